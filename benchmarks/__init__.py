@@ -1,0 +1,1 @@
+"""Claims as commands: ``python -m benchmarks.NAME --json``."""

@@ -1,0 +1,1 @@
+"""Observation + recording -> misfit -> fitted genome."""

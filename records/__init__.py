@@ -1,0 +1,27 @@
+"""What flows through wingfit: wings, conditions, recordings, genes. Nothing here computes physics.
+
+All quantities are SI, angles in radians; unit suffixes appear only in files and over HTTP.
+Axes (docs/notation.md): x aft along the chord, y outboard along the span, z up. The hinge axis is parallel to x.
+"""
+
+from records.dataset import Condition, Dataset, Recording
+from records.drive import Drive, FourBarDrive, FourierDrive
+from records.genes import Gene, Genome
+from records.wing import Hinge, Marker, Materials, Rod, Station, Wing
+
+__all__ = [
+    "Condition",
+    "Dataset",
+    "Drive",
+    "FourBarDrive",
+    "FourierDrive",
+    "Gene",
+    "Genome",
+    "Hinge",
+    "Marker",
+    "Materials",
+    "Recording",
+    "Rod",
+    "Station",
+    "Wing",
+]

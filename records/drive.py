@@ -1,0 +1,38 @@
+"""The motion of the driving rods, as data: how the flap angle follows the phase of the beat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class FourierDrive:
+    """Flap angle as a Fourier series of the drive phase psi, in rad.
+
+    phi(psi) = mean + sum_k [cosine[k-1] cos(k psi) + sine[k-1] sin(k psi)], k = 1, 2, ...
+    """
+
+    mean: float
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    kind: Literal["fourier"] = "fourier"
+
+
+@dataclass(frozen=True)
+class FourBarDrive:
+    """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod (thesis III-F).
+
+    Lengths in m; ``ground`` joins the two fixed pivots. The crank angle equals the drive phase psi.
+    ``offset`` is added to the rocker angle so that zero flap angle is the horizontal wing (rad).
+    """
+
+    ground: float
+    crank: float
+    coupler: float
+    rocker: float
+    offset: float
+    kind: Literal["four_bar"] = "four_bar"
+
+
+Drive = FourierDrive | FourBarDrive

@@ -1,0 +1,109 @@
+"""Genes (named, bounded parameters of a model) and genomes (their values in a declared order)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Scale = Literal["log", "linear"]
+
+
+@dataclass(frozen=True)
+class Gene:
+    """One parameter that a calibration may search.
+
+    ``share_of`` names a group whose values are weights: the model divides each by the sum of its group, so
+    that the shares sum to one for every genome (thesis Eqs. 12-13).
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    lower: float
+    upper: float
+    scale: Scale
+    description: str
+    share_of: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.lower < self.upper:
+            raise ValueError(f"gene '{self.name}': lower bound {self.lower} must be below upper bound {self.upper}")
+        if self.scale == "log" and self.lower <= 0:
+            raise ValueError(
+                f"gene '{self.name}': a log-scaled gene needs a positive lower bound, got {self.lower} {self.unit}"
+            )
+        self.check(self.nominal)
+
+    def check(self, value: float) -> None:
+        """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
+        if not (math.isfinite(value) and self.lower <= value <= self.upper):
+            raise ValueError(
+                f"gene '{self.name}' is {value:g} {self.unit}; it must lie in [{self.lower:g}, {self.upper:g}] {self.unit}"
+            )
+
+    def to_unit(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Map values to [0, 1], logarithmically for a log-scaled gene."""
+        v = np.asarray(value, float)
+        if self.scale == "log":
+            return np.log(v / self.lower) / math.log(self.upper / self.lower)
+        return (v - self.lower) / (self.upper - self.lower)
+
+    def from_unit(self, u: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Inverse of :meth:`to_unit`; the result never leaves the bounds."""
+        x = np.asarray(u, float)
+        if self.scale == "log":
+            value = self.lower * np.exp(x * math.log(self.upper / self.lower))
+        else:
+            value = self.lower + x * (self.upper - self.lower)
+        return np.clip(value, self.lower, self.upper)
+
+
+@dataclass(frozen=True)
+class Genome:
+    """Values of genes, in the order of ``genes``."""
+
+    genes: tuple[Gene, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.genes) != len(self.values):
+            raise ValueError(f"a genome of {len(self.genes)} genes needs as many values, got {len(self.values)}")
+        for gene, value in zip(self.genes, self.values, strict=True):
+            gene.check(value)
+
+    @classmethod
+    def nominal(cls, genes: Sequence[Gene]) -> Genome:
+        """The genome of all nominal values."""
+        return cls(tuple(genes), tuple(gene.nominal for gene in genes))
+
+    def __getitem__(self, name: str) -> float:
+        return self.as_dict()[name]
+
+    def as_dict(self) -> dict[str, float]:
+        """Values by gene name."""
+        return {gene.name: value for gene, value in zip(self.genes, self.values, strict=True)}
+
+    def replace(self, values: Mapping[str, float]) -> Genome:
+        """Return a genome with the named values changed; an unknown name raises ValueError with the known ones."""
+        known = self.as_dict()
+        unknown = sorted(set(values) - set(known))
+        if unknown:
+            raise ValueError(f"unknown gene {unknown[0]!r}; the model has {', '.join(known)}")
+        merged = known | {name: float(value) for name, value in values.items()}
+        return Genome(self.genes, tuple(merged[gene.name] for gene in self.genes))
+
+    def normalised(self) -> dict[str, float]:
+        """Values by name with every share group divided by its sum: what the model uses and what people compare."""
+        sums: dict[str, float] = {}
+        for gene, value in zip(self.genes, self.values, strict=True):
+            if gene.share_of:
+                sums[gene.share_of] = sums.get(gene.share_of, 0.0) + value
+        return {
+            gene.name: value / sums[gene.share_of] if gene.share_of else value
+            for gene, value in zip(self.genes, self.values, strict=True)
+        }

@@ -1,0 +1,93 @@
+"""Description of a wing: planform, materials, rods, markers, hinge and drive. SI units, radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from records.drive import Drive
+
+
+@dataclass(frozen=True)
+class Station:
+    """Section of the planform at span position ``y``: leading edge ``x``, chord and thickness in m."""
+
+    y: float
+    leading_edge: float
+    chord: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Carbon rod that slides in a straw glued into the foam, straight from (x_root, y_root) to (x_tip, y_tip), in m.
+
+    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod continues the driving rod of the same name.
+    """
+
+    name: str
+    x_root: float
+    y_root: float
+    x_tip: float
+    y_tip: float
+    diameter: float
+    density: float
+    glue_linear_density: float
+
+
+@dataclass(frozen=True)
+class Materials:
+    """Masses that are no genes: foam (kg/m^3), skin with its glue (kg/m^2, both faces together)."""
+
+    foam_density: float
+    skin_areal_density: float
+
+
+@dataclass(frozen=True)
+class Marker:
+    """Tracked marker: rest position (x, y, z) in m in the wing frame, and mass in kg."""
+
+    name: str
+    position: tuple[float, float, float]
+    mass: float
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """Axis of flapping, parallel to x through (y, z), in m in the wing frame."""
+
+    y: float
+    z: float
+
+
+@dataclass(frozen=True)
+class Wing:
+    """A wing as built: everything a model needs that is not a gene.
+
+    ``driven_rods`` are the names of the front and the rear rod; the rear one follows by the condition's phase lag.
+    ``reference_markers`` define the start of the beat: where their mean height crosses that of the hinge on the
+    upstroke (thesis IV-A). ``estimates`` are the user's estimates of genes by name, overriding the model's defaults.
+    """
+
+    name: str
+    stations: tuple[Station, ...]
+    materials: Materials
+    rods: tuple[Rod, ...]
+    driven_rods: tuple[str, str]
+    markers: tuple[Marker, ...]
+    reference_markers: tuple[str, ...]
+    hinge: Hinge
+    drive: Drive
+    estimates: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def span(self) -> float:
+        """Distance from the root station to the tip station, m."""
+        return self.stations[-1].y - self.stations[0].y
+
+    def marker(self, name: str) -> Marker:
+        """The marker called ``name``."""
+        for marker in self.markers:
+            if marker.name == name:
+                return marker
+        raise ValueError(f"no marker {name!r} on wing {self.name!r}; it has {', '.join(m.name for m in self.markers)}")

@@ -1,0 +1,1 @@
+"""HTTP, database, command line, Python client, web page."""

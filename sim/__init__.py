@@ -1,0 +1,1 @@
+"""Wing + genome + condition -> observation."""

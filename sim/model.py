@@ -1,0 +1,47 @@
+"""The protocol that every simulated rig meets; calibration and diagnosis know nothing else about physics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Gene, Recording
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What a batch of B individuals would have been recorded as.
+
+    ``channels`` has shape [B, T, C] in the layout of the recording; a failed individual's row is NaN and its entry in
+    ``reasons`` says why (None for a good one).
+    """
+
+    channels: Array
+    reasons: tuple[str | None, ...]
+
+
+class Model(Protocol):
+    """A simulated rig."""
+
+    @property
+    def genes(self) -> tuple[Gene, ...]:
+        """All genes of the model, in the order of the columns of a genome batch."""
+        ...
+
+    def observe(self, genomes: Array, recording: Recording) -> Observation:
+        """Simulate ``genomes`` [B, G] under the recording's condition, sampled and aligned like the recording."""
+        ...
+
+
+def genome_batch(genes: Sequence[Gene], genomes: npt.ArrayLike) -> Array:
+    """Return ``genomes`` as a contiguous [B, G] float array; ValueError when the shape does not fit the genes."""
+    batch = np.ascontiguousarray(np.atleast_2d(np.asarray(genomes, float)))
+    if batch.ndim != 2 or batch.shape[1] != len(genes):
+        raise ValueError(f"a genome batch needs shape [B, {len(genes)}], got {list(np.shape(genomes))}")
+    return batch
