@@ -1,0 +1,48 @@
+"""How a wing is cut into rigid bodies: strips along the span, each into bodies along the chord (thesis Fig. 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+PRESETS = {"4": (1, 1, 1, 1), "11": (3, 3, 3, 2), "24": (4, 4, 4, 4, 4, 4)}
+MAX_STRIPS, MAX_CHORDWISE = 64, 16
+
+
+@dataclass(frozen=True)
+class Division:
+    """Bodies along the chord in each strip, root first."""
+
+    bodies: tuple[int, ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Division:
+        """Read a preset ("4", "11", "24"), "STRIPSxCHORDWISE" ("6x4") or a list ("3,3,3,2")."""
+        if text in PRESETS:
+            return cls(PRESETS[text])
+        try:
+            if "x" in text:
+                strips, chordwise = (int(part) for part in text.split("x"))
+                if not 1 <= strips <= MAX_STRIPS:
+                    raise ValueError
+                counts: tuple[int, ...] = (chordwise,) * strips
+            else:
+                counts = tuple(int(part) for part in text.split(","))
+        except ValueError:
+            counts = ()
+        good = 2 <= len(counts) <= MAX_STRIPS and all(1 <= n <= MAX_CHORDWISE for n in counts)
+        if not good:
+            raise ValueError(
+                f"division {text!r} is not understood; give a preset ({', '.join(PRESETS)}), strips x bodies along the "
+                f"chord such as 6x4, or bodies per strip from the root such as 3,3,3,2 "
+                f"(2 to {MAX_STRIPS} strips of 1 to {MAX_CHORDWISE} bodies)"
+            )
+        return cls(counts)
+
+    @property
+    def total(self) -> int:
+        """Number of bodies."""
+        return sum(self.bodies)
+
+    def index(self, strip: int, chordwise: int) -> int:
+        """Number of a body: strips from the root, in each from the leading edge."""
+        return sum(self.bodies[:strip]) + chordwise

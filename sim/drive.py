@@ -1,0 +1,64 @@
+"""Flap angle of the driving rods over the beat, with its first two derivatives."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Drive, FourBarDrive, FourierDrive
+
+Array = npt.NDArray[np.float64]
+
+_SAMPLES = 512
+_HARMONICS = 40
+
+
+def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
+    """[..., 3]: angle (rad) and its first and second derivative by the drive phase ``psi`` (rad)."""
+    phase = np.asarray(psi, float)
+    series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
+    k = np.arange(1, max(len(series.cosine), len(series.sine)) + 1)
+    a, b = _padded(series.cosine, len(k)), _padded(series.sine, len(k))
+    c, s = np.cos(phase[..., None] * k), np.sin(phase[..., None] * k)
+    angle = series.mean + c @ a + s @ b
+    first = c @ (k * b) - s @ (k * a)
+    second = -(c @ (k**2 * a) + s @ (k**2 * b))
+    return np.stack([angle, first, second], axis=-1)
+
+
+def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:
+    """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
+
+    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is where the circles of the coupler
+    about the crank pin and of the rocker about its pivot meet, on the side that the open linkage keeps.
+    """
+    phase = np.asarray(psi, float)
+    px, py = linkage.crank * np.cos(phase), linkage.crank * np.sin(phase)
+    dx, dy = px - linkage.ground, py
+    diagonal2 = dx**2 + dy**2
+    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # the crank stays on the far side of the rocker's pivot
+    cosine = (linkage.rocker**2 + diagonal2 - linkage.coupler**2) / (2 * linkage.rocker * np.sqrt(diagonal2))
+    if np.any(np.abs(cosine) > 1):
+        raise ValueError(
+            f"four-bar linkage with ground {linkage.ground:g}, crank {linkage.crank:g}, coupler {linkage.coupler:g}, "
+            f"rocker {linkage.rocker:g} m cannot turn a full revolution; shorten the crank"
+        )
+    return np.asarray(along - np.arccos(cosine) + linkage.offset)
+
+
+@lru_cache(maxsize=64)
+def _four_bar_series(linkage: FourBarDrive) -> FourierDrive:
+    """The rocker angle as a Fourier series, exact to round-off for the linkages at hand (coefficients fall fast)."""
+    psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    angle = four_bar_angle(linkage, psi)
+    coefficients = np.fft.rfft(angle) / _SAMPLES
+    head = coefficients[1 : _HARMONICS + 1]
+    return FourierDrive(float(coefficients[0].real), tuple(2 * head.real), tuple(-2 * head.imag))
+
+
+def _padded(values: tuple[float, ...], length: int) -> Array:
+    out = np.zeros(length)
+    out[: len(values)] = values
+    return out

@@ -1,0 +1,46 @@
+"""Rectangular cross sections and round rods: areas and second moments."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """Cross section ``width`` x ``thickness`` (m) of the foam between two bodies."""
+
+    width: float
+    thickness: float
+
+    @property
+    def area(self) -> float:
+        """A, m^2."""
+        return self.width * self.thickness
+
+    @property
+    def flapwise(self) -> float:
+        """Second moment for bending out of the wing's plane, w h^3 / 12, m^4."""
+        return self.width * self.thickness**3 / 12
+
+    @property
+    def inplane(self) -> float:
+        """Second moment for bending in the wing's plane, h w^3 / 12, m^4."""
+        return self.thickness * self.width**3 / 12
+
+    @property
+    def torsion(self) -> float:
+        """Saint-Venant torsion constant, m^4 (Roark, table for the solid rectangle; within 1 % of the series)."""
+        a, b = max(self.width, self.thickness), min(self.width, self.thickness)
+        r = b / a
+        return a * b**3 * (1 / 3 - 0.21 * r * (1 - r**4 / 12))
+
+
+def round_area(diameter: float) -> float:
+    """Area of a round rod, m^2."""
+    return math.pi * diameter**2 / 4
+
+
+def round_second_moment(diameter: float) -> float:
+    """Second moment of a round rod about a diameter, m^4."""
+    return math.pi * diameter**4 / 64

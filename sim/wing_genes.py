@@ -1,0 +1,122 @@
+"""The genes of the flexible wing (thesis Eqs. 18 and 19) and what they set in the lanes of the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Gene
+from sim.kernels import LANES
+from sim.kernels.integrate import Lanes
+from sim.structure import SHEAR, Structure
+
+Array = npt.NDArray[np.float64]
+Group = Literal["structure", "aerodynamics"]
+
+QUARTERS = 4
+FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
+
+# name, unit, default estimate, description
+_STRUCTURE = (
+    ("E_f", "Pa", 6.0e6, "Young's modulus of the foam with its skin"),
+    ("E_r", "Pa", 7.0e10, "Young's modulus of the carbon rods with their glue"),
+    ("G_f", "Pa", 2.2e6, "shear modulus of the foam with its skin"),
+    ("G_r", "Pa", 3.0e9, "shear modulus of the carbon rods with their glue"),
+    ("D_E", "Pa s", 3.0e4, "damping that goes with Young's modulus of the foam"),
+    ("D_G", "Pa s", 1.2e4, "damping that goes with the shear modulus of the foam"),
+)
+_AERODYNAMICS = (
+    ("L_a", "1/rad", 4.0, "slope of the lift coefficient with angle of attack"),
+    ("L_b", "1", 0.3, "lift coefficient at zero angle of attack"),
+    ("ID_a", "1/rad", 0.8, "slope of the induced-drag coefficient with the magnitude of the angle of attack"),
+    ("ID_b", "1", 0.08, "induced-drag coefficient at zero angle of attack"),
+)
+_SHARES = (0.4, 0.3, 0.2, 0.1)
+
+STRUCTURAL = tuple(row[0] for row in _STRUCTURE)
+AERODYNAMIC = (
+    *(row[0] for row in _AERODYNAMICS),
+    *(f"L_{k}" for k in range(1, QUARTERS + 1)),
+    *(f"ID_{k}" for k in range(1, QUARTERS + 1)),
+)
+
+
+def group(name: str) -> Group:
+    """Whether a gene belongs to the structure or to the aerodynamics."""
+    return "structure" if name in STRUCTURAL else "aerodynamics"
+
+
+def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[Gene, ...]:
+    """All genes, bounded by ``factor`` around the estimates; ValueError for an unknown or non-positive estimate."""
+    rows = [*_STRUCTURE, *_AERODYNAMICS]
+    for prefix, what in (("L", "lift"), ("ID", "induced drag")):
+        for k, share in enumerate(_SHARES, 1):
+            rows.append((f"{prefix}_{k}", "1", share, f"weight of the strip's {what} on quarter {k} of the chord"))
+    known = [row[0] for row in rows]
+    for name, value in estimates.items():
+        if name not in known:
+            raise ValueError(f"estimate for unknown gene {name!r}; the flexible wing has {', '.join(known)}")
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"estimate of gene {name!r} is {value:g}; it must be positive and finite")
+    return tuple(_gene(name, unit, estimates.get(name, default), text, factor) for name, unit, default, text in rows)
+
+
+def _gene(name: str, unit: str, nominal: float, text: str, factor: float) -> Gene:
+    share = {"L_1": "L", "L_2": "L", "L_3": "L", "L_4": "L"}.get(name)
+    if name.startswith("ID_") and name[3:].isdigit():
+        share = "ID"
+    return Gene(name, unit, nominal, nominal / factor, nominal * factor, "log", text, share)
+
+
+def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lanes:
+    """Stiffness, damping and air coefficients of up to LANES genomes [B, G]; spare lanes repeat the last one."""
+    column = {gene.name: k for k, gene in enumerate(genes)}
+    padded = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
+
+    def value(name: str) -> Array:
+        return padded[:, column[name]]
+
+    foam = np.array([c.foam for c in structure.connectors])[:, :, None]
+    rod = np.array([c.rod for c in structure.connectors])[:, :, None]
+    shear = np.array([[m == SHEAR for m in c.modulus] for c in structure.connectors])[:, :, None]
+    # rods: E_r I_r in bending (rotations), G_r A_r across (translations), thesis Eqs. 15-16
+    rod_modulus = np.concatenate([np.tile(value("E_r"), (3, 1)), np.tile(value("G_r"), (3, 1))])
+    stiffness = foam * np.where(shear, value("G_f"), value("E_f")) + rod * rod_modulus
+    damping = foam * np.where(shear, value("D_G"), value("D_E"))
+    shares, places = {}, {}
+    for prefix in ("L", "ID"):
+        weights = np.array([value(f"{prefix}_{k}") for k in range(1, QUARTERS + 1)])
+        shares[prefix], places[prefix] = _distribute(structure, weights / weights.sum(axis=0))
+    return Lanes(
+        stiffness=np.ascontiguousarray(stiffness),
+        damping=np.ascontiguousarray(damping),
+        coefficients=np.ascontiguousarray([value(name) for name in ("L_a", "L_b", "ID_a", "ID_b")]),
+        lift_share=shares["L"],
+        lift_x=places["L"],
+        drag_share=shares["ID"],
+        drag_x=places["ID"],
+    )
+
+
+def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
+    """Share [N, W] of the strip's force on each body, and where along the chord [N, W] it acts in the body's frame.
+
+    The shares belong to the quarters of the chord, whatever the division: a body takes what its stretch of chord
+    covers, at the centroid of what it takes.
+    """
+    edges = np.linspace(0, 1, QUARTERS + 1)
+    share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
+    for n, panel in enumerate(structure.panels):
+        for q in range(QUARTERS):
+            s0, s1 = max(panel.s0, edges[q]), min(panel.s1, edges[q + 1])
+            if s1 <= s0:
+                continue
+            part = quarters[q] * (s1 - s0) * QUARTERS
+            y = 0.5 * (panel.y0 + panel.y1)
+            x = structure.planform.x(0.5 * (s0 + s1), y) - structure.bodies[n].centre[0]
+            share[n] += part
+            moment[n] += part * x
+    return share, moment / share
