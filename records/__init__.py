@@ -6,13 +6,17 @@ Axes (docs/notation.md): x aft along the chord, y outboard along the span, z up.
 
 from records.dataset import Condition, Dataset, Recording
 from records.drive import Drive, FourBarDrive, FourierDrive
+from records.errors import DatasetError, Fault
 from records.genes import Gene, Genome
+from records.storage import load_archive, load_dataset, save_dataset
 from records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 
 __all__ = [
     "Condition",
     "Dataset",
+    "DatasetError",
     "Drive",
+    "Fault",
     "FourBarDrive",
     "FourierDrive",
     "Gene",
@@ -24,4 +28,7 @@ __all__ = [
     "Rod",
     "Station",
     "Wing",
+    "load_archive",
+    "load_dataset",
+    "save_dataset",
 ]

@@ -1,0 +1,112 @@
+"""The one exception of the file formats: what is wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from records.limits import MAX_ERRORS
+
+_SHOWN = 80
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One error: ``where`` (file with line or key), the offending ``value``, ``message`` with the remedy."""
+
+    where: str
+    value: str | None
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}"
+
+
+class DatasetError(ValueError):
+    """A dataset that cannot be read or written.
+
+    ``errors`` lists what was found, at most ``MAX_ERRORS``; ``found`` counts all. ``where``, ``value`` and
+    ``message`` are those of the first.
+    """
+
+    def __init__(self, errors: Sequence[Fault], found: int | None = None) -> None:
+        if not errors:
+            raise ValueError("a DatasetError needs at least one fault")
+        self.errors = list(errors[:MAX_ERRORS])
+        self.found = max(len(errors), found or 0)
+        self.where = self.errors[0].where
+        self.value = self.errors[0].value
+        self.message = self.errors[0].message
+        lines = [str(fault) for fault in self.errors]
+        if self.found > len(self.errors):
+            lines.append(f"and {self.found - len(self.errors)} more")
+        super().__init__("\n".join(lines))
+
+    def __reduce__(self) -> tuple[type[DatasetError], tuple[list[Fault], int]]:
+        return type(self), (self.errors, self.found)
+
+
+class Faults:
+    """Collects faults so that a user sees several at once; counts all, keeps the first ``MAX_ERRORS``."""
+
+    def __init__(self) -> None:
+        self.kept: list[Fault] = []
+        self.found = 0
+
+    def add(self, where: str, value: object, message: str) -> None:
+        """Note one fault."""
+        self.found += 1
+        if len(self.kept) < MAX_ERRORS:
+            self.kept.append(Fault(where, shown(value), message))
+
+    def extend(self, error: DatasetError) -> None:
+        """Take over the faults of another error."""
+        self.kept.extend(error.errors[: MAX_ERRORS - len(self.kept)])
+        self.found += error.found
+
+    @property
+    def full(self) -> bool:
+        """True once looking for more is no help to anybody."""
+        return self.found >= MAX_ERRORS
+
+    def raise_any(self) -> None:
+        """Raise DatasetError when there is anything to report."""
+        if self.kept:
+            raise DatasetError(self.kept, self.found)
+
+
+def fail(where: str, value: object, message: str) -> DatasetError:
+    """Make a DatasetError with one fault, to be raised."""
+    return DatasetError([Fault(where, shown(value), message)])
+
+
+def shown(value: object) -> str | None:
+    """``value`` as short text for a message."""
+    if value is None:
+        return None
+    if isinstance(value, (dict, list, tuple)):
+        return f"{'mapping' if isinstance(value, dict) else 'list'} of {len(value)}"
+    text = str(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}... ({len(text)} characters)"
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Hint at the name that was meant: the nearest known one, or the known ones."""
+    names = list(known)
+    close = difflib.get_close_matches(name, names, 1, 0.6)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"known: {listed}" if names else "there are none"
+
+
+def decode(raw: bytes, file: str) -> str:
+    """UTF-8 text of a file, a byte-order mark removed; DatasetError names the line that is not UTF-8."""
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        byte = f"0x{raw[error.start]:02x}"
+        message = f"byte {byte} is not UTF-8 text; save the file as UTF-8 (not UTF-16 or Latin-1)"
+        raise fail(f"{file}, line {line}", byte, message) from None

@@ -1,0 +1,66 @@
+"""Exact conversion between the units people write (deg, mbar, Celsius) and SI inside.
+
+Doubles in degrees do not reach every double in radians: where the mantissa of the degree value is the coarser
+one, two neighbours straddle the wanted radian. So a number in a file is read as a decimal, converted in long
+arithmetic and rounded once; and it is written with as few digits as bring back the same double (18 now and
+then, where 17 would do without a change of unit). Reading what was written is therefore exact.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from decimal import Context, Decimal
+
+_LONG = Context(prec=60, Emin=-999_999, Emax=999_999)
+_PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of the files: SI value = ``factor`` x value + ``offset``."""
+
+    factor: Decimal = Decimal(1)
+    offset: Decimal = Decimal(0)
+
+
+SI = Unit()
+DEG = Unit(_LONG.divide(_PI, Decimal(180)))
+MBAR = Unit(Decimal(100))
+CELSIUS = Unit(offset=Decimal("273.15"))
+
+
+def to_si(value: Decimal, unit: Unit = SI) -> float:
+    """Round ``value`` converted to SI to the nearest double."""
+    if unit == SI:
+        return float(value)
+    scaled = _LONG.multiply(value, unit.factor)
+    # Adding a zero offset would turn -0 into 0.
+    return float(_LONG.add(scaled, unit.offset) if unit.offset else scaled)
+
+
+def from_si(value: float, unit: Unit = SI) -> Decimal:
+    """Find the shortest decimal in ``unit`` that :func:`to_si` turns back into ``value``, bit for bit."""
+    value = float(value)
+    if unit == SI or not math.isfinite(value):
+        return Decimal(repr(value))
+    exact = _LONG.divide(_LONG.subtract(Decimal(value), unit.offset), unit.factor)
+    candidates = (Decimal(0), Decimal("-0"), *(Context(prec=n).plus(exact) for n in range(1, 40)))
+    # Only temperatures within a hair of absolute zero find no candidate; the format refuses them.
+    return next((candidate for candidate in candidates if _same(to_si(candidate, unit), value)), exact)
+
+
+def number_text(value: Decimal) -> str:
+    """``value`` as text that YAML 1.1 and 1.2 readers alike take for a number."""
+    text = repr(float(value))
+    if Decimal(text) != value:
+        text = str(value).lower()
+    mantissa, _, exponent = text.partition("e")
+    if exponent and "." not in mantissa:
+        mantissa += ".0"
+    return f"{mantissa}e{exponent}" if exponent else mantissa
+
+
+def _same(a: float, b: float) -> bool:
+    return struct.pack("<d", a) == struct.pack("<d", b)
