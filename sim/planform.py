@@ -55,15 +55,15 @@ class Planform:
 
     def leading_edge(self, y: npt.ArrayLike) -> Array:
         """x of the leading edge at span position y, m."""
-        return np.asarray(np.interp(y, self._y, self._le))
+        return np.asarray(np.interp(np.asarray(y, float), self._y, self._le))
 
     def chord(self, y: npt.ArrayLike) -> Array:
         """Chord at span position y, m."""
-        return np.asarray(np.interp(y, self._y, self._chord))
+        return np.asarray(np.interp(np.asarray(y, float), self._y, self._chord))
 
     def thickness(self, y: npt.ArrayLike) -> Array:
         """Thickness at span position y, m."""
-        return np.asarray(np.interp(y, self._y, self._thickness))
+        return np.asarray(np.interp(np.asarray(y, float), self._y, self._thickness))
 
     def x(self, fraction: float, y: float) -> float:
         """x at a fraction of the chord, m."""
@@ -139,7 +139,7 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
     centre = masses @ places / total
     r = places - centre
     inertia = np.eye(3) * (masses @ (r**2).sum(axis=1)) - (r * masses[:, None]).T @ r
-    # thickness: foam through it, skin half on each face; the cells' own extent in the plane is below the quadrature error
+    # thickness: foam through it, skin half on each face
     through = float((foam * h**2 / 12 + skin * h**2 / 4).sum())
     inertia += np.diag([through, through, 0.0])
     area = float(cell.sum())

@@ -12,6 +12,7 @@ from sim.atmosphere import density
 from sim.drive import flap_angle
 from sim.kernels import LANES
 from sim.kernels.integrate import NODES, PORTS, Setting, State, Trace, advance, new_work
+from sim.periodic import extrapolate
 from sim.structure import Structure
 from sim.wing_genes import lanes
 
@@ -30,12 +31,14 @@ class Numerics:
         ramp_beats: the drive's amplitude grows from rest over these first beats.
         max_beats: after which a wing that is still not periodic is reported.
         periodic: largest marker displacement between successive beats (m) that counts as periodic.
+        window: beats between extrapolations to the periodic motion; 0 waits for transients to die.
     """
 
-    steps: int = 120
+    steps: int = 160
     ramp_beats: int = 1
-    max_beats: int = 20
-    periodic: float = 2e-5
+    max_beats: int = 24
+    periodic: float = 5e-5
+    window: int = 4
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class Beat:
         rods: [B, n, 2, 6] wrench (moment, force) of the wing on the front and rear driving rod, rod frame at the hinge.
         air: [B, n, 3] force of the air on the wing in the world, N.
         energy: [B, n, 3] kinetic, elastic, gravitational, J.
-        work: [B, n + 1, 4] work done on the wing over the beat through dampers, front and rear motor, and air, J.
+        power: [B, n, 4] into the wing through dampers, front motor, rear motor and air, W.
         beats: [B] beats simulated until periodic.
         reasons: why an individual failed, else None.
     """
@@ -56,7 +59,7 @@ class Beat:
     rods: Array
     air: Array
     energy: Array
-    work: Array
+    power: Array
     beats: npt.NDArray[np.int64]
     reasons: tuple[str | None, ...]
 
@@ -69,8 +72,13 @@ def periodic_beat(
         _run_group(structure, genes, genomes[k : k + LANES], condition, numerics) for k in range(0, len(genomes), LANES)
     ]
     return Beat(
-        *(np.concatenate([getattr(g, name) for g in groups]) for name in ("tracks", "rods", "air", "energy", "work", "beats")),
-        tuple(reason for g in groups for reason in g.reasons),
+        tracks=np.concatenate([g.tracks for g in groups]),
+        rods=np.concatenate([g.rods for g in groups]),
+        air=np.concatenate([g.air for g in groups]),
+        energy=np.concatenate([g.energy for g in groups]),
+        power=np.concatenate([g.power for g in groups]),
+        beats=np.concatenate([g.beats for g in groups]),
+        reasons=tuple(reason for g in groups for reason in g.reasons),
     )
 
 
@@ -80,7 +88,7 @@ def drive_table(structure: Structure, condition: Condition, numerics: Numerics, 
     phase = 2 * np.pi * (np.arange(n)[:, None, None] + NODES[None, :, None]) / n - np.array([0.0, condition.phase_lag])
     angle = flap_angle(structure.wing.drive, phase) * np.array([1.0, omega, omega**2])
     if beat >= numerics.ramp_beats:
-        return angle
+        return np.asarray(angle)
     # smooth start from rest: 0 at the start, 1 at the end of the ramp, rate and acceleration zero at both
     x = (beat + (np.arange(n)[:, None, None] + NODES[None, :, None]) / n) / numerics.ramp_beats
     rate = condition.flap_frequency / numerics.ramp_beats
@@ -117,7 +125,7 @@ def new_trace(structure: Structure, steps: int) -> Trace:
         tracks=np.zeros((steps, len(structure.wing.markers), 3, LANES)),
         rods=np.zeros((steps, 2, 6, LANES)),
         air=np.zeros((steps, 3, LANES)),
-        ledger=np.zeros((steps + 1, PORTS, LANES)),
+        power=np.zeros((steps, PORTS, LANES)),
         energy=np.zeros((steps, 3, LANES)),
     )
 
@@ -134,11 +142,9 @@ def _run_group(
     beats, change = np.zeros(LANES, np.int64), np.full(LANES, np.inf)
     tables = [drive_table(structure, condition, numerics, beat) for beat in range(numerics.ramp_beats + 1)]
     before = np.full_like(trace.tracks, np.inf)
+    history: list[State] = []
     for beat in range(numerics.max_beats):
-        trace.ledger[0] = 0.0
-        advance(
-            structure.wiring, here, group, tables[min(beat, numerics.ramp_beats)], work, state, trace, alive
-        )
+        advance(structure.wiring, here, group, tables[min(beat, numerics.ramp_beats)], work, state, trace, alive)
         with np.errstate(invalid="ignore"):
             change = np.abs(trace.tracks - before).max(axis=(0, 1, 2))
         before = trace.tracks.copy()
@@ -151,6 +157,11 @@ def _run_group(
         done |= arrived
         if done.all():
             break
+        if beat >= numerics.ramp_beats - 1 and numerics.window:
+            history.append(State(*(array.copy() for array in state)))
+        if len(history) > numerics.window:
+            extrapolate(history, ~done, 2 * np.pi * condition.flap_frequency, state)
+            history, before = [], np.full_like(before, np.inf)
     reasons = tuple(
         _reason(bool(alive[k]), bool(done[k]), int(beats[k]), float(change[k]), numerics) for k in range(count)
     )
@@ -158,8 +169,8 @@ def _run_group(
         if reason is not None:
             for array in kept:
                 array[..., k] = np.nan
-    tracks, rods, air, ledger, energy = (np.moveaxis(array, -1, 0)[:count] for array in kept)
-    return Beat(tracks.copy(), rods.copy(), air.copy(), energy.copy(), ledger.copy(), beats[:count], reasons)
+    tracks, rods, air, power, energy = (np.moveaxis(array, -1, 0)[:count] for array in kept)
+    return Beat(tracks.copy(), rods.copy(), air.copy(), energy.copy(), power.copy(), beats[:count], reasons)
 
 
 def _reason(alive: bool, done: bool, beats: int, change: float, numerics: Numerics) -> str | None:

@@ -57,7 +57,7 @@ def build(wing: Wing, division: Division) -> Structure:
     panels = planform.panels(division)
     parts = bodies(planform, panels)
     connectors = [
-        *_along_span(planform, division, panels, parts),
+        *_along_span(planform, division, parts),
         *_along_chord(planform, division, panels, parts),
         *_at_root(planform, division, panels, parts),
     ]
@@ -88,9 +88,7 @@ def _rod_rigidities(diameter: float) -> Array:
     return np.array([second, 0.0, second, A, 0.0, A])
 
 
-def _along_span(
-    planform: Planform, division: Division, panels: list[Panel], parts: list[Body]
-) -> list[Connector]:
+def _along_span(planform: Planform, division: Division, parts: list[Body]) -> list[Connector]:
     found = []
     edges = planform.strips(division)
     for strip in range(len(division.bodies) - 1):
@@ -115,9 +113,7 @@ def _along_span(
     return found
 
 
-def _along_chord(
-    planform: Planform, division: Division, panels: list[Panel], parts: list[Body]
-) -> list[Connector]:
+def _along_chord(planform: Planform, division: Division, panels: list[Panel], parts: list[Body]) -> list[Connector]:
     found = []
     for strip, count in enumerate(division.bodies):
         for k in range(count - 1):
@@ -132,9 +128,7 @@ def _along_chord(
     return found
 
 
-def _at_root(
-    planform: Planform, division: Division, panels: list[Panel], parts: list[Body]
-) -> list[Connector]:
+def _at_root(planform: Planform, division: Division, panels: list[Panel], parts: list[Body]) -> list[Connector]:
     """The driven rods hold the root: each the body it enters, with the foam of that body shared among its rods."""
     wing = planform.wing
     y = wing.stations[0].y
@@ -144,7 +138,7 @@ def _at_root(
         x = rod_at(rod, max(y, rod.y_root))
         if x is None or rod.y_root > y + 0.02:
             raise ValueError(
-                f"driven rod {name!r} starts at y = {rod.y_root:g} m, more than 0.02 m outboard of the root at {y:g} m; "
+                f"driven rod {name!r} starts at y = {rod.y_root:g} m, over 0.02 m outboard of the root at {y:g} m; "
                 "it must reach the root to drive the wing"
             )
         fraction = min(planform.fraction(x, y), 1 - 1e-9)
@@ -183,7 +177,8 @@ def _wiring(
         first=first,
         second=second,
         block=np.array(
-            [n + pattern.number[(int(j), int(i))] if i < n else -1 for i, j in zip(first, second, strict=True)], np.int64
+            [n + pattern.number[(int(j), int(i))] if i < n else -1 for i, j in zip(first, second, strict=True)],
+            np.int64,
         ),
         driven=int(np.argmax(first >= n)),
         a=np.array(base),

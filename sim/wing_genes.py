@@ -22,11 +22,11 @@ FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
 # name, unit, default estimate, description
 _STRUCTURE = (
     ("E_f", "Pa", 6.0e6, "Young's modulus of the foam with its skin"),
-    ("E_r", "Pa", 7.0e10, "Young's modulus of the carbon rods with their glue"),
+    ("E_r", "Pa", 1.2e11, "Young's modulus of the carbon rods with their glue"),
     ("G_f", "Pa", 2.2e6, "shear modulus of the foam with its skin"),
     ("G_r", "Pa", 3.0e9, "shear modulus of the carbon rods with their glue"),
-    ("D_E", "Pa s", 3.0e4, "damping that goes with Young's modulus of the foam"),
-    ("D_G", "Pa s", 1.2e4, "damping that goes with the shear modulus of the foam"),
+    ("D_E", "Pa s", 6.0e4, "damping that goes with Young's modulus of the foam"),
+    ("D_G", "Pa s", 2.5e4, "damping that goes with the shear modulus of the foam"),
 )
 _AERODYNAMICS = (
     ("L_a", "1/rad", 4.0, "slope of the lift coefficient with angle of attack"),

@@ -48,7 +48,7 @@ STAGE = ALPHA @ _INVERSE
 COUPLING = np.diag(np.full(4, 1.0 / GAMMA)) - _INVERSE
 UPDATE = WEIGHTS @ _INVERSE
 
-# Rows of the ledger [PORTS, W]: work since the start, J.
+# Ports through which power enters the wing.
 DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
 MAX_ROTATION = 1.0  # rad in one step; beyond, the individual has diverged
 
@@ -90,7 +90,10 @@ class Setting(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """What differs between individuals: stiffness, damping [C, 6, W], air coefficients [4, W], shares and places [N, W]."""
+    """What differs between individuals.
+
+    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W].
+    """
 
     stiffness: Array
     damping: Array
@@ -135,20 +138,19 @@ class Work(NamedTuple):
     stored: Array
     air_power: Array
     air_force: Array
-    powers: Array
 
 
 class Trace(NamedTuple):
     """What a beat leaves behind, per step.
 
     tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
-    [n, 3, W]; ledger [n + 1, PORTS, W] of work; energy [n, 3, W]: kinetic, elastic, gravitational.
+    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational.
     """
 
     tracks: Array
     rods: Array
     air: Array
-    ledger: Array
+    power: Array
     energy: Array
 
 
@@ -212,13 +214,12 @@ def new_work(wiring: Wiring, lanes: Lanes, step: float) -> Work:
         stored=np.zeros(LANES),
         air_power=np.zeros(LANES),
         air_force=np.zeros((3, LANES)),
-        powers=np.zeros((4, PORTS, LANES)),
     )
 
 
 @kernel
-def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, stage: int) -> None:
-    """Wrenches on all bodies and rods at the stage's pose and twist, and the power through every port."""
+def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
+    """Wrenches on all bodies and rods at the pose and twist in ``work``."""
     n = len(wiring.mass)
     w_, Q, d = work.wrench, work.Q, work.d
     relative_pose(wiring.first, wiring.second, wiring.a, wiring.b, work.R, work.p, Q, d)
@@ -237,17 +238,20 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, stage: in
         lanes.coefficients, lanes.lift_share, lanes.lift_x, lanes.drag_share, lanes.drag_x,
         work.R, work.V, w_, work.normal_damping, work.air_power, work.air_force,
     )  # fmt: skip
-    for w in range(LANES):
-        work.powers[stage, DAMPERS, w] = -work.lost[w]
-        work.powers[stage, AIR, w] = work.air_power[w]
-        work.powers[stage, FRONT_MOTOR, w] = -w_[n, 0, w] * work.V[n, 0, w]
-        work.powers[stage, REAR_MOTOR, w] = -w_[n + 1, 0, w] * work.V[n + 1, 0, w]
 
 
 @kernel
 def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> None:
-    """Write down the motion, the rods' load, the air's force and the energies at the start of step ``t``."""
-    n = len(wiring.mass)
+    """Write down the motion, the rods' load, the air's force, powers and energies at the start of step ``t``.
+
+    Powers are taken here and not at the stages, where stiff springs are far from their values at the step's ends.
+    """
+    n, power = len(wiring.mass), trace.power[t]
+    for w in range(LANES):
+        power[DAMPERS, w] = -work.lost[w]
+        power[AIR, w] = work.air_power[w]
+        power[FRONT_MOTOR, w] = -work.wrench[n, 0, w] * work.V[n, 0, w]
+        power[REAR_MOTOR, w] = -work.wrench[n + 1, 0, w] * work.V[n + 1, 0, w]
     trace.rods[t] = work.wrench[n:]
     trace.air[t] = work.air_force
     track(wiring.markers, wiring.carrier, work.R, work.p, trace.tracks[t])
@@ -262,9 +266,7 @@ def linearise(wiring: Wiring, setting: Setting, work: Work) -> None:
     work.Q0[:] = work.Q
     work.d0[:] = work.d
     start_blocks(wiring.mass, wiring.inertia, 1.0 / (setting.step * GAMMA), work.normal_damping, work.blocks)
-    add_connectors(
-        wiring.first, wiring.second, wiring.block, wiring.a, wiring.b, work.C, work.Q0, work.d0, work.blocks
-    )
+    add_connectors(wiring.first, wiring.second, wiring.block, wiring.a, wiring.b, work.C, work.Q0, work.d0, work.blocks)
     factor(wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
@@ -300,8 +302,8 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
 
 
 @kernel
-def finish_step(work: Work, state: State, trace: Trace, step: float, t: int, alive: npt.NDArray[np.bool_]) -> None:
-    """Take the step and book the work done through every port."""
+def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
+    """Take the step; a lane that turned too far or is no number any more is dead."""
     _combine(work.zero, work.U_xi, UPDATE, 4, 1.0, work.xi)
     _combine(state.V, work.U_V, UPDATE, 4, 1.0, work.V)
     move(state.R, state.p, work.xi, work.R, work.p)
@@ -313,12 +315,6 @@ def finish_step(work: Work, state: State, trace: Trace, step: float, t: int, ali
             x, y, z = work.xi[i, 0, w], work.xi[i, 1, w], work.xi[i, 2, w]
             if not x * x + y * y + z * z < MAX_ROTATION**2:
                 alive[w] = False
-    for port in range(PORTS):
-        for w in range(LANES):
-            done = 0.0
-            for s in range(4):
-                done += WEIGHTS[s] * work.powers[s, port, w]
-            trace.ledger[t + 1, port, w] = trace.ledger[t, port, w] + step * done
 
 
 @kernel
@@ -348,9 +344,9 @@ def advance(
                 _combine(work.zero, work.U_xi, STAGE[stage], stage, 1.0, work.xi)
                 _combine(state.V, work.U_V, STAGE[stage], stage, 1.0, work.V)
                 move(state.R, state.p, work.xi, work.R, work.p)
-            forces(wiring, setting, lanes, work, stage)
+            forces(wiring, setting, lanes, work)
             if stage == 0:
                 note(wiring, setting, work, trace, t)
                 linearise(wiring, setting, work)
             solve_stage(wiring, setting, work, drive[t, stage], stage)
-        finish_step(work, state, trace, setting.step, t, alive)
+        finish_step(work, state, alive)

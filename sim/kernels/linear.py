@@ -223,10 +223,9 @@ def factor(start: Index, below: Index, products: Index, product_start: Index, bl
 
 
 @kernel
-def solve(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
-    """Solve L L^T x = x in place for x [N, 6, W]; ``row`` gives the body row of each block in ``below``."""
-    n_bodies = len(start) - 1
-    for n in range(n_bodies):
+def _forward(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
+    """x <- L^-1 x."""
+    for n in range(len(start) - 1):
         for i in range(6):
             for w in range(LANES):
                 total = x[n, i, w]
@@ -241,7 +240,12 @@ def solve(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> No
                     for k in range(6):
                         total -= blocks[m, 6 * i + k, w] * x[n, k, w]
                     x[r, i, w] = total
-    for n in range(n_bodies - 1, -1, -1):
+
+
+@kernel
+def _backward(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
+    """x <- L^-T x."""
+    for n in range(len(start) - 2, -1, -1):
         for s in range(start[n], start[n + 1]):
             m, r = below[s], row[s]
             for i in range(6):
@@ -256,3 +260,10 @@ def solve(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> No
                 for k in range(i + 1, 6):
                     total -= blocks[n, 6 * k + i, w] * x[n, k, w]
                 x[n, i, w] = total * blocks[n, 7 * i, w]
+
+
+@kernel
+def solve(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
+    """Solve L L^T x = x in place for x [N, 6, W]; ``row`` gives the body row of each block in ``below``."""
+    _forward(start, below, row, blocks, x)
+    _backward(start, below, row, blocks, x)

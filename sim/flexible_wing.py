@@ -1,0 +1,81 @@
+"""The flexible wing as a model: genomes in, marker tracks out, sampled and aligned like a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Gene, Recording, Wing
+from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
+from sim.division import Division
+from sim.model import Observation, genome_batch
+from sim.simulate import Beat, Numerics, periodic_beat
+from sim.structure import Structure, build
+from sim.wing_genes import FACTOR, wing_genes
+
+Array = npt.NDArray[np.float64]
+
+_HARMONICS = 30  # of the periodic tracks that are kept; the rest is below the integrator's error
+
+
+@dataclass(frozen=True)
+class FlexibleWing:
+    """Multi-body wing driven by two rods (thesis III) for markers seen by cameras.
+
+    ``division`` as :meth:`sim.division.Division.parse` reads it; genes are bounded by ``bounds_factor`` around the
+    wing's estimates.
+    """
+
+    wing: Wing
+    division: str = "11"
+    bounds_factor: float = FACTOR
+    numerics: Numerics = field(default_factory=Numerics)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Pickle the definition only; whatever was built from it is built again."""
+        return {name: self.__dict__[name] for name in ("wing", "division", "bounds_factor", "numerics")}
+
+    @cached_property
+    def genes(self) -> tuple[Gene, ...]:
+        """Structural genes (thesis Eq. 18), then aerodynamic ones (Eq. 19)."""
+        return wing_genes(self.wing.estimates, self.bounds_factor)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Bodies and connectors."""
+        return build(self.wing, Division.parse(self.division))
+
+    def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Beat:
+        """One periodic beat of ``genomes`` [B, G] under the recording's condition, with loads and energies."""
+        batch = genome_batch(self.genes, genomes)
+        return periodic_beat(self.structure, self.genes, batch, recording.condition, self.numerics)
+
+    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+        """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames, beats aligned by the upstroke crossing."""
+        beat = self.beat(genomes, recording)
+        names = [marker.name for marker in self.wing.markers]
+        columns = [names.index(name) for name in recording.markers]
+        series = _series(beat.tracks[:, :, columns].reshape(len(beat.tracks), self.numerics.steps, -1))
+        height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
+        own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
+        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
+        since = psi - recorded_crossing(self.wing, recording)
+        reasons = tuple(
+            reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
+            for reason, phase in zip(beat.reasons, own, strict=True)
+        )
+        k = np.arange(series.shape[1])
+        turn = np.exp(1j * k * since[:, None])
+        channels = np.stack([(turn @ (s * np.exp(1j * k * p)[:, None])).real for s, p in zip(series, own, strict=True)])
+        return Observation(channels, reasons)
+
+
+def _series(samples: Array) -> npt.NDArray[np.complex128]:
+    """Fourier series [B, K + 1, C] of periodic samples [B, n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
+    n = samples.shape[1]
+    spectrum: npt.NDArray[np.complex128] = np.fft.rfft(samples, axis=1)[:, : min(_HARMONICS, (n - 1) // 2) + 1] / n
+    spectrum[:, 1:] *= 2
+    return spectrum
