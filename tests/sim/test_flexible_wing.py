@@ -132,7 +132,8 @@ def test_air_density_matters_and_vacuum_is_not_empty(model: FlexibleWing) -> Non
 def test_air_takes_energy_from_a_wing_flapping_in_still_air(model: FlexibleWing) -> None:
     """Power test: with no wind the air can only be paid, however the shares and slopes are set (no camber lift)."""
     genomes = random_genomes(model, 4)
-    beat = model.beat(genomes, blank_recording(model.wing, vacuum(1000.0, 0.05, 3.0)))
+    fine = replace(model, numerics=Numerics(steps=320))
+    beat = fine.beat(genomes, blank_recording(model.wing, vacuum(1000.0, 0.05, 3.0)))
     assert np.all(beat.power[:, :, 3].mean(axis=1) < 0)
     assert np.all(beat.power[:, :, 0] <= 0)
     np.testing.assert_allclose(
