@@ -9,8 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
-from calibration.search import CalibrationSpec
-from records import Dataset
+from calibration.noise import noise_distance
+from calibration.problem import Problem, base_genome
+from calibration.search import CalibrationSpec, Stage, model_for, plan
+from calibration.standing import Standing, standing
+from records import Dataset, Genome
+from sim.alignment import recorded_crossing
+from sim.flexible_wing import FlexibleWing
 
 
 @dataclass(frozen=True)
@@ -77,9 +82,73 @@ class Comparison:
 
 def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
     """Judge ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
-    raise NotImplementedError
+    model = model_for(dataset, spec.division, spec.bounds_factor)
+    nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
+    stages = plan(spec, dataset)
+    both = evaluator.evaluate(
+        Problem(model, dataset.recordings, tuple(g.name for g in model.genes), nominal),
+        np.array([nominal.values, best.values]),
+    )
+    recordings = tuple(
+        RecordingResult(
+            recording.name,
+            recording.name in dataset.held_out,
+            next((stage.name for stage in stages if recording in stage.recordings), None),
+            part.samples,
+            float(part.distance[0]),
+            float(part.distance[1]),
+        )
+        for recording, part in zip(dataset.recordings, both.per_recording, strict=True)
+    )
+    fitted = [r for r in recordings if r.stage is not None]
+    held_out = [r for r in recordings if r.held_out]
+    return Result(
+        genes=_genes(model, stages, nominal, best, evaluator),
+        recordings=recordings,
+        before=_mean(fitted, "before"),
+        after=_mean(fitted, "after"),
+        held_out_before=_mean(held_out, "before") if held_out else None,
+        held_out_after=_mean(held_out, "after") if held_out else None,
+        noise=noise_distance(dataset.recordings),
+    )
 
 
 def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str) -> Comparison:
     """Tracks of ``genome`` over the recording called ``recording``; ValueError when the simulation fails."""
-    raise NotImplementedError
+    model = model_for(dataset, spec.division, spec.bounds_factor)
+    record = dataset.recording(recording)
+    observed = model.observe([base_genome(model, genome).values], record)
+    if observed.reasons[0] is not None:
+        raise ValueError(f"the wing cannot be simulated under {recording!r}: {observed.reasons[0]}")
+    turns = record.condition.flap_frequency * record.times - recorded_crossing(dataset.wing, record) / (2 * np.pi)
+    tracks = observed.channels[0].reshape(record.positions.shape)
+    return Comparison(recording, turns % 1.0, record.markers, record.positions, tracks)
+
+
+def _genes(
+    model: FlexibleWing, stages: tuple[Stage, ...], nominal: Genome, best: Genome, evaluator: Evaluator
+) -> tuple[GeneResult, ...]:
+    known: dict[str, Standing] = {}
+    for stage in stages:
+        known |= standing(Problem(model, stage.recordings, stage.free, best), evaluator)
+    before, after = nominal.normalised(), best.normalised()
+    return tuple(
+        GeneResult(
+            gene.name,
+            gene.unit,
+            gene.description,
+            before[gene.name],
+            after[gene.name],
+            gene.lower,
+            gene.upper,
+            gene.name in known,
+            known[gene.name].standard_error if gene.name in known else None,
+            known[gene.name].identifiable if gene.name in known else None,
+        )
+        for gene in model.genes
+    )
+
+
+def _mean(recordings: list[RecordingResult], which: str) -> float:
+    weights = [r.samples for r in recordings]
+    return float(np.average([getattr(r, which) for r in recordings], weights=weights))

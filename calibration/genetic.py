@@ -1,0 +1,149 @@
+"""The genetic search: DEAP's operators, a loop of ours (thesis IV).
+
+Individuals live in the unit box of the genes' scales. Every random draw is keyed by seed, stage, generation and slot,
+so a resumed search equals an uninterrupted one bit for bit. DEAP draws from Python's global generator; it is seeded for each
+child and put back, under a lock, so that searches in other threads neither see nor disturb it.
+"""
+
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from deap import base, tools
+
+Array = npt.NDArray[np.float64]
+
+_LOCK = threading.Lock()
+
+TOURNAMENT = 3
+DIFFERENTIAL, BLEND = 0.6, 0.3  # share of children by each crossover; the rest are mutations
+DIFFERENCE_SCALE = (0.3, 0.9)
+BLEND_ALPHA = 0.4
+MUTATION_ETA = 20.0
+FAILED = 1e300  # stands for an infinite misfit in checkpoints, JSON having no infinity
+
+
+class _Fitness(base.Fitness):  # type: ignore[misc]
+    weights = (-1.0,)
+
+
+class _Individual(list[float]):
+    """Unit coordinates with DEAP's fitness attached."""
+
+    def __init__(self, u: Sequence[float], fitness: float | None = None) -> None:
+        super().__init__(u)
+        self.fitness = _Fitness(() if fitness is None else (fitness,))
+
+
+@dataclass
+class Population:
+    """State of a search between generations; plain numbers, so that it is its own checkpoint.
+
+    Attributes:
+        unit: individuals in unit coordinates, best first.
+        fitness: of each (FAILED for one that failed).
+        distance: mean distance per marker of each, m.
+        generation: number of the generation that these are.
+        stall: generations since the best fitness last improved.
+        best: the fitness that a further improvement is measured against.
+    """
+
+    unit: list[list[float]] = field(default_factory=list)
+    fitness: list[float] = field(default_factory=list)
+    distance: list[float] = field(default_factory=list)
+    generation: int = -1
+    stall: int = 0
+    best: float = FAILED
+
+    def as_json(self) -> dict[str, Any]:
+        """Checkpoint."""
+        return dict(self.__dict__)
+
+    @classmethod
+    def from_json(cls, state: dict[str, Any]) -> Population:
+        """Back from a checkpoint."""
+        return cls(**state)
+
+    @property
+    def diversity(self) -> float:
+        """Mean over the genes of the standard deviation in unit coordinates."""
+        return float(np.mean(np.std(np.array(self.unit), axis=0)))
+
+
+def first_generation(seed: int, stage: str, size: int, start: Sequence[float]) -> Array:
+    """Unit coordinates [size, F]: the start itself, the rest uniform over the box."""
+    rows = [list(start)]
+    for slot in range(1, size):
+        draw = random.Random(f"{seed}/{stage}/0/{slot}")  # noqa: S311  (a search, not a secret)
+        rows.append([draw.random() for _ in start])
+    return np.array(rows)
+
+
+def offspring(population: Population, seed: int, stage: str, size: int) -> Array:
+    """Unit coordinates [size, F] of the next generation's children."""
+    parents = [_Individual(u, f) for u, f in zip(population.unit, population.fitness, strict=True)]
+    generation = population.generation + 1
+    with _LOCK:
+        before = random.getstate()
+        try:
+            return np.array([_child(parents, f"{seed}/{stage}/{generation}/{slot}") for slot in range(size)])
+        finally:
+            random.setstate(before)
+
+
+def _child(parents: list[_Individual], key: str) -> list[float]:
+    """One child by differential crossover, blend crossover or mutation.
+
+    Stiffnesses compensate each other, so good individuals lie in narrow oblique valleys. Crossovers that mix gene by
+    gene (blend, simulated binary) lose them; a step along the difference of two others (Storn and Price 1997) keeps to
+    the valley, whatever its direction. docs/decisions/0003 has the figures.
+    """
+    random.seed(key)
+    draw = random.random()  # noqa: S311
+    if draw < DIFFERENTIAL:
+        (origin,) = tools.selTournament(parents, 1, TOURNAMENT)
+        ahead, behind = tools.selRandom(parents, 2)
+        scale = random.uniform(*DIFFERENCE_SCALE)  # noqa: S311
+        child = [u + scale * (v - w) for u, v, w in zip(origin, ahead, behind, strict=True)]
+    elif draw < DIFFERENTIAL + BLEND:
+        child, other = (_Individual(p) for p in tools.selTournament(parents, 2, TOURNAMENT))
+        tools.cxBlend(child, other, BLEND_ALPHA)
+    else:
+        child = _Individual(tools.selTournament(parents, 1, TOURNAMENT)[0])
+        tools.mutPolynomialBounded(child, MUTATION_ETA, 0.0, 1.0, 1.0 / len(child))
+    return [_reflected(u) for u in child]
+
+
+def _reflected(u: float) -> float:
+    """Back into [0, 1] by mirroring at the bounds: unlike clipping it does not pile individuals on them."""
+    u = abs(u) % 2.0
+    return 2.0 - u if u > 1.0 else u
+
+
+def survive(population: Population, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Population:
+    """The best of parents and children together; equal fitness keeps the elder, so that the order is reproducible."""
+    size = len(unit)
+    everyone = population.unit + [[float(v) for v in row] for row in unit]
+    scores = population.fitness + [_finite(f) for f in fitness]
+    distances = population.distance + [_finite(d) for d in distance]
+    order = sorted(range(len(everyone)), key=lambda k: scores[k])[:size]
+    best = scores[order[0]]
+    improved = best < population.best * (1.0 - tolerance)
+    return Population(
+        unit=[everyone[k] for k in order],
+        fitness=[scores[k] for k in order],
+        distance=[distances[k] for k in order],
+        generation=population.generation + 1,
+        stall=0 if improved else population.stall + 1,
+        best=best if improved else population.best,
+    )
+
+
+def _finite(value: float) -> float:
+    return float(value) if np.isfinite(value) else FAILED

@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.evaluator import gather, run_unit, units
+from calibration.problem import Evaluation, Problem, base_genome, misfit
+from calibration.result import compare, noise_distance, summarise
+from calibration.search import CalibrationSpec, calibrate, model_for, plan
+from calibration.standing import standing
+from records import Dataset, Genome
+from sim.rig import Tracking
+from sim.wing_genes import AERODYNAMIC, STRUCTURAL
+
+SPEC = CalibrationSpec(division="4", population=16, max_generations=4, seed=7)
+
+
+class Here:
+    """Evaluates in this process; counts calls."""
+
+    def __init__(self) -> None:
+        self.individuals = 0
+
+    def evaluate(self, problem: Problem, values: np.ndarray, *, residuals: bool = False) -> Evaluation:
+        self.individuals += len(values)
+        done = [run_unit(problem, np.asarray(values), u, residuals=residuals) for u in units(problem, len(values))]
+        return gather(problem, done)
+
+    def close(self) -> None:
+        pass
+
+
+def test_stages_follow_the_thesis(small: tuple[Dataset, Genome]) -> None:
+    dataset, _ = small
+    structure, air = plan(CalibrationSpec(division="4"), dataset)
+    assert structure.free == STRUCTURAL
+    assert [r.name for r in structure.recordings] == [dataset.recordings[0].name]
+    assert air.free == AERODYNAMIC
+    assert [r.name for r in air.recordings] == [dataset.recordings[1].name]
+    (joint,) = plan(CalibrationSpec(division="4", mode="joint"), dataset)
+    assert joint.free == (*STRUCTURAL, *AERODYNAMIC)
+    assert len(joint.recordings) == 2
+
+
+def test_fitness_is_equation_14(small: tuple[Dataset, Genome]) -> None:
+    """Sum over frames and markers of squared distance, over what was recorded; the mean distance in m beside it."""
+    dataset, truth = small
+    model = model_for(dataset, "4")
+    problem = Problem(model, dataset.recordings[:1], (), truth)
+    record = dataset.recordings[0]
+    tracks = model.observe([truth.values], record).channels[0].reshape(record.positions.shape)
+    distance = np.linalg.norm(tracks - record.positions, axis=2)
+    part = misfit(problem, np.zeros((1, 0)), 0)
+    assert part.squares[0] == pytest.approx(np.nansum(distance**2))
+    assert part.distance[0] == pytest.approx(np.nanmean(distance))
+    assert part.samples == np.isfinite(distance).sum()
+
+
+def test_a_failed_individual_has_the_worst_fitness_and_a_reason(small: tuple[Dataset, Genome]) -> None:
+    dataset, truth = small
+    model = model_for(dataset, "4")
+    problem = Problem(model, dataset.recordings[1:2], ("L_a",), truth)
+    part = misfit(problem, np.array([[4.0], [1e6]]), 0)
+    assert np.isfinite(part.squares[0])
+    assert part.squares[1] == np.inf
+    assert part.reasons[0] is None
+    assert part.reasons[1]
+
+
+@pytest.mark.parametrize("cut", [1, 4, 6])
+def test_resumed_equals_uninterrupted(small: tuple[Dataset, Genome], cut: int) -> None:
+    """Cut within the first stage, at its end and within the second; the checkpoint passes through JSON."""
+    dataset, _ = small
+    whole = list(calibrate(SPEC, dataset, Here()))
+    assert [g.stage for g in whole] == ["structure"] * 4 + ["aerodynamics"] * 4
+    checkpoint = json.loads(json.dumps(whole[cut - 1].checkpoint, allow_nan=False))
+    rest = list(calibrate(SPEC, dataset, Here(), checkpoint))
+    assert rest == whole[cut:]
+
+
+def test_history_is_monotone_and_complete(small: tuple[Dataset, Genome]) -> None:
+    dataset, _ = small
+    evaluator = Here()
+    history = list(calibrate(SPEC, dataset, evaluator))
+    assert history[-1].evaluations == evaluator.individuals == 8 * 16
+    assert history[-1].progress == 1
+    assert all(a.progress <= b.progress for a, b in zip(history, history[1:], strict=False))
+    for stage in ("structure", "aerodynamics"):
+        best = [g.best for g in history if g.stage == stage]
+        assert best == sorted(best, reverse=True)
+        assert best[-1] < best[0]
+    assert set(history[-1].genome) == {*STRUCTURAL, *AERODYNAMIC}
+
+
+def test_result_judges_fitted_and_held_out_recordings(small: tuple[Dataset, Genome]) -> None:
+    dataset, truth = small
+    result = summarise(SPEC, dataset, Here(), truth.as_dict())
+    assert result.after < result.before
+    assert result.held_out_after is not None
+    assert result.held_out_before is not None
+    assert result.held_out_after < result.held_out_before
+    assert result.noise == pytest.approx(result.held_out_after, rel=0.15), "the truth leaves the noise"
+    assert [r.held_out for r in result.recordings] == [False, False, True, True]
+    shares = [g.best for g in result.genes if g.name.startswith("L_") and g.name[2:].isdigit()]
+    assert sum(shares) == pytest.approx(1)
+
+
+def test_noise_is_estimated_from_the_scatter_between_beats(small: tuple[Dataset, Genome]) -> None:
+    dataset, _ = small
+    sx, sy, sz = Tracking().noise
+    draws = np.random.default_rng(0).normal(size=(200_000, 3)) * (sx, sy, sz)
+    expected = np.linalg.norm(draws, axis=1).mean() * np.exp(0.2**2 / 2)
+    assert noise_distance(dataset.recordings) == pytest.approx(expected, rel=0.12)
+
+
+def test_standing_tells_what_the_data_ignore(small: tuple[Dataset, Genome]) -> None:
+    """Rod stiffness shows; in vacuum the air does not, and its error is that of the box."""
+    dataset, truth = small
+    model = model_for(dataset, "4")
+    problem = Problem(model, dataset.recordings[:1], ("E_r", "G_f", "L_1"), truth)
+    known = standing(problem, Here())
+    assert known["E_r"].identifiable
+    assert known["E_r"].standard_error < 0.02
+    alone = standing(Problem(model, dataset.recordings[:1], ("ID_b",), truth), Here())
+    assert not alone["ID_b"].identifiable
+
+
+def test_standard_errors_are_honest(small: tuple[Dataset, Genome]) -> None:
+    """Refitting under fresh coloured noise scatters as the stated error says (a linear refit, 40 draws)."""
+    from calibration.standing import _linearised
+    from sim.rig import _noise
+
+    dataset, truth = small
+    model = model_for(dataset, "4")
+    problem = Problem(model, dataset.recordings[:1], ("E_r", "G_f"), truth)
+    stated = standing(problem, Here())
+    genes = [g for g in model.genes if g.name in problem.free]
+    jacobian, _, _ = _linearised(problem, genes, Here())
+    record = dataset.recordings[0]
+    shape = record.positions.shape
+    seen = np.isfinite(record.values).ravel()
+    pull = np.linalg.pinv(jacobian)
+    fits = [
+        pull @ _noise(shape, Tracking(beats=2), np.random.default_rng(1000 + k)).reshape(-1)[seen] for k in range(40)
+    ]
+    scatter = np.std(fits, axis=0)
+    for k, gene in enumerate(genes):
+        assert 0.5 < stated[gene.name].standard_error / scatter[k] < 2.0
+
+
+def test_comparison_lies_on_the_recording(small: tuple[Dataset, Genome]) -> None:
+    dataset, truth = small
+    record = dataset.recordings[1]
+    laid = compare(CalibrationSpec(division="4"), dataset, truth.as_dict(), record.name)
+    assert laid.recorded.shape == laid.simulated.shape == (len(record.times), len(record.markers), 3)
+    assert np.all((laid.phase >= 0) & (laid.phase < 1))
+    assert np.nanmean(np.linalg.norm(laid.recorded - laid.simulated, axis=2)) < 1.2e-3
+    reference = [record.markers.index(m) for m in dataset.wing.reference_markers if m in record.markers]
+    near = (laid.phase < 0.05) | (laid.phase > 0.95)
+    assert np.abs(laid.simulated[near][:, reference, 2].mean(axis=1)).max() < 0.06, "phase 0 is the horizontal"
+
+
+def refused(spec: CalibrationSpec, dataset: Dataset, match: str) -> None:
+    with pytest.raises(ValueError, match=match):
+        plan(spec, dataset)
+
+
+def test_specs_that_do_not_fit_are_refused_with_what_would(
+    small: tuple[Dataset, Genome], marker_only: Dataset
+) -> None:
+    dataset, _ = small
+    refused(replace(SPEC, division="7"), dataset, "preset")
+    refused(replace(SPEC, recordings=("nope",)), dataset, "no recording 'nope'")
+    refused(replace(SPEC, recordings=(dataset.held_out[0],)), dataset, "held out")
+    refused(replace(SPEC, genes=("E_x",)), dataset, "unknown gene 'E_x'")
+    refused(replace(SPEC, fixed={"E_f": 1.0}), dataset, r"E_f.* must lie in")
+    refused(replace(SPEC, fixed={name: model_nominal(dataset, name) for name in (*STRUCTURAL, *AERODYNAMIC)}), dataset, "nothing")  # fmt: skip
+    refused(replace(SPEC, recordings=(dataset.recordings[1].name,)), dataset, "vacuum")
+    refused(SPEC, marker_only, "recording")
+
+
+def model_nominal(dataset: Dataset, name: str) -> float:
+    return base_genome(model_for(dataset, "4"))[name]
