@@ -15,11 +15,23 @@ import numpy.typing as npt
 
 from sim.kernels import LANES
 from sim.kernels.jit import kernel
+from sim.kernels.vector import Vector, load, load0, load1, magnitude, root, store, store0, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 REVERSAL = 0.05
 STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
+
+
+@kernel
+def angle(y: Vector, x: Vector) -> Vector:
+    """atan2 lane by lane: there is no vector instruction for it."""
+    scratch = np.empty((2, LANES))
+    store1(scratch, 0, y)
+    store1(scratch, 1, x)
+    for w in range(LANES):
+        scratch[0, w] = math.atan2(scratch[0, w], scratch[1, w])
+    return load1(scratch, 0)
 
 
 @kernel
@@ -55,62 +67,61 @@ def strip_forces(
         flow[:] = 0.0
         for n in range(start[s], start[s + 1]):
             g, x, y = weight[n], centroid[n, 0], centroid[n, 1]
-            for w in range(LANES):
-                oz = V[n, 2, w]
-                vx, vy = V[n, 3, w] - oz * y, V[n, 4, w] + oz * x
-                vz = V[n, 5, w] + V[n, 0, w] * y - V[n, 1, w] * x
-                for i in range(3):
-                    flow[i, w] += g * (R[n, 3 * i, w] * vx + R[n, 3 * i + 1, w] * vy + R[n, 3 * i + 2, w] * vz)
-                    flow[3 + i, w] += g * R[n, 3 * i, w]
-                    flow[6 + i, w] += g * R[n, 3 * i + 2, w]
-        scale = 0.5 * density * area[s]
-        for w in range(LANES):
-            cx, cy, cz = flow[3, w], flow[4, w], flow[5, w]
-            r = 1.0 / math.sqrt(cx * cx + cy * cy + cz * cz)
-            cx, cy, cz = cx * r, cy * r, cz * r
-            nx, ny, nz = flow[6, w], flow[7, w], flow[8, w]
-            r = nx * cx + ny * cy + nz * cz
-            nx, ny, nz = nx - r * cx, ny - r * cy, nz - r * cz
-            r = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
-            nx, ny, nz = nx * r, ny * r, nz * r
-            ux, uy, uz = wind[0] - flow[0, w], wind[1] - flow[1, w], wind[2] - flow[2, w]
-            uc = ux * cx + uy * cy + uz * cz
-            un = ux * nx + uy * ny + uz * nz
-            q = math.sqrt(uc * uc + un * un + STILL * STILL)
-            forward = uc / math.sqrt(uc * uc + REVERSAL * REVERSAL * q * q)
-            alpha = math.atan2(un, uc * forward)
-            cl = coefficients[0, w] * alpha + coefficients[1, w]
-            cd = coefficients[2, w] * abs(alpha) + coefficients[3, w]
-            fl = scale * q * cl * forward
-            fd = scale * q * cd
-            lift[0, w] = fl * (uc * nx - un * cx)
-            lift[1, w] = fl * (uc * ny - un * cy)
-            lift[2, w] = fl * (uc * nz - un * cz)
-            lift[3, w] = scale * q * coefficients[0, w]
-            drag[0, w] = fd * (uc * cx + un * nx)
-            drag[1, w] = fd * (uc * cy + un * ny)
-            drag[2, w] = fd * (uc * cz + un * nz)
-            drag[3, w] = scale * q * (cd + coefficients[2, w])
+            oz = load(V, n, 2)
+            vx, vy = load(V, n, 3) - oz * y, load(V, n, 4) + oz * x
+            vz = load(V, n, 5) + load(V, n, 0) * y - load(V, n, 1) * x
             for i in range(3):
-                force[i, w] += lift[i, w] + drag[i, w]
+                world = load(R, n, 3 * i) * vx + load(R, n, 3 * i + 1) * vy + load(R, n, 3 * i + 2) * vz
+                store1(flow, i, load1(flow, i) + g * world)
+                store1(flow, 3 + i, load1(flow, 3 + i) + g * load(R, n, 3 * i))
+                store1(flow, 6 + i, load1(flow, 6 + i) + g * load(R, n, 3 * i + 2))
+        scale = 0.5 * density * area[s]
+        cx, cy, cz = load1(flow, 3), load1(flow, 4), load1(flow, 5)
+        r = 1.0 / root(cx * cx + cy * cy + cz * cz)
+        cx, cy, cz = cx * r, cy * r, cz * r
+        nx, ny, nz = load1(flow, 6), load1(flow, 7), load1(flow, 8)
+        r = nx * cx + ny * cy + nz * cz
+        nx, ny, nz = nx - r * cx, ny - r * cy, nz - r * cz
+        r = 1.0 / root(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx * r, ny * r, nz * r
+        ux, uy, uz = wind[0] - load1(flow, 0), wind[1] - load1(flow, 1), wind[2] - load1(flow, 2)
+        uc = ux * cx + uy * cy + uz * cz
+        un = ux * nx + uy * ny + uz * nz
+        q = root(uc * uc + un * un + STILL * STILL)
+        forward = uc / root(uc * uc + REVERSAL * REVERSAL * q * q)
+        alpha = angle(un, uc * forward)
+        cl = load1(coefficients, 0) * alpha + load1(coefficients, 1)
+        cd = load1(coefficients, 2) * magnitude(alpha) + load1(coefficients, 3)
+        fl = scale * q * cl * forward
+        fd = scale * q * cd
+        store1(lift, 0, fl * (uc * nx - un * cx))
+        store1(lift, 1, fl * (uc * ny - un * cy))
+        store1(lift, 2, fl * (uc * nz - un * cz))
+        store1(lift, 3, scale * q * load1(coefficients, 0))
+        store1(drag, 0, fd * (uc * cx + un * nx))
+        store1(drag, 1, fd * (uc * cy + un * ny))
+        store1(drag, 2, fd * (uc * cz + un * nz))
+        store1(drag, 3, scale * q * (cd + load1(coefficients, 2)))
+        for i in range(3):
+            store1(force, i, load1(force, i) + load1(lift, i) + load1(drag, i))
         for n in range(start[s], start[s + 1]):
             y = centroid[n, 1]
-            for w in range(LANES):
-                a, b = lift_share[n, w], drag_share[n, w]
-                lx = a * (R[n, 0, w] * lift[0, w] + R[n, 3, w] * lift[1, w] + R[n, 6, w] * lift[2, w])
-                ly = a * (R[n, 1, w] * lift[0, w] + R[n, 4, w] * lift[1, w] + R[n, 7, w] * lift[2, w])
-                lz = a * (R[n, 2, w] * lift[0, w] + R[n, 5, w] * lift[1, w] + R[n, 8, w] * lift[2, w])
-                dx = b * (R[n, 0, w] * drag[0, w] + R[n, 3, w] * drag[1, w] + R[n, 6, w] * drag[2, w])
-                dy = b * (R[n, 1, w] * drag[0, w] + R[n, 4, w] * drag[1, w] + R[n, 7, w] * drag[2, w])
-                dz = b * (R[n, 2, w] * drag[0, w] + R[n, 5, w] * drag[1, w] + R[n, 8, w] * drag[2, w])
-                tx, ty = y * (lz + dz), -lift_x[n, w] * lz - drag_x[n, w] * dz
-                tz = lift_x[n, w] * ly + drag_x[n, w] * dy - y * (lx + dx)
-                wrench[n, 0, w] += tx
-                wrench[n, 1, w] += ty
-                wrench[n, 2, w] += tz
-                wrench[n, 3, w] += lx + dx
-                wrench[n, 4, w] += ly + dy
-                wrench[n, 5, w] += lz + dz
-                damping[n, w] = a * lift[3, w] + b * drag[3, w]
-                power[w] += tx * V[n, 0, w] + ty * V[n, 1, w] + tz * V[n, 2, w]
-                power[w] += (lx + dx) * V[n, 3, w] + (ly + dy) * V[n, 4, w] + (lz + dz) * V[n, 5, w]
+            a, b = load1(lift_share, n), load1(drag_share, n)
+            lx = a * (load(R, n, 0) * load1(lift, 0) + load(R, n, 3) * load1(lift, 1) + load(R, n, 6) * load1(lift, 2))
+            ly = a * (load(R, n, 1) * load1(lift, 0) + load(R, n, 4) * load1(lift, 1) + load(R, n, 7) * load1(lift, 2))
+            lz = a * (load(R, n, 2) * load1(lift, 0) + load(R, n, 5) * load1(lift, 1) + load(R, n, 8) * load1(lift, 2))
+            dx = b * (load(R, n, 0) * load1(drag, 0) + load(R, n, 3) * load1(drag, 1) + load(R, n, 6) * load1(drag, 2))
+            dy = b * (load(R, n, 1) * load1(drag, 0) + load(R, n, 4) * load1(drag, 1) + load(R, n, 7) * load1(drag, 2))
+            dz = b * (load(R, n, 2) * load1(drag, 0) + load(R, n, 5) * load1(drag, 1) + load(R, n, 8) * load1(drag, 2))
+            tx, ty = y * (lz + dz), -load1(lift_x, n) * lz - load1(drag_x, n) * dz
+            tz = load1(lift_x, n) * ly + load1(drag_x, n) * dy - y * (lx + dx)
+            store(wrench, n, 0, load(wrench, n, 0) + tx)
+            store(wrench, n, 1, load(wrench, n, 1) + ty)
+            store(wrench, n, 2, load(wrench, n, 2) + tz)
+            store(wrench, n, 3, load(wrench, n, 3) + lx + dx)
+            store(wrench, n, 4, load(wrench, n, 4) + ly + dy)
+            store(wrench, n, 5, load(wrench, n, 5) + lz + dz)
+            store1(damping, n, a * load1(lift, 3) + b * load1(drag, 3))
+            turning = tx * load(V, n, 0) + ty * load(V, n, 1) + tz * load(V, n, 2)
+            moving = (lx + dx) * load(V, n, 3) + (ly + dy) * load(V, n, 4) + (lz + dz) * load(V, n, 5)
+            store0(power, load0(power) + turning + moving)

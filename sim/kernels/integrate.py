@@ -8,6 +8,7 @@ acceleration, so that stiff roots see consistent stages; their pose is set to th
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from sim.kernels.bodies import inertial, kinetic_and_height, local_rate, move, t
 from sim.kernels.connectors import connect, relative_pose, tangent
 from sim.kernels.jit import kernel
 from sim.kernels.linear import add_connectors, factor, solve, start_blocks
+from sim.kernels.vector import load, load0, load3, store, store1, store3
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -159,18 +161,17 @@ def set_rods(rods: Array, state: State) -> None:
     """Put the driving rods at angle and rate ``rods`` [2, 3] (angle, rate, acceleration) about the hinge."""
     n = len(state.R) - 2
     for k in range(2):
-        c, s = np.cos(rods[k, 0]), np.sin(rods[k, 0])
-        for w in range(LANES):
-            for i in range(9):
-                state.R[n + k, i, w] = 0.0
-            for i in range(6):
-                state.V[n + k, i, w] = 0.0
-            state.R[n + k, 0, w] = 1.0
-            state.R[n + k, 4, w] = c
-            state.R[n + k, 5, w] = -s
-            state.R[n + k, 7, w] = s
-            state.R[n + k, 8, w] = c
-            state.V[n + k, 0, w] = rods[k, 1]
+        c, s = math.cos(rods[k, 0]), math.sin(rods[k, 0])
+        for i in range(9):
+            store(state.R, n + k, i, 0.0)
+        for i in range(6):
+            store(state.V, n + k, i, 0.0)
+        store(state.R, n + k, 0, 1.0)
+        store(state.R, n + k, 4, c)
+        store(state.R, n + k, 5, -s)
+        store(state.R, n + k, 7, s)
+        store(state.R, n + k, 8, c)
+        store(state.V, n + k, 0, rods[k, 1])
 
 
 @kernel
@@ -178,11 +179,10 @@ def _combine(base: Array, U: Array, coefficient: Array, count: int, factor_: flo
     """out = base + factor * sum over the first ``count`` stages of coefficient * U."""
     for i in range(base.shape[0]):
         for k in range(base.shape[1]):
-            for w in range(LANES):
-                total = 0.0
-                for s in range(count):
-                    total += coefficient[s] * U[s, i, k, w]
-                out[i, k, w] = base[i, k, w] + factor_ * total
+            total = load(base, i, k)
+            for s in range(count):
+                total += (factor_ * coefficient[s]) * load3(U, s, i, k)
+            store(out, i, k, total)
 
 
 def new_work(wiring: Wiring, lanes: Lanes, step: float) -> Work:
@@ -247,11 +247,10 @@ def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> 
     Powers are taken here and not at the stages, where stiff springs are far from their values at the step's ends.
     """
     n, power = len(wiring.mass), trace.power[t]
-    for w in range(LANES):
-        power[DAMPERS, w] = -work.lost[w]
-        power[AIR, w] = work.air_power[w]
-        power[FRONT_MOTOR, w] = -work.wrench[n, 0, w] * work.V[n, 0, w]
-        power[REAR_MOTOR, w] = -work.wrench[n + 1, 0, w] * work.V[n + 1, 0, w]
+    store1(power, DAMPERS, -load0(work.lost))
+    store1(power, AIR, load0(work.air_power))
+    store1(power, FRONT_MOTOR, -load(work.wrench, n, 0) * load(work.V, n, 0))
+    store1(power, REAR_MOTOR, -load(work.wrench, n + 1, 0) * load(work.V, n + 1, 0))
     trace.rods[t] = work.wrench[n:]
     trace.air[t] = work.air_force
     track(wiring.markers, wiring.carrier, work.R, work.p, trace.tracks[t])
@@ -283,10 +282,9 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
     _combine(r_xi, work.U_xi, COUPLING[stage], stage, 1.0 / setting.step, r_xi)
     _combine(work.zero, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, work.lead)
     for rod in range(2):
-        for w in range(LANES):
-            value = hg * (work.lead[n + rod, 0, w] + rods[rod, 2])
-            U_V[n + rod, 0, w] = value
-            work.rods_only[n + rod, 0, w] = value
+        value = hg * (load(work.lead, n + rod, 0) + rods[rod, 2])
+        store(U_V, n + rod, 0, value)
+        store(work.rods_only, n + rod, 0, value)
     times_mass(wiring.mass, wiring.inertia, work.lead, wrench)
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.hK, work.Q0, work.d0, r_xi, wrench)
     tangent(
@@ -297,8 +295,7 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
     U_V[:n] = wrench[:n]
     for i in range(n + 2):
         for j in range(6):
-            for w in range(LANES):
-                work.U_xi[stage, i, j, w] = hg * (U_V[i, j, w] + r_xi[i, j, w])
+            store3(work.U_xi, stage, i, j, hg * (load(U_V, i, j) + load(r_xi, i, j)))
 
 
 @kernel
