@@ -1,8 +1,8 @@
 """The genetic search: DEAP's operators, a loop of ours (thesis IV).
 
 Individuals live in the unit box of the genes' scales. Every random draw is keyed by seed, stage, generation and slot,
-so a resumed search equals an uninterrupted one bit for bit. DEAP draws from Python's global generator; it is seeded for each
-child and put back, under a lock, so that searches in other threads neither see nor disturb it.
+so a resumed search equals an uninterrupted one bit for bit. DEAP draws from Python's global generator; it is seeded for
+each child and put back, under a lock, so that searches in other threads neither see nor disturb it.
 """
 
 from __future__ import annotations

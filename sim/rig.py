@@ -235,7 +235,7 @@ def campaign(
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Dataset, Genome]:
     """Record a campaign; the true genome comes beside it. ``small`` is ten recordings, else all 72 of the thesis."""
-    fine = Numerics(steps=240, max_beats=60, periodic=2e-6)
+    fine = Numerics(steps=720, max_beats=60, periodic=2e-6)
     model = FlexibleWing(robird_wing(), division, numerics=fine)
     truth = true_genome(model, seed)
     plan, recordings, held_out = list(_plan(small)), [], []

@@ -1,8 +1,8 @@
 """A group of lanes as one value inside kernels: arithmetic on eight individuals that looks like arithmetic on one.
 
-Inside a compiled kernel ``load(array, i, j)`` gives the lanes of ``array[i, j, :]`` as a vector of the processor (LLVM's
-``<8 x double>``); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store`` writes one back. The
-compiler's own vectoriser does not do this: it unrolls a loop over eight lanes first and then finds nothing to
+Inside a compiled kernel ``load(array, i, j)`` gives the lanes of ``array[i, j, :]`` as a vector of the processor
+(LLVM's ``<8 x double>``); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store`` writes one back.
+The compiler's own vectoriser does not do this: it unrolls a loop over eight lanes first and then finds nothing to
 vectorise, and with a free number of lanes it spends more on alias checks than on arithmetic.
 
 Kernels run only compiled; the annotations are for the reader and the type checker.

@@ -53,9 +53,7 @@ def test_threads_do_not_disturb_each_other_and_the_global_generator_is_put_back(
     expected = random.random()  # noqa: S311
     random.seed(5)
     together: dict[int, Population] = {}
-    threads = [
-        threading.Thread(target=lambda s=seed: together.update({s: search(s, 6, size=20)})) for seed in range(4)
-    ]
+    threads = [threading.Thread(target=lambda s=seed: together.update({s: search(s, 6, size=20)})) for seed in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -1,14 +1,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
-from calibration.evaluator import gather, run_unit, units
+from calibration.evaluator import as_batch, gather, run_unit, units
+from calibration.noise import noise_distance
 from calibration.problem import Evaluation, Problem, base_genome, misfit
-from calibration.result import compare, noise_distance, summarise
+from calibration.result import compare, summarise
 from calibration.search import CalibrationSpec, calibrate, model_for, plan
 from calibration.standing import standing
 from records import Dataset, Genome
@@ -24,10 +28,10 @@ class Here:
     def __init__(self) -> None:
         self.individuals = 0
 
-    def evaluate(self, problem: Problem, values: np.ndarray, *, residuals: bool = False) -> Evaluation:
-        self.individuals += len(values)
-        done = [run_unit(problem, np.asarray(values), u, residuals=residuals) for u in units(problem, len(values))]
-        return gather(problem, done)
+    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+        batch = as_batch(values)
+        self.individuals += len(batch)
+        return gather(problem, [run_unit(problem, batch, u, residuals=residuals) for u in units(problem, len(batch))])
 
     def close(self) -> None:
         pass
@@ -87,7 +91,7 @@ def test_history_is_monotone_and_complete(small: tuple[Dataset, Genome]) -> None
     history = list(calibrate(SPEC, dataset, evaluator))
     assert history[-1].evaluations == evaluator.individuals == 8 * 16
     assert history[-1].progress == 1
-    assert all(a.progress <= b.progress for a, b in zip(history, history[1:], strict=False))
+    assert all(a.progress <= b.progress for a, b in pairwise(history))
     for stage in ("structure", "aerodynamics"):
         best = [g.best for g in history if g.stage == stage]
         assert best == sorted(best, reverse=True)
@@ -168,19 +172,17 @@ def refused(spec: CalibrationSpec, dataset: Dataset, match: str) -> None:
         plan(spec, dataset)
 
 
-def test_specs_that_do_not_fit_are_refused_with_what_would(
-    small: tuple[Dataset, Genome], marker_only: Dataset
-) -> None:
+def test_specs_that_do_not_fit_are_refused_with_what_would(small: tuple[Dataset, Genome], marker_only: Dataset) -> None:
     dataset, _ = small
     refused(replace(SPEC, division="7"), dataset, "preset")
     refused(replace(SPEC, recordings=("nope",)), dataset, "no recording 'nope'")
     refused(replace(SPEC, recordings=(dataset.held_out[0],)), dataset, "held out")
     refused(replace(SPEC, genes=("E_x",)), dataset, "unknown gene 'E_x'")
     refused(replace(SPEC, fixed={"E_f": 1.0}), dataset, r"E_f.* must lie in")
-    refused(replace(SPEC, fixed={name: model_nominal(dataset, name) for name in (*STRUCTURAL, *AERODYNAMIC)}), dataset, "nothing")  # fmt: skip
+    refused(replace(SPEC, fixed=nominal_values(dataset)), dataset, "nothing")
     refused(replace(SPEC, recordings=(dataset.recordings[1].name,)), dataset, "vacuum")
     refused(SPEC, marker_only, "recording")
 
 
-def model_nominal(dataset: Dataset, name: str) -> float:
-    return base_genome(model_for(dataset, "4"))[name]
+def nominal_values(dataset: Dataset) -> Mapping[str, float]:
+    return base_genome(model_for(dataset, "4")).as_dict()

@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pair:
-    """Poses (rotation vector, position) and twists [6] of two bodies, arms of the connector, stiffness and damping [6]."""
+    """Poses (rotation vector, position) and twists of two bodies, arms of the connector, stiffness and damping."""
 
     turn: Array
     place: Array

@@ -30,10 +30,7 @@ def test_spring_wrench_is_minus_the_gradient_of_its_energy(seed: int) -> None:
     pair, h = random_pair(seed), 1e-6
     wrench, _, _ = load(pair)
     gradient = np.array(
-        [
-            [(load(pair.moved(n, k, h))[2] - load(pair.moved(n, k, -h))[2]) / (2 * h) for k in range(6)]
-            for n in range(2)
-        ]
+        [[(load(pair.moved(n, k, h))[2] - load(pair.moved(n, k, -h))[2]) / (2 * h) for k in range(6)] for n in range(2)]
     )
     np.testing.assert_allclose(wrench, -gradient, atol=1e-7 * (1 + np.abs(wrench).max()) + 1e-9 * pair.K.max())
 
@@ -45,9 +42,7 @@ def test_wrenches_on_the_two_bodies_balance(seed: int) -> None:
     wrench, _, _ = load(pair)
     rotations = [Rotation.from_rotvec(t) for t in pair.turn]
     force = [r.apply(w[3:]) for r, w in zip(rotations, wrench, strict=True)]
-    moment = [
-        r.apply(w[:3]) + np.cross(p, f) for r, w, p, f in zip(rotations, wrench, pair.place, force, strict=True)
-    ]
+    moment = [r.apply(w[:3]) + np.cross(p, f) for r, w, p, f in zip(rotations, wrench, pair.place, force, strict=True)]
     np.testing.assert_allclose(force[0] + force[1], 0, atol=1e-9 * np.abs(force).max())
     np.testing.assert_allclose(moment[0] + moment[1], 0, atol=1e-9 * (np.abs(moment).max() + np.abs(force).max()))
 

@@ -9,12 +9,11 @@ import numpy.typing as npt
 import pytest
 from scipy.interpolate import CubicSpline
 
-from records import Condition, FourierDrive, Genome, Hinge, Marker, Materials, Rod, Station, Wing
+from records import Condition, FourBarDrive, FourierDrive, Gene, Genome, Hinge, Marker, Materials, Rod, Station, Wing
 from sim.division import Division
-from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
-from sim.kernels.integrate import NODES, Setting, State, Wiring, advance, new_work
-from sim.rig import blank_recording, robird_wing, tunnel, vacuum
+from sim.kernels.integrate import NODES, Lanes, Setting, State, Wiring, advance, new_work
+from sim.rig import robird_wing, tunnel, vacuum
 from sim.simulate import Numerics, at_rest, drive_table, new_trace, setting
 from sim.structure import Structure, build
 from sim.wing_genes import lanes, wing_genes
@@ -46,9 +45,7 @@ def march(
     group = lanes(structure, genes, values)
     trace, alive = new_trace(structure, steps), np.ones(LANES, bool)
     still = np.zeros((steps, 4, 2, 3)) if table is None else table
-    advance(
-        structure.wiring, here, group, still, new_work(structure.wiring, group, here.step), state, trace, alive
-    )
+    advance(structure.wiring, here, group, still, new_work(structure.wiring, group, here.step), state, trace, alive)
     assert alive[0]
     return trace.tracks[..., 0], trace.energy[..., 0], trace.power[..., 0]
 
@@ -82,19 +79,19 @@ def test_free_body_keeps_energy_and_angular_momentum_and_falls() -> None:
         return float(omega @ inertia @ omega), R @ inertia @ omega
 
     energy, momentum = invariants()
-    advance(
-        structure.wiring, here, group, np.zeros((n, 4, 2, 3)), new_work(structure.wiring, group, 1e-3), state, trace, alive
-    )  # fmt: skip
+    work = new_work(structure.wiring, group, 1e-3)
+    advance(structure.wiring, here, group, np.zeros((n, 4, 2, 3)), work, state, trace, alive)
     turned = invariants()
     assert abs(state.V[0, 0, 0]) > 1.0, "rotation about the middle axis must have become unstable by now"
     assert turned[0] == pytest.approx(energy, rel=1e-4)
-    np.testing.assert_allclose(turned[1], momentum, rtol=0, atol=2e-4 * np.linalg.norm(momentum))
-    np.testing.assert_allclose(state.p[0, :, 0], start - [0, 0, 0.5 * 9.81 * 0.25], atol=1e-5)  # body axes turn: third order
+    np.testing.assert_allclose(turned[1], momentum, rtol=0, atol=2e-4 * float(np.linalg.norm(momentum)))
+    # the velocity is integrated in body axes, which turn: exact to third order only
+    np.testing.assert_allclose(state.p[0, :, 0], start - [0, 0, 0.5 * 9.81 * 0.25], atol=1e-5)
 
 
-def lanes_without_connectors(structure: Structure, genes: tuple[object, ...]) -> object:
+def lanes_without_connectors(structure: Structure, genes: tuple[Gene, ...]) -> Lanes:
     full = build(structure.wing, structure.division)
-    group = lanes(full, genes, np.array([[g.nominal for g in genes]]))  # type: ignore[arg-type, attr-defined]
+    group = lanes(full, genes, np.array([[g.nominal for g in genes]]))
     return group._replace(stiffness=group.stiffness[:0], damping=group.damping[:0])
 
 
@@ -167,11 +164,12 @@ def test_four_bar_rocker_closes_the_loop() -> None:
     from sim.drive import four_bar_angle
 
     linkage = robird_wing().drive
+    assert isinstance(linkage, FourBarDrive)
     psi = np.linspace(0, 2 * np.pi, 50)
-    angle = four_bar_angle(linkage, psi) - linkage.offset  # type: ignore[arg-type, union-attr]
-    pin = linkage.crank * np.stack([np.cos(psi), np.sin(psi)])  # type: ignore[union-attr]
-    tip = np.array([[linkage.ground], [0.0]]) + linkage.rocker * np.stack([np.cos(angle), np.sin(angle)])  # type: ignore[union-attr]
-    np.testing.assert_allclose(np.linalg.norm(tip - pin, axis=0), linkage.coupler, rtol=1e-12)  # type: ignore[union-attr]
+    angle = four_bar_angle(linkage, psi) - linkage.offset
+    pin = linkage.crank * np.stack([np.cos(psi), np.sin(psi)])
+    tip = np.array([[linkage.ground], [0.0]]) + linkage.rocker * np.stack([np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(np.linalg.norm(tip - pin, axis=0), linkage.coupler, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
