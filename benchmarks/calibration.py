@@ -1,0 +1,188 @@
+"""The staged calibration of the example campaign against the truth that it never reads.
+
+``python -m benchmarks.calibration [--json] [--joint] [--evaluator KIND]``. The misfit floor is what the true genome
+leaves on the same recordings: tracking noise, and the error of placing the beat from noisy tracks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machine import commit, cpu
+from calibration.evaluator import Evaluator
+from calibration.problem import Problem, base_genome
+from calibration.result import Result, summarise
+from calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
+from records import Dataset, load_dataset
+from workers import make_evaluator
+from workers.factory import EvaluatorKind
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
+TRUTH = EXAMPLE.with_name("robird.truth.json")
+WITHIN = 0.15
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One finished calibration."""
+
+    last: Generation
+    result: Result
+    seconds: float
+
+
+def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: str) -> Outcome:
+    """Calibrate and judge, with progress on standard error."""
+    start, last = time.perf_counter(), None
+    for last in calibrate(spec, dataset, evaluator):  # noqa: B007
+        note = f"{label}: {last.stage} generation {last.index}, {last.distance * 1e3:.3f} mm"
+        print(f"\r{note}, {time.perf_counter() - start:.0f} s   ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    if last is None:
+        raise RuntimeError("the calibration had no generation")
+    return Outcome(last, summarise(spec, dataset, evaluator, last.genome), time.perf_counter() - start)
+
+
+def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: dict[str, float]) -> tuple[float, float]:
+    """Mean distance (m) that the true genome leaves on fitted and on held-out recordings."""
+    found = summarise(spec, dataset, evaluator, truth)
+    if found.held_out_after is None:
+        raise ValueError("the campaign holds no recording out")
+    return found.after, found.held_out_after
+
+
+def gene_table(result: Result, truth: dict[str, float]) -> list[dict[str, Any]]:
+    """Deviation from the truth of each gene (shares normalised), in per cent, beside its standard error."""
+    sums: dict[str, float] = {}
+    for name, value in truth.items():
+        group = share_group(name)
+        if group:
+            sums[group] = sums.get(group, 0.0) + value
+    rows = []
+    for gene in result.genes:
+        true = truth[gene.name] / sums.get(share_group(gene.name) or "", 1.0)
+        rows.append(
+            {
+                "gene": gene.name,
+                "best": gene.best,
+                "true": true,
+                "error_percent": round(100 * (gene.best / true - 1), 2),
+                "standard_error_percent": None if gene.standard_error is None else round(100 * gene.standard_error, 2),
+                "identifiable": gene.identifiable,
+            }
+        )
+    return rows
+
+
+def share_group(name: str) -> str | None:
+    """``L`` for L_1..L_4, ``ID`` for ID_1..ID_4, else None."""
+    prefix, _, number = name.rpartition("_")
+    return prefix if number.isdigit() else None
+
+
+def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
+    """Cut a short calibration in each stage; the rest must come out the same, through JSON."""
+    spec = CalibrationSpec(division="11", population=16, max_generations=3, seed=5)
+    whole = list(calibrate(spec, dataset, evaluator))
+    return all(
+        list(calibrate(spec, dataset, evaluator, json.loads(json.dumps(whole[cut].checkpoint)))) == whole[cut + 1 :]
+        for cut in (0, 3)
+    )
+
+
+def evaluators_are_identical(dataset: Dataset) -> bool:
+    """The same individuals in this process, on a pool of two and on Ray."""
+    spec = CalibrationSpec(division="11")
+    model, stage = model_for(dataset, spec.division), plan(spec, dataset)[1]
+    problem = Problem(model, stage.recordings, stage.free, base_genome(model))
+    rng = np.random.default_rng(0)
+    genes = [g for g in model.genes if g.name in stage.free]
+    values = np.array([[float(g.from_unit(rng.uniform())) for g in genes] for _ in range(19)])
+    seen = set()
+    for kind, workers in (("in_process", None), ("processes", 1), ("processes", 2), ("ray", 2)):
+        evaluator = make_evaluator(kind, workers)  # type: ignore[arg-type]
+        try:
+            found = evaluator.evaluate(problem, values, residuals=True)
+            seen.add(b"".join(p.squares.tobytes() + np.asarray(p.residuals).tobytes() for p in found.per_recording))
+        finally:
+            evaluator.close()
+    return len(seen) == 1
+
+
+def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
+    """All figures of the benchmark."""
+    dataset = load_dataset(EXAMPLE)
+    truth: dict[str, float] = json.loads(TRUTH.read_text(encoding="utf-8"))["genome"]
+    spec = CalibrationSpec(division="11", seed=seed)
+    evaluator = make_evaluator(kind)
+    try:
+        outcome = run(spec, dataset, evaluator, "11 bodies, staged")
+        floor_fitted, floor_held_out = floor(spec, dataset, evaluator, truth)
+        rows = gene_table(outcome.result, truth)
+        known = [row for row in rows if row["identifiable"]]
+        thesis = CalibrationSpec(
+            division="24", seed=seed, recordings=("vac-0010mbar-lag3-3.0hz", "wt-06.0ms-lag7-4.0hz")
+        )
+        big = run(thesis, dataset, evaluator, "24 bodies, the thesis's search")
+        figures: dict[str, Any] = {
+            "mm_before": outcome.result.before * 1e3,
+            "mm_after": outcome.result.after * 1e3,
+            "mm_floor": floor_held_out * 1e3,
+            "mm_floor_fitted": floor_fitted * 1e3,
+            "heldout_mm_before": (outcome.result.held_out_before or 0) * 1e3,
+            "heldout_mm_after": (outcome.result.held_out_after or 0) * 1e3,
+            "noise_mm_from_data": (outcome.result.noise or 0) * 1e3,
+            "genes_within_15_percent": sum(abs(row["error_percent"]) <= 100 * WITHIN for row in known),
+            "genes_identifiable": len(known),
+            "evaluations": outcome.last.evaluations,
+            "seconds": outcome.seconds,
+            "seconds_24_bodies": big.seconds,
+            "mm_after_24_bodies": big.result.after * 1e3,
+            "genes": rows,
+        }
+        if joint:
+            both = run(CalibrationSpec(division="11", seed=seed, mode="joint"), dataset, evaluator, "11 bodies, joint")
+            right = [r for r in gene_table(both.result, truth) if r["identifiable"]]
+            figures["joint"] = {
+                "mm_after": both.result.after * 1e3,
+                "heldout_mm_after": (both.result.held_out_after or 0) * 1e3,
+                "genes_within_15_percent": sum(abs(row["error_percent"]) <= 100 * WITHIN for row in right),
+                "genes_identifiable": len(right),
+                "evaluations": both.last.evaluations,
+                "seconds": both.seconds,
+            }
+        figures["resume_identical"] = resume_is_identical(dataset, evaluator)
+    finally:
+        evaluator.close()
+    figures["evaluators_identical"] = evaluators_are_identical(dataset)
+    return figures | {"seed": seed, "evaluator": kind, "cpu": cpu(), "commit": commit()}
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print only the JSON object")
+    parser.add_argument("--joint", action="store_true", help="also search all genes at once, to compare with stages")
+    parser.add_argument("--evaluator", choices=("in_process", "processes", "ray"), default="ray")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    figures = measure(arguments.evaluator, arguments.seed, arguments.joint)
+    if not arguments.json:
+        for key, value in figures.items():
+            if key != "genes":
+                print(f"{key}: {value}")
+        for row in figures["genes"]:
+            print(row)
+    print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
