@@ -1,1 +1,6 @@
-"""The same evaluations in-process, on a process pool and on Ray; job states without I/O."""
+"""Where evaluations run: in this process, in worker processes or on a Ray cluster; and the life of a job."""
+
+from workers.errors import EvaluatorClosedError, WorkerLostError
+from workers.factory import EvaluatorKind, RunningEvaluator, make_evaluator
+
+__all__ = ["EvaluatorClosedError", "EvaluatorKind", "RunningEvaluator", "WorkerLostError", "make_evaluator"]

@@ -1,0 +1,41 @@
+# One image for the API and for Ray's nodes: Ray ships pickled work between them, so their code must be the same.
+FROM python:3.11-slim
+
+ENV PYTHONUNBUFFERED=1 \
+    PIP_NO_CACHE_DIR=1 \
+    PIP_DISABLE_PIP_VERSION_CHECK=1 \
+    RAY_USAGE_STATS_ENABLED=0
+
+RUN useradd --uid 10001 --create-home --shell /usr/sbin/nologin wingfit \
+    && install -d -o wingfit -g wingfit -m 0700 /data /run/ray-token \
+    && install -d -o wingfit -g wingfit /opt/wingfit
+WORKDIR /opt/wingfit
+
+# Dependencies change less often than the code, so they have a layer of their own. The lock file also names the
+# tools of development; as a list of constraints it gives versions only to what the service needs.
+COPY pyproject.toml requirements.lock ./
+RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" \
+        > /tmp/needed.txt \
+    && pip install --constraint requirements.lock --requirement /tmp/needed.txt setuptools \
+    && rm /tmp/needed.txt
+
+COPY --chown=wingfit:wingfit LICENSE README.md ./
+COPY --chown=wingfit:wingfit records records
+COPY --chown=wingfit:wingfit sim sim
+COPY --chown=wingfit:wingfit calibration calibration
+COPY --chown=wingfit:wingfit workers workers
+COPY --chown=wingfit:wingfit service service
+RUN pip install --no-deps --no-build-isolation --editable .
+
+USER wingfit
+# Compiled kernels are kept beside the code. On another kind of processor they are compiled again at the first use.
+RUN if [ -f sim/warm.py ]; then python -m sim.warm; fi
+
+ENV WINGFIT_DATA=/data \
+    WINGFIT_HOST=0.0.0.0 \
+    WINGFIT_PORT=8321 \
+    WINGFIT_ALLOW_REMOTE=1
+EXPOSE 8321
+HEALTHCHECK --interval=15s --timeout=5s --start-period=60s \
+    CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8321/v1/health', timeout=4)"]
+CMD ["wingfit", "serve"]

@@ -1,0 +1,54 @@
+# Everything here works on a fresh machine that has make and python3 (3.11 to 3.14, for which Ray is built).
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/installed
+
+.PHONY: demo test check serve format lock install clean
+
+demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
+	@$(BIN)/python -m service.demo
+
+serve: $(INSTALLED)  ## start the service and stay
+	@$(BIN)/wingfit serve
+
+test: check  ## every check and every test
+	$(BIN)/python -m pytest
+
+check: $(INSTALLED)  ## every check, no test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(INSTALLED)  ## rewrite the code in the house format
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+install: $(INSTALLED)  ## only install
+
+# The stamp is written last, so an installation that was interrupted is done again. The package itself needs no
+# index: its build tool is in the lock file.
+$(INSTALLED): pyproject.toml requirements.lock | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@if [ -f sim/warm.py ]; then echo "compiling the simulator once ..." && $(BIN)/python -m sim.warm; fi
+	@touch $@
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' \
+		|| { echo "wingfit needs Python 3.11 to 3.14; say which with: make PYTHON=python3.12 $(MAKECMDGOALS)"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
+		|| { echo "this Python cannot make virtual environments; on Debian and Ubuntu: apt install python3-venv"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+# Versions only: no hashes, because the same file serves mirrors and machines with wheels of their own.
+lock: | $(BIN)/python  ## choose the newest versions that pyproject.toml admits, and write them down
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra dev --no-annotate \
+		--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
+		pyproject.toml --output-file requirements.lock
+
+clean:  ## remove what was installed and cached here, but no data
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

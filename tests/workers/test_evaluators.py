@@ -1,0 +1,218 @@
+"""One suite over all evaluators: the same bits, and manners when something goes wrong."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.evaluator import gather, run_unit, units
+from calibration.problem import Evaluation, Problem
+from tests.workers import pendulum
+from workers import EvaluatorClosedError, EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator
+
+KINDS: tuple[EvaluatorKind, ...] = ("in_process", "processes", "ray")
+DISTRIBUTED: tuple[EvaluatorKind, ...] = ("processes", "ray")
+
+
+@pytest.fixture(scope="module")
+def made() -> Iterator[Callable[[EvaluatorKind], RunningEvaluator]]:
+    """Evaluators with two workers, started when first asked for and shared by the tests of this module."""
+    running: dict[EvaluatorKind, RunningEvaluator] = {}
+
+    def get(kind: EvaluatorKind) -> RunningEvaluator:
+        if kind not in running:
+            running[kind] = make_evaluator(kind, 2)
+        return running[kind]
+
+    yield get
+    for evaluator in running.values():
+        evaluator.close()
+
+
+@pytest.fixture(params=KINDS)
+def any_evaluator(
+    request: pytest.FixtureRequest, made: Callable[[EvaluatorKind], RunningEvaluator]
+) -> RunningEvaluator:
+    return made(request.param)
+
+
+@pytest.fixture(params=DISTRIBUTED)
+def distributed(request: pytest.FixtureRequest, made: Callable[[EvaluatorKind], RunningEvaluator]) -> RunningEvaluator:
+    return made(request.param)
+
+
+def reference(problem: Problem, values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Evaluation:
+    done = [run_unit(problem, values, unit, residuals=True) for unit in units(problem, len(values))]
+    return gather(problem, done)
+
+
+def assert_same_bits(got: Evaluation, wanted: Evaluation) -> None:
+    assert len(got.per_recording) == len(wanted.per_recording)
+    for a, b in zip(got.per_recording, wanted.per_recording, strict=True):
+        assert a.squares.tobytes() == b.squares.tobytes()
+        assert a.distance.tobytes() == b.distance.tobytes()
+        assert (a.samples, a.reasons) == (b.samples, b.reasons)
+        assert a.residuals is not None
+        assert b.residuals is not None
+        assert a.residuals.tobytes() == b.residuals.tobytes()
+
+
+@pytest.mark.parametrize("individuals", [1, 8, 53])
+def test_same_bits_everywhere(any_evaluator: RunningEvaluator, individuals: int) -> None:
+    problem, values = pendulum.problem(), pendulum.population(individuals)
+    wanted = reference(problem, values)
+    assert_same_bits(any_evaluator.evaluate(problem, values, residuals=True), wanted)
+    assert wanted.reasons[0] == "overdamped"
+    assert wanted.fitness[0] == np.inf
+    assert all(np.isfinite(wanted.fitness[1:]))
+
+
+def test_residuals_only_when_asked(any_evaluator: RunningEvaluator) -> None:
+    evaluation = any_evaluator.evaluate(pendulum.problem(), pendulum.population(3))
+    assert all(part.residuals is None for part in evaluation.per_recording)
+
+
+def test_says_what_it_is(any_evaluator: RunningEvaluator) -> None:
+    assert any_evaluator.kind in KINDS
+    assert any_evaluator.workers == (1 if any_evaluator.kind == "in_process" else 2)
+
+
+def test_two_threads_with_different_problems(any_evaluator: RunningEvaluator) -> None:
+    problems = [pendulum.problem(gravities=(9.81, 3.7)), pendulum.problem(gravities=(1.62,))]
+    populations = [pendulum.population(40, seed) for seed in (1, 2)]
+    wanted = [reference(p, v) for p, v in zip(problems, populations, strict=True)]
+    results: list[list[Evaluation]] = [[], []]
+
+    def work(i: int) -> None:
+        for _ in range(3):
+            results[i].append(any_evaluator.evaluate(problems[i], populations[i], residuals=True))
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    for got, want in zip(results, wanted, strict=True):
+        assert len(got) == 3
+        for evaluation in got:
+            assert_same_bits(evaluation, want)
+
+
+def test_more_problems_than_a_worker_remembers(distributed: RunningEvaluator) -> None:
+    problems = [pendulum.problem(gravities=(g,)) for g in np.linspace(1.0, 10.0, 11).tolist()]
+    values = pendulum.population(5)
+    for problem in (*problems, *problems):
+        assert_same_bits(distributed.evaluate(problem, values, residuals=True), reference(problem, values))
+
+
+def test_a_models_error_arrives_as_it_was(any_evaluator: RunningEvaluator) -> None:
+    with pytest.raises(ValueError, match=r"^cannot simulate g9\.81"):
+        any_evaluator.evaluate(pendulum.problem(pendulum.refuse, (9.81,)), pendulum.population(3))
+    problem, values = pendulum.problem(), pendulum.population(3)
+    assert_same_bits(any_evaluator.evaluate(problem, values, residuals=True), reference(problem, values))
+
+
+def test_a_model_that_cannot_travel_is_an_error(distributed: RunningEvaluator) -> None:
+    with pytest.raises(Exception, match="pickle"):
+        distributed.evaluate(pendulum.problem(lambda *_: None), pendulum.population(3))
+
+
+def test_kernels_get_arrays_of_the_type_they_were_compiled_for(any_evaluator: RunningEvaluator) -> None:
+    any_evaluator.evaluate(pendulum.problem(pendulum.need_writeable), pendulum.population(9))
+
+
+def test_survives_the_death_of_a_worker(distributed: RunningEvaluator, tmp_path: Path) -> None:
+    problem, values = pendulum.problem(pendulum.DieOnce(tmp_path / "died")), pendulum.population(50)
+    got = distributed.evaluate(problem, values, residuals=True)
+    assert (tmp_path / "died").exists()
+    assert_same_bits(got, reference(pendulum.problem(), values))
+
+
+def test_gives_up_on_what_always_kills_its_worker(distributed: RunningEvaluator) -> None:
+    with pytest.raises(WorkerLostError, match="fewer workers than 2"):
+        distributed.evaluate(pendulum.problem(pendulum.die_always, (9.81,)), pendulum.population(3))
+    problem, values = pendulum.problem(), pendulum.population(3)
+    assert_same_bits(distributed.evaluate(problem, values, residuals=True), reference(problem, values))
+
+
+def test_workers_are_polite_and_single_threaded(distributed: RunningEvaluator, tmp_path: Path) -> None:
+    distributed.evaluate(pendulum.problem(pendulum.Note(tmp_path, 0.05)), pendulum.population(32))
+    notes = [note.read_text().split() for note in tmp_path.iterdir()]
+    assert len(notes) == 2
+    for niceness, threads, *_ in notes:
+        assert int(niceness) >= 10
+        assert threads == "1"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_closing_ends_a_call_under_way(kind: EvaluatorKind, tmp_path: Path) -> None:
+    # In a process of its own, since one process can have one connection to Ray.
+    code = f"""
+import threading, time
+from pathlib import Path
+from tests.workers import pendulum
+from workers import EvaluatorClosedError, make_evaluator
+
+population = pendulum.population(400)
+
+def call():
+    try:
+        evaluator.evaluate(pendulum.problem(pendulum.Note(Path({str(tmp_path)!r}), 0.5)), population)
+    except EvaluatorClosedError as error:
+        print("closed:", error)
+
+if __name__ == "__main__":
+    evaluator = make_evaluator({kind!r}, 2)
+    thread = threading.Thread(target=call)
+    thread.start()
+    while not any(Path({str(tmp_path)!r}).iterdir()):
+        time.sleep(0.05)
+    evaluator.close()
+    evaluator.close()
+    thread.join(10)
+    print("alive" if thread.is_alive() else "ended")
+    call()
+"""
+    script = tmp_path.with_suffix(".py")
+    script.write_text(code)
+    began = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=90, env=environment(), check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [message(kind), "ended", message(kind)]
+    # To wait for the work itself would take 400 / 8 * 3 * 0.5 s / 2.
+    assert time.monotonic() - began < 30
+
+
+def message(kind: str) -> str:
+    return f"closed: {EvaluatorClosedError(kind)}"
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+
+
+def test_only_ray_costs_the_import_of_ray() -> None:
+    code = "import sys, workers.processes as p; p.ProcessPoolEvaluator(1).close(); print('ray' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_refuses_settings_that_cannot_be() -> None:
+    with pytest.raises(ValueError, match="workers is 0; it must be at least 1"):
+        make_evaluator("processes", 0)
+    with pytest.raises(ValueError, match="needs the evaluator 'ray'"):
+        make_evaluator("processes", address="127.0.0.1:6379")
+    with pytest.raises(ValueError, match="'ray://head:10001'; write host:port"):
+        make_evaluator("ray", address="ray://head:10001")
+    with pytest.raises(ValueError, match="no evaluator 'dask'; there are in_process, processes, ray"):
+        make_evaluator("dask")  # type: ignore[arg-type]

@@ -1,0 +1,51 @@
+"""Makes evaluators by name, so that nothing else needs to know where evaluations run."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol, get_args
+
+from calibration.evaluator import Evaluator
+
+EvaluatorKind = Literal["in_process", "processes", "ray"]
+
+
+class RunningEvaluator(Evaluator, Protocol):
+    """An evaluator that also says what it is, for the health page."""
+
+    @property
+    def kind(self) -> EvaluatorKind:
+        """Which implementation this is."""
+        ...
+
+    @property
+    def workers(self) -> int:
+        """Number of units that can run at the same time."""
+        ...
+
+
+def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str | None = None) -> RunningEvaluator:
+    """Start an evaluator.
+
+    ``workers`` is the number of worker processes, by default one per processor. ``address`` ("host:port" or
+    "auto") joins a standing Ray cluster, which then decides the number of workers; without it, Ray starts on
+    this machine.
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}; it must be at least 1, or absent for one per processor")
+    if address is not None and kind != "ray":
+        raise ValueError(f"a Ray address ({address}) needs the evaluator 'ray', not {kind!r}")
+    if address is not None and "://" in address:
+        raise ValueError(f"the Ray address is {address!r}; write host:port, and run a node of it on this machine")
+    if kind == "in_process":
+        from workers.in_process import InProcessEvaluator
+
+        return InProcessEvaluator()
+    if kind == "processes":
+        from workers.processes import ProcessPoolEvaluator
+
+        return ProcessPoolEvaluator(workers)
+    if kind == "ray":
+        from workers.ray_cluster import RayEvaluator
+
+        return RayEvaluator(workers, address)
+    raise ValueError(f"no evaluator {kind!r}; there are {', '.join(get_args(EvaluatorKind))}")

@@ -1,0 +1,35 @@
+"""Evaluation in the caller's own thread: the reference that the other evaluators must match bit for bit."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy.typing as npt
+
+from calibration.evaluator import as_batch, gather, run_unit, units
+from calibration.problem import Evaluation, Misfit, Problem
+from workers.errors import EvaluatorClosedError
+
+
+class InProcessEvaluator:
+    """Runs one unit after the other."""
+
+    kind: Literal["in_process"] = "in_process"
+    workers = 1
+
+    def __init__(self) -> None:
+        self._closed = False
+
+    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+        """Misfits of ``values`` [B, F] to every recording of the problem."""
+        batch = as_batch(values)
+        done: list[Misfit] = []
+        for unit in units(problem, len(batch)):
+            if self._closed:
+                raise EvaluatorClosedError(self.kind)
+            done.append(run_unit(problem, batch, unit, residuals=residuals))
+        return gather(problem, done)
+
+    def close(self) -> None:
+        """Refuse further work; a call under way ends after its current unit."""
+        self._closed = True

@@ -1,0 +1,279 @@
+r"""The life of a calibration job as a pure state machine: no clock, no database, no threads.
+
+``step`` takes a job and an event and returns the job as it is afterwards and what the caller must now do. The
+caller stores the returned job, then carries out the instructions in order. A request to pause or cancel a
+running job is kept as a *wish* until the runner reports its next generation, so no finished one is lost, and
+a wish survives a restart of the server because it is part of the stored job. Cancelling wins.
+
+    None --submit--> QUEUED --start--> RUNNING --finish--> SUCCEEDED
+                      ^  |              |   |----fail----> FAILED
+                      |  +---pause---+  |   |
+                      |              v  |   +--wish CANCEL, then generation, finish, fail or restart
+                      +--resume--- PAUSED                          |
+                                     +------cancel------------> CANCELLED
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+
+class State(StrEnum):
+    """Where a job stands; the last three are final."""
+
+    QUEUED = "QUEUED"
+    RUNNING = "RUNNING"
+    PAUSED = "PAUSED"
+    SUCCEEDED = "SUCCEEDED"
+    FAILED = "FAILED"
+    CANCELLED = "CANCELLED"
+
+    @property
+    def final(self) -> bool:
+        """Whether no event can change a job in this state."""
+        return self in (State.SUCCEEDED, State.FAILED, State.CANCELLED)
+
+
+class Wish(StrEnum):
+    """What a user asked of a running job that its runner has not yet acted on."""
+
+    NONE = "NONE"
+    PAUSE = "PAUSE"
+    CANCEL = "CANCEL"
+
+
+class Instruction(StrEnum):
+    """What the caller of :func:`step` must do once the new job is stored."""
+
+    ENQUEUE = "ENQUEUE"
+    """Put the job at the end of the waiting line."""
+    DEQUEUE = "DEQUEUE"
+    """Take the job out of the waiting line."""
+    RUN = "RUN"
+    """Begin, or go on from the last stored generation."""
+    STORE = "STORE"
+    """Store the generation that came with the event; in the same transaction as the job."""
+    STOP = "STOP"
+    """The runner stops here; without this instruction it goes on to the next generation."""
+    PUBLISH = "PUBLISH"
+    """The state changed: tell whoever watches."""
+
+
+@dataclass(frozen=True)
+class Submit:
+    """A user submitted the job."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A runner took the job out of the waiting line."""
+
+
+@dataclass(frozen=True)
+class Generation:
+    """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1]."""
+
+    progress: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.progress <= 1.0:
+            raise ValueError(f"progress is {self.progress}; it must lie in [0, 1]")
+
+
+@dataclass(frozen=True)
+class Pause:
+    """A user asked to pause."""
+
+
+@dataclass(frozen=True)
+class Resume:
+    """A user asked to go on, or took back a pause that has not happened yet."""
+
+
+@dataclass(frozen=True)
+class Cancel:
+    """A user asked to cancel."""
+
+
+@dataclass(frozen=True)
+class Finish:
+    """The runner reached the end."""
+
+
+@dataclass(frozen=True)
+class Fail:
+    """The runner broke down; ``error`` is for the user."""
+
+    error: str
+
+
+@dataclass(frozen=True)
+class Restart:
+    """The server came up and found the job unfinished; whoever ran it is gone."""
+
+
+Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | Restart
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as it is stored. ``progress`` never decreases; ``error`` is set only in state FAILED."""
+
+    state: State = State.QUEUED
+    wish: Wish = Wish.NONE
+    generations: int = 0
+    progress: float = 0.0
+    error: str | None = None
+
+
+Outcome = tuple[Job, tuple[Instruction, ...]]
+
+
+class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an error, and named in the contract
+    """An event that the job's state does not admit. ``allowed`` names those that it does."""
+
+    def __init__(self, job: Job | None, event: Event) -> None:
+        self.state = job.state if job else None
+        self.event = type(event).__name__.lower()
+        self.allowed = allowed(job)
+        standing = "a job that does not exist yet" if job is None else f"a job in state {job.state.value}"
+        if job and job.wish is not Wish.NONE:
+            standing += f" that is about to {job.wish.value.lower()}"
+        choices = ", ".join(self.allowed) or "nothing: the state is final"
+        super().__init__(f"cannot {self.event} {standing}; allowed: {choices}")
+
+
+def allowed(job: Job | None) -> tuple[str, ...]:
+    """Names of the events that ``step`` admits for ``job``, in a fixed order."""
+    return tuple(kind.__name__.lower() for kind, handle in _HANDLERS.items() if handle(job, _sample(kind)) is not None)
+
+
+def step(job: Job | None, event: Event) -> Outcome:
+    """Return the job after ``event`` and what to do now; IllegalTransition when the state forbids it."""
+    outcome = _HANDLERS[type(event)](job, event)
+    if outcome is None:
+        raise IllegalTransition(job, event)
+    return outcome
+
+
+def _sample(kind: type[Event]) -> Event:
+    return kind(0.0) if kind is Generation else kind("") if kind is Fail else kind()  # type: ignore[call-arg]
+
+
+def _move(job: Job, state: State, *instructions: Instruction, error: str | None = None) -> Outcome:
+    """Enter ``state``; a wish is fulfilled or void by then."""
+    return replace(job, state=state, wish=Wish.NONE, error=error), (*instructions, Instruction.PUBLISH)
+
+
+def _submit(job: Job | None, _: Event) -> Outcome | None:
+    return (Job(), (Instruction.ENQUEUE, Instruction.PUBLISH)) if job is None else None
+
+
+def _start(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.state is not State.QUEUED:
+        return None
+    return _move(job, State.RUNNING, Instruction.RUN)
+
+
+def _generation(job: Job | None, event: Event) -> Outcome | None:
+    if job is None or job.state is not State.RUNNING or not isinstance(event, Generation):
+        return None
+    job = replace(job, generations=job.generations + 1, progress=max(job.progress, event.progress))
+    if job.wish is Wish.NONE:
+        return job, (Instruction.STORE,)
+    state = State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED
+    return _move(job, state, Instruction.STORE, Instruction.STOP)
+
+
+def _pause(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.wish is Wish.CANCEL:
+        return None
+    if job.state is State.QUEUED:
+        return _move(job, State.PAUSED, Instruction.DEQUEUE)
+    return (replace(job, wish=Wish.PAUSE), ()) if job.state is State.RUNNING else None
+
+
+def _resume(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.wish is Wish.CANCEL:
+        return None
+    if job.state is State.PAUSED:
+        return _move(job, State.QUEUED, Instruction.ENQUEUE)
+    return (replace(job, wish=Wish.NONE), ()) if job.wish is Wish.PAUSE else None
+
+
+def _cancel(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.state.final:
+        return None
+    if job.state is State.RUNNING:
+        return replace(job, wish=Wish.CANCEL), ()
+    return _move(job, State.CANCELLED, *([Instruction.DEQUEUE] if job.state is State.QUEUED else []))
+
+
+def _finish(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.state is not State.RUNNING:
+        return None
+    if job.wish is Wish.CANCEL:
+        return _move(job, State.CANCELLED, Instruction.STOP)
+    return _move(replace(job, progress=1.0), State.SUCCEEDED, Instruction.STOP)
+
+
+def _fail(job: Job | None, event: Event) -> Outcome | None:
+    if job is None or job.state is not State.RUNNING or not isinstance(event, Fail):
+        return None
+    if job.wish is Wish.CANCEL:
+        return _move(job, State.CANCELLED, Instruction.STOP)
+    return _move(job, State.FAILED, Instruction.STOP, error=event.error)
+
+
+def _restart(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.state.final:
+        return None
+    if job.state is State.QUEUED:
+        return job, (Instruction.ENQUEUE,)
+    if job.state is State.PAUSED:
+        return job, ()
+    if job.wish is Wish.NONE:
+        return _move(job, State.QUEUED, Instruction.ENQUEUE)
+    return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED)
+
+
+_HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
+    Submit: _submit,
+    Start: _start,
+    Generation: _generation,
+    Pause: _pause,
+    Resume: _resume,
+    Cancel: _cancel,
+    Finish: _finish,
+    Fail: _fail,
+    Restart: _restart,
+}
+
+ETA_MEMORY = 0.2
+"""Share of the elapsed time over which old progress fades out of the estimate, by a factor e."""
+
+
+def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
+    """Seconds until progress 1, or None while nothing can be said.
+
+    ``history`` holds (elapsed s of running time, progress) of each generation, in order; (0, 0) is implied.
+    The speed is the slope of a straight line through the history, fitted by least squares with weights that
+    fade into the past: one slow generation moves the estimate little, a lasting change of speed is followed.
+    """
+    points = [(0.0, 0.0), *history]
+    now, progress = points[-1]
+    if progress >= 1.0:
+        return 0.0
+    if now <= 0.0:
+        return None
+    weights = [math.exp((t - now) / (ETA_MEMORY * now)) for t, _ in points]
+    total = sum(weights)
+    mean_t = sum(w * t for w, (t, _) in zip(weights, points, strict=True)) / total
+    mean_p = sum(w * p for w, (_, p) in zip(weights, points, strict=True)) / total
+    spread = sum(w * (t - mean_t) ** 2 for w, (t, _) in zip(weights, points, strict=True))
+    rise = sum(w * (t - mean_t) * (p - mean_p) for w, (t, p) in zip(weights, points, strict=True))
+    seconds = (1.0 - progress) * spread / rise if rise > 0.0 else math.inf
+    return seconds if math.isfinite(seconds) else None

@@ -1,0 +1,130 @@
+"""The connection of this process to Ray, and how Ray is started here when there is no cluster to join.
+
+Facts about Ray 2.60 that shaped this module:
+- A Ray that was started here dies with the *thread* that started it, and Ray ends a process that has lost its
+  Ray after a minute. So a thread of our own connects, and lives until the evaluator is closed. Away from the
+  main thread Ray also leaves the signal handlers of the process alone.
+- Ray listens on all interfaces. So a Ray of our own asks for a token too; it does so by default, but it would
+  write the token where others can read it, unless it finds one in the environment.
+- Ray's usual folder remembers cluster addresses and misleads whoever starts Ray next. So ours has its own.
+"""
+
+from __future__ import annotations
+
+import atexit
+import logging
+import os
+import secrets
+import shutil
+import sys
+import tempfile
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from workers.share import child_environment
+
+# Ray reads these when it is imported.
+os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+
+import ray
+from ray import exceptions as ray_errors
+
+__all__ = ["Connection", "ray", "ray_errors"]
+
+STOP_SECONDS = 30.0
+OBJECT_STORE_BYTES = 256 * 2**20
+# Ray puts sockets into its folder, and the path of a socket may not exceed 107 bytes.
+LONGEST_TEMP_PATH = 24
+FOLDER = "wingfit-ray-"
+QUIET: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+
+
+class Connection:
+    """Ray, started or joined by a thread that stays until :meth:`close`."""
+
+    def __init__(self, workers: int | None, address: str | None) -> None:
+        if ray.is_initialized():
+            raise RuntimeError("this process already has a connection to Ray; close its other Ray evaluator")
+        connect = (lambda: _join(address)) if address else (lambda: _start(workers or os.cpu_count() or 1))
+        self._failure: BaseException | None = None
+        self._connected, self._leave = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._live, args=(connect,), name="ray", daemon=True)
+        self._thread.start()
+        self._connected.wait()
+        if self._failure:
+            raise self._failure
+        atexit.register(self.close)
+
+    def close(self) -> None:
+        """Leave Ray, and stop it if it was started here."""
+        atexit.unregister(self.close)
+        self._leave.set()
+        self._thread.join(STOP_SECONDS)
+
+    def _live(self, connect: Callable[[], Callable[[], None]]) -> None:
+        try:
+            leave = connect()
+        except BaseException as failure:
+            self._failure = failure
+            return
+        finally:
+            self._connected.set()
+        self._leave.wait()
+        leave()
+
+
+def _join(address: str) -> Callable[[], None]:
+    try:
+        ray.init(address=address, **QUIET)
+    except (ConnectionError, RuntimeError, ValueError, ray_errors.RayError) as error:
+        _stop()
+        raise ConnectionError(
+            f"cannot join the Ray cluster at {address!r}: {error}. This machine must run a node of it "
+            "(ray start --address=...), and RAY_AUTH_MODE and RAY_AUTH_TOKEN_PATH must be the same everywhere"
+        ) from error
+    return _stop
+
+
+def _start(workers: int) -> Callable[[], None]:
+    if not {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & set(os.environ):
+        os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
+    folder = _own_folder()
+    try:
+        # Ray hands only the folder of the script on to its workers, not the rest of the search path.
+        with child_environment(PYTHONPATH=os.pathsep.join(filter(None, sys.path))):
+            ray.init(
+                address="local",
+                num_cpus=workers,
+                num_gpus=0,
+                include_dashboard=False,
+                object_store_memory=OBJECT_STORE_BYTES,
+                _temp_dir=str(folder),
+                **QUIET,
+            )
+    except BaseException:
+        _stop(folder)
+        raise
+    return lambda: _stop(folder)
+
+
+def _stop(folder: Path | None = None) -> None:
+    with suppress(Exception):
+        ray.shutdown()
+    if folder:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _own_folder() -> Path:
+    """Make a private folder, and remove those of processes that were killed before they could clean up."""
+    usual = Path(tempfile.gettempdir())
+    base = usual if len(str(usual)) <= LONGEST_TEMP_PATH else Path("/tmp")  # noqa: S108  mkdtemp is private
+    for old in base.glob(f"{FOLDER}*-*"):
+        owner = old.name.removeprefix(FOLDER).split("-")[0]
+        if owner.isdigit() and not Path("/proc", owner).exists():
+            shutil.rmtree(old, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"{FOLDER}{os.getpid()}-", dir=base))
