@@ -1,0 +1,157 @@
+"""Shapes of the server's answers, as the Python client hands them out (docs/api.md explains the fields)."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, TypedDict
+
+State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
+FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
+
+
+class Health(TypedDict):
+    """Answer of ``GET /v1/health``."""
+
+    status: str
+    version: str
+    sqlite_version: str
+    evaluator: str
+    workers: int | None
+    runs_active: int
+
+
+class RecordingInfo(TypedDict):
+    """One recording of a dataset: its condition and how much of it was tracked."""
+
+    name: str
+    rig: str
+    held_out: bool
+    frames: int
+    markers: int
+    missing_percent: float
+    flap_frequency_hz: float
+    phase_lag_deg: float
+    pressure_mbar: float
+    temperature_c: float
+    airspeed_m_s: float
+    angle_of_attack_deg: float
+
+
+class Dataset(TypedDict):
+    """An uploaded dataset."""
+
+    id: str
+    name: str
+    description: str
+    created_at: str
+    sha256: str
+    size_bytes: int
+    markers: int
+    recordings: list[RecordingInfo]
+
+
+class Run(TypedDict):
+    """A calibration run and how far it is."""
+
+    id: str
+    name: str
+    dataset_id: str
+    spec: dict[str, Any]
+    state: State
+    wish: Literal["PAUSE", "CANCEL"] | None
+    stage: str | None
+    progress: float
+    eta_seconds: float | None
+    created_at: str
+    started_at: str | None
+    finished_at: str | None
+    generations: int
+    evaluations: int
+    best_mm: float | None
+    error: str | None
+
+
+class HistoryItem(TypedDict):
+    """One generation; ``best`` and ``mean`` are Eq. 14 in m^2, ``best_mm`` the mean distance per marker.
+
+    ``evaluations`` counts since the run began, ``failed`` in this generation.
+    """
+
+    sequence: int
+    stage: str
+    generation: int
+    best: float | None
+    mean: float | None
+    diversity: float | None
+    best_mm: float | None
+    evaluations: int
+    failed: int
+    elapsed_seconds: float
+
+
+class GeneInfo(TypedDict):
+    """One gene, nominal and best, with its bounds and whether the data can tell it."""
+
+    name: str
+    unit: str
+    description: str
+    nominal: float
+    best: float
+    lower: float
+    upper: float
+    searched: bool
+    standard_error_percent: float | None
+    identifiable: bool | None
+
+
+class GenomeInfo(TypedDict):
+    """Best genome so far; ``final`` once the run has ended."""
+
+    genes: list[GeneInfo]
+    final: bool
+
+
+class RecordingResult(TypedDict):
+    """Mean distance per marker on one recording, with the nominal and with the best genome."""
+
+    name: str
+    held_out: bool
+    stage: str | None
+    samples: int
+    before_mm: float | None
+    after_mm: float | None
+
+
+class Result(TypedDict):
+    """Outcome of a finished run."""
+
+    before_mm: float | None
+    after_mm: float | None
+    held_out_before_mm: float | None
+    held_out_after_mm: float | None
+    noise_mm: float | None
+    recordings: list[RecordingResult]
+    genes: list[GeneInfo]
+
+
+class Comparison(TypedDict):
+    """Recorded and simulated tracks [frame][marker][x, y, z] in mm; None where not recorded."""
+
+    recording: str
+    phase: list[float]
+    markers: list[str]
+    recorded_mm: list[list[list[float | None]]]
+    simulated_mm: list[list[list[float | None]]]
+
+
+class Simulation(Comparison):
+    """A comparison of one simulation with the recording under whose condition it ran."""
+
+    mean_distance_mm: float | None
+
+
+class Event(TypedDict):
+    """A server-sent event: ``generation`` (a history item with progress) or ``state`` (a run)."""
+
+    id: str | None
+    event: str
+    data: dict[str, Any]

@@ -1,0 +1,112 @@
+"""The web application: routes, guards, pages."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.responses import FileResponse, Response
+from starlette.routing import Match
+from starlette.staticfiles import StaticFiles
+
+from service import problems
+from service.database import Database
+from service.engine import Engine
+from service.guard import Guard
+from service.routes import datasets, outcomes, runs, system
+from service.schemas import ProblemOut
+from service.settings import Settings
+from service.state import MakeEvaluator, Service, wingfit_version
+
+LOG = logging.getLogger("wingfit")
+WEB = Path(__file__).parent / "web"
+ROUTERS = (system.router, datasets.router, runs.router, outcomes.router)
+METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
+DESCRIPTION = (
+    "Calibrates flapping-wing simulations on recordings of tracked markers. Upload a dataset, submit a run, "
+    "watch its events, fetch its result. Errors are problem details (RFC 9457)."
+)
+
+
+def create_app(
+    settings: Settings,
+    *,
+    database: Database | None = None,
+    engine: Engine | None = None,
+    make_evaluator: MakeEvaluator | None = None,
+) -> FastAPI:
+    """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        opened = Database(settings.data) if database is None else database
+        service = Service(settings, opened, engine, make_evaluator)
+        app.state.service = service
+        await run_in_threadpool(service.start)
+        yield
+        app.state.stopped = await run_in_threadpool(service.stop)
+
+    app = FastAPI(
+        title="wingfit",
+        version=wingfit_version(),
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
+    problems.install(app)
+    for router in ROUTERS:
+        app.include_router(router)
+    app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
+    _document_problems(app)
+    _mount_pages(app)
+    app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)
+    return app
+
+
+async def _nothing_here(request: Request) -> Response:
+    """Tell an unknown path from a method that the path does not have; the pages at / would hide both."""
+    scope = dict(request.scope)
+    found = set()
+    for method in METHODS:
+        scope["method"] = method
+        if any(route.matches(scope)[0] is Match.FULL for router in ROUTERS for route in router.routes):
+            found.add(method)
+    if not found:
+        raise HTTPException(404, f"there is nothing at {request.url.path[:200]}; /docs lists the calls")
+    allow = ", ".join(sorted(found))
+    raise HTTPException(405, f"{request.method} is not possible here; possible: {allow}", {"Allow": allow})
+
+
+def _document_problems(app: FastAPI) -> None:
+    generate = app.openapi
+
+    def openapi() -> dict[str, Any]:
+        specification = generate()
+        schemas = specification.setdefault("components", {}).setdefault("schemas", {})
+        problem = ProblemOut.model_json_schema(ref_template="#/components/schemas/{model}")
+        schemas.update(problem.pop("$defs", {}))
+        schemas["Problem"] = problem
+        return specification
+
+    app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents
+
+
+def _mount_pages(app: FastAPI) -> None:
+    @app.get("/assets/plotly.min.js", include_in_schema=False)
+    def plotly() -> FileResponse:
+        # The package's own file: the page needs no other origin.
+        path = files("plotly") / "package_data" / "plotly.min.js"
+        return FileResponse(str(path), media_type="text/javascript", headers={"Cache-Control": "max-age=86400"})
+
+    if WEB.is_dir():
+        app.mount("/", StaticFiles(directory=WEB, html=True), name="pages")
+    else:
+        LOG.warning("the pages are missing: %s is no folder", WEB)

@@ -1,0 +1,50 @@
+"""The command line: ``wingfit serve | campaign | datasets | runs | simulate``.
+
+Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a wrong use of the command, 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from service.client import WingfitError
+from service.commands import datasets, rig, runs, serve, simulate
+from service.commands.output import note
+
+ERROR = 1
+
+app = typer.Typer(
+    name="wingfit",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Calibrate flapping-wing simulations on recordings of tracked markers.",
+    epilog="Example: wingfit serve, then wingfit datasets upload examples/robird",
+)
+app.command()(serve.serve)
+app.command()(rig.campaign)
+app.add_typer(datasets.app, name="datasets")
+app.add_typer(runs.app, name="runs")
+app.command()(simulate.simulate)
+
+
+def main() -> None:
+    """Run the command line; expected failures end as a message, not as a traceback."""
+    try:
+        app()
+    except WingfitError as error:
+        note(f"error: {error}")
+        sys.exit(ERROR)
+    except BrokenPipeError:
+        # The reader of the pipe has gone (as with "| head"); Python would complain again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(ERROR)
+    except OSError as error:
+        note(f"error: {error}")
+        sys.exit(ERROR)
+
+
+if __name__ == "__main__":
+    main()

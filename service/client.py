@@ -1,0 +1,262 @@
+"""Python client of the wingfit server.
+
+>>> client = Client()                                               # doctest: +SKIP
+>>> dataset = client.upload_dataset("examples/robird")              # doctest: +SKIP
+>>> run = client.submit_run(dataset["id"], division="11")           # doctest: +SKIP
+>>> client.wait(run["id"], on_progress=lambda run: print(run["progress"]))  # doctest: +SKIP
+>>> client.result(run["id"])["after_mm"]                            # doctest: +SKIP
+
+Answers are plain dicts, typed in :mod:`service.answers`. Every failure is a :class:`WingfitError`.
+"""
+
+from __future__ import annotations
+
+import io
+import time
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, cast
+from urllib.parse import quote
+
+import httpx
+
+from service import answers as a
+from service.transport import (
+    DEFAULT_URL,
+    CountedFile,
+    OnBytes,
+    ServerAwayError,
+    Transport,
+    WingfitError,
+    given,
+    is_passing,
+    zip_folder,
+)
+
+__all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
+
+OnRun = Callable[[a.Run], None]
+
+
+class Client(Transport):
+    """Talks to one server; usable as a context manager."""
+
+    def health(self) -> a.Health:
+        """Ask whether the server is up, for its version, evaluator and load."""
+        return cast(a.Health, self._json("GET", "/v1/health"))
+
+    # -- datasets ------------------------------------------------------------
+
+    def upload_dataset(
+        self, path: str | Path, *, name: str | None = None, on_bytes: OnBytes | None = None
+    ) -> a.Dataset:
+        """Upload a dataset: a zip, a NetCDF file, or a folder, which is zipped first.
+
+        ``on_bytes(sent, total)`` is called as the bytes go out.
+        """
+        source = Path(path)
+        if not source.exists():
+            raise WingfitError("no such dataset", f"{source} does not exist; give a folder, a .zip or a .nc file")
+        with TemporaryDirectory(prefix="wingfit-") as scratch:
+            archive = zip_folder(source, Path(scratch) / f"{source.resolve().name}.zip") if source.is_dir() else source
+            key = str(uuid.uuid4())
+
+            def send() -> httpx.Response:
+                with CountedFile(archive, on_bytes) as stream:
+                    return self._http.post(
+                        "/v1/datasets",
+                        files={"file": (archive.name, cast(io.BufferedReader, stream))},
+                        data={"name": name} if name else {},
+                        headers={"Idempotency-Key": key},
+                    )
+
+            return cast(a.Dataset, self._repeat(send).json())
+
+    def datasets(self) -> list[a.Dataset]:
+        """List all datasets, newest first."""
+        return cast(list[a.Dataset], self._all("/v1/datasets"))
+
+    def dataset(self, dataset_id: str) -> a.Dataset:
+        """Fetch one dataset with its recordings."""
+        return cast(a.Dataset, self._json("GET", f"/v1/datasets/{_part(dataset_id)}"))
+
+    def download(self, dataset_id: str, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
+        """Write the bytes that were uploaded to ``path``; into a folder under the server's name for them.
+
+        ``on_bytes(received, total)`` is called as they come in; total is 0 where the server does not say.
+        """
+        target = Path(path)
+        part: Path | None = None
+        with self._stream("GET", f"/v1/datasets/{_part(dataset_id)}/archive") as response:
+            if target.is_dir():
+                target = target / _attachment_name(response, f"{dataset_id}.zip")
+            part = target.with_name(target.name + ".part")
+            try:
+                with part.open("wb") as stream:
+                    for block in response.iter_bytes():
+                        stream.write(block)
+                        if on_bytes:
+                            on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
+            except httpx.TransportError as error:
+                part.unlink(missing_ok=True)
+                raise ServerAwayError(self.base_url, error) from error
+        part.replace(target)
+        return target
+
+    def delete_dataset(self, dataset_id: str) -> None:
+        """Delete a dataset; the server refuses while runs refer to it."""
+        self._call("DELETE", f"/v1/datasets/{_part(dataset_id)}")
+
+    # -- runs ----------------------------------------------------------------
+
+    def submit_run(self, dataset_id: str, **spec: Any) -> a.Run:
+        """Submit a calibration.
+
+        ``spec``: division, mode, population, stall, tolerance, max_generations, seed, bounds_factor,
+        recordings, genes, name. What is left out takes the server's default (the thesis's settings).
+        """
+        body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
+        return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
+
+    def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
+        """List all runs, newest first, optionally of one dataset or in one state."""
+        return cast(list[a.Run], self._all("/v1/runs", dataset_id=dataset_id, state=state))
+
+    def run(self, run_id: str) -> a.Run:
+        """Fetch one run with its progress."""
+        return cast(a.Run, self._json("GET", _run(run_id)))
+
+    def cancel(self, run_id: str) -> a.Run:
+        """Stop a run for good; what it has found so far stays."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/cancel"))
+
+    def pause(self, run_id: str) -> a.Run:
+        """Stop a run after its current generation."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/pause"))
+
+    def resume(self, run_id: str) -> a.Run:
+        """Go on with a paused run."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/resume"))
+
+    def delete_run(self, run_id: str) -> None:
+        """Delete a run that has ended."""
+        self._call("DELETE", _run(run_id))
+
+    def history(self, run_id: str, *, after: int | None = None) -> list[a.HistoryItem]:
+        """Fetch the generations so far, those after sequence number ``after``."""
+        items: list[Any] = []
+        while True:
+            page = self._json("GET", f"{_run(run_id)}/history", params=given(after=after, limit=1000))["items"]
+            items += page
+            if not page or page[-1]["sequence"] == after:
+                return cast(list[a.HistoryItem], items)
+            after = page[-1]["sequence"]
+
+    def genome(self, run_id: str) -> a.GenomeInfo:
+        """Fetch the best genome so far, beside the nominal one, with units and bounds."""
+        return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
+
+    def result(self, run_id: str) -> a.Result:
+        """Fetch misfits before and after and the genes of a finished run."""
+        return cast(a.Result, self._json("GET", f"{_run(run_id)}/result"))
+
+    def comparison(
+        self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
+    ) -> a.Comparison:
+        """Fetch recorded and simulated markers of one recording."""
+        params = given(recording=recording, genome=genome)
+        return cast(a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params))
+
+    def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
+        """Yield the server-sent events of a run until its final state.
+
+        A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
+        without a server.
+        """
+        away_since: float | None = None
+        while True:
+            try:
+                for event in self._events_once(f"{_run(run_id)}/events", last_event_id):
+                    away_since = None
+                    last_event_id = event["id"] or last_event_id
+                    yield event
+                    if _is_final(event):
+                        return
+                run = self.run(run_id)  # the stream ended early, or resumed after the final state
+                if run["state"] in a.FINAL:
+                    yield {"id": None, "event": "state", "data": dict(run)}
+                    return
+            except (httpx.TransportError, WingfitError) as error:
+                if isinstance(error, WingfitError) and not is_passing(error):
+                    raise
+                away_since = away_since or time.monotonic()
+                if time.monotonic() - away_since > patience_s:
+                    raise ServerAwayError(self.base_url, error) from error
+            time.sleep(self.retry_wait_s)
+
+    def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
+        """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
+        run = self.run(run_id)
+        report = on_progress or (lambda _: None)
+        report(run)
+        if run["state"] in a.FINAL:
+            return run
+        for event in self.events(run_id, patience_s=patience_s):
+            run = merge(run, event)
+            report(run)
+        return run
+
+    def simulate(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        division: str = "11",
+        genome: Mapping[str, float] | None = None,
+    ) -> a.Simulation:
+        """Simulate one recording; genes not named in ``genome`` keep their nominal value."""
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "division": division,
+            "genome": dict(genome or {}),
+        }
+        return cast(a.Simulation, self._json("POST", "/v1/simulations", json=body, key=str(uuid.uuid4())))
+
+
+def merge(run: a.Run, event: a.Event) -> a.Run:
+    """Return the run as it stands after ``event``."""
+    data = event["data"]
+    if event["event"] == "state":
+        return cast(a.Run, dict(run) | data)
+    # After a reconnection the server repeats what the run already counts.
+    if event["event"] != "generation" or data["sequence"] <= run["generations"]:
+        return run
+    kept = ("stage", "progress", "eta_seconds", "best_mm", "evaluations")
+    known = {key: data[key] for key in kept if key in data}
+    return cast(a.Run, dict(run) | known | {"generations": data["sequence"]})
+
+
+def _is_final(event: a.Event) -> bool:
+    return event["event"] == "state" and event["data"].get("state") in a.FINAL
+
+
+def _part(identifier: str) -> str:
+    """Quote an id as one segment of a path, whatever characters were typed."""
+    if not identifier:
+        raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
+    return quote(identifier, safe="").replace(".", "%2E")
+
+
+def _run(run_id: str) -> str:
+    return f"/v1/runs/{_part(run_id)}"
+
+
+def _attachment_name(response: httpx.Response, fallback: str) -> str:
+    """File name from Content-Disposition, without any folder that it may name."""
+    disposition = response.headers.get("content-disposition", "")
+    _, found, rest = disposition.partition('filename="')
+    name = Path(rest.partition('"')[0].replace("\\", "/")).name if found else ""
+    return name if name and not name.startswith(".") else fallback

@@ -1,0 +1,1 @@
+"""The commands of ``wingfit``, one module per noun."""

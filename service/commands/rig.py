@@ -1,0 +1,34 @@
+"""``wingfit campaign``: the virtual rig."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from service.client import WingfitError
+from service.commands.output import progress, say
+
+
+def campaign(
+    out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip).")],
+    division: Annotated[str, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = "24",
+    small: Annotated[bool, typer.Option("--small", help="A few recordings instead of the whole campaign.")] = False,
+    seed: Annotated[int, typer.Option(help="Of the true genome, the noise and the gaps.")] = 1,
+) -> None:
+    """Write the thesis's experiment as a dataset, recorded on a simulated rig whose genome is known.
+
+    The true genome lies in a separate file beside the dataset, which a calibration never reads.
+
+    Example: wingfit campaign my-campaign --division 11 --small --seed 7
+    """
+    from sim.rig import write_campaign  # compiled kernels wait until they are needed
+
+    try:
+        with progress("simulating the campaign") as report:
+            write_campaign(out, division=division, small=small, seed=seed, progress=report)
+    except ValueError as error:
+        raise WingfitError("no campaign written", str(error)) from error
+    say(f"campaign written to {out}")
+    say(f"next: wingfit datasets upload {out}")

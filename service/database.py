@@ -1,0 +1,182 @@
+"""The database: one process owns the data folder, one connection does all writing, reads go beside it.
+
+SQLite before 3.51.3 can corrupt a database in WAL mode when two connections write or checkpoint at the same
+time. Therefore readers are opened read-only, and the folder is locked against a second server.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any, ClassVar
+from urllib.parse import quote
+
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import QueuePool, StaticPool
+
+FILE_NAME = "wingfit.sqlite3"
+LOCK_NAME = "wingfit.lock"
+BUSY_TIMEOUT_MS = 10_000
+READERS = 16
+
+
+class DataFolderError(RuntimeError):
+    """The data folder cannot be used; the message says why and what to do."""
+
+
+class DatabaseClosedError(RuntimeError):
+    """The service is stopping; what was not yet stored is computed again after the next start."""
+
+
+class FolderLock:
+    """Holds a data folder for this process.
+
+    A POSIX record lock, because it dies with the process and is not inherited by worker processes; it does
+    not guard against the same process, hence the set.
+    """
+
+    _held: ClassVar[set[Path]] = set()
+
+    def __init__(self, folder: Path) -> None:
+        self.path = (folder / LOCK_NAME).resolve()
+        if self.path in self._held:
+            raise DataFolderError(f"this process already serves the data folder {folder}")
+        self._file: IO[str] = self.path.open("a+", encoding="ascii")
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._file.seek(0)
+            owner = self._file.read().strip() or "unknown"
+            self._file.close()
+            raise DataFolderError(
+                f"another wingfit server (process {owner}) uses the data folder {folder}; stop it, or set "
+                "WINGFIT_DATA to another folder"
+            ) from None
+        self._file.truncate(0)
+        self._file.write(f"{os.getpid()}\n")
+        self._file.flush()
+        self._held.add(self.path)
+
+    def release(self) -> None:
+        """Give the folder free."""
+        self._held.discard(self.path)
+        self._file.close()
+
+
+class Database:
+    """Sessions that read and the one that writes."""
+
+    def __init__(self, folder: Path) -> None:
+        """Lock ``folder`` (created if missing), bring its database to the newest schema and open it."""
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DataFolderError(
+                f"cannot create the data folder {folder}: {error.strerror}; set WINGFIT_DATA"
+            ) from None
+        self._lock = FolderLock(folder)
+        self._guard = threading.Lock()
+        self._closed = False
+        path = (folder / FILE_NAME).resolve()
+        try:
+            self._writer = _writer(path)
+            migrate(self._writer)
+        except Exception as error:
+            self._lock.release()
+            if isinstance(error, DataFolderError):
+                raise
+            raise DataFolderError(f"cannot open the database {path}: {error}") from error
+        self._readers = _readers(path)
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """One transaction, the only one that writes at this time; durable when the block has ended."""
+        with self._guard:
+            if self._closed:
+                raise DatabaseClosedError("the service is stopping")
+            with Session(self._writer, expire_on_commit=False) as session, session.begin():
+                yield session
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """One consistent snapshot."""
+        if self._closed:
+            raise DatabaseClosedError("the service is stopping")
+        with Session(self._readers, expire_on_commit=False) as session:
+            yield session
+
+    def close(self) -> None:
+        """Finish the write under way, refuse further ones, give the folder free."""
+        with self._guard:
+            if self._closed:
+                return
+            self._closed = True
+            self._readers.dispose()
+            self._writer.dispose()
+            self._lock.release()
+
+
+def migrate(engine: Engine) -> None:
+    """Bring the schema to the newest revision."""
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    script = ScriptDirectory.from_config(config)
+    with engine.connect() as connection:
+        config.attributes["connection"] = connection
+        try:
+            command.upgrade(config, "head")
+        except CommandError as error:
+            raise DataFolderError(
+                f"a newer wingfit wrote the database (this one knows schema {script.get_current_head()}): "
+                f"{error}; install the newer wingfit, or set WINGFIT_DATA to another folder"
+            ) from None
+        connection.commit()
+
+
+def _writer(path: Path) -> Engine:
+    engine = create_engine(
+        f"sqlite:///{path}",
+        poolclass=StaticPool,
+        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
+    )
+    event.listen(engine, "connect", _prepare_writer)
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN IMMEDIATE"))
+    return engine
+
+
+def _readers(path: Path) -> Engine:
+    engine = create_engine(
+        f"sqlite:///file:{quote(str(path))}?mode=ro&uri=true",
+        poolclass=QueuePool,
+        pool_size=READERS,
+        max_overflow=READERS,
+        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
+    )
+    event.listen(engine, "connect", _prepare_reader)
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
+    return engine
+
+
+def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:
+    # The driver must not begin transactions by itself: schema changes and reads belong to ours.
+    connection.isolation_level = None
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
+
+
+def _prepare_reader(connection: sqlite3.Connection, _record: Any) -> None:
+    connection.isolation_level = None
+    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
+    connection.execute("PRAGMA query_only=ON")

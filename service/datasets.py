@@ -1,0 +1,50 @@
+"""Parsed datasets, by id: parsing takes longer than most requests may."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+
+from sqlalchemy.orm import Session
+
+from records import Dataset
+from service import store
+from service.database import Database
+from service.engine import Engine
+
+KEPT = 8
+
+
+class Datasets:
+    """The last few datasets used. They never change once uploaded."""
+
+    def __init__(self, database: Database, engine: Engine) -> None:
+        self._database, self._engine = database, engine
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[str, Dataset] = OrderedDict()
+
+    def get(self, dataset_id: str) -> Dataset:
+        """The dataset, or a 404."""
+        with self._database.read() as session:
+            row = store.dataset(session, dataset_id)
+        with self._lock:
+            if dataset_id in self._kept:
+                self._kept.move_to_end(dataset_id)
+                return self._kept[dataset_id]
+        with self._database.read() as session:
+            loaded = self._engine.load(store.archive(session, dataset_id), row.filename)
+        self.keep(dataset_id, loaded)
+        return loaded
+
+    def keep(self, dataset_id: str, loaded: Dataset) -> None:
+        """Remember a dataset that was just parsed."""
+        with self._lock:
+            self._kept[dataset_id] = loaded
+            while len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+
+    def delete(self, session: Session, dataset_id: str) -> None:
+        """Delete a dataset here and there."""
+        store.delete_dataset(session, dataset_id)
+        with self._lock:
+            self._kept.pop(dataset_id, None)

@@ -1,0 +1,119 @@
+"""What stands before every request: who may ask, how much may be sent, which headers go out.
+
+Plain ASGI, because wrapping a stream in a request-response middleware would buffer the event stream.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.problems import ProblemError, response
+
+UPLOAD_PATH = "/v1/datasets"
+UPLOAD_LIMIT = 64 * 2**20
+# Boundaries and headers of the multipart form around a file of the largest size.
+FORM_SLACK = 64 * 2**10
+BODY_LIMIT = 2**20
+CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
+
+SECURITY_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "object-src 'none'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Permissions-Policy": "camera=(), geolocation=(), microphone=()",
+}
+
+
+class Guard:
+    """Checks host, origin and size, and adds the security headers."""
+
+    def __init__(self, app: ASGIApp, allowed_hosts: tuple[str, ...]) -> None:
+        self.app, self.allowed_hosts = app, frozenset(allowed_hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle one connection."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        guarded = _with_headers(send)
+        refusal = self._refusal(scope)
+        if refusal:
+            await response(refusal)(scope, receive, guarded)
+            return
+        await self.app(scope, _limited(receive, _limit(scope)), guarded)
+
+    def _refusal(self, scope: Scope) -> ProblemError | None:
+        headers = Headers(scope=scope)
+        host = headers.get("host", "")
+        if _name(host) not in self.allowed_hosts:
+            return ProblemError(
+                400,
+                "host",
+                f"this server does not answer for the host name {host[:200]!r}; use localhost, or name the "
+                "host in WINGFIT_ALLOWED_HOSTS",
+            )
+        if scope["method"] in CHANGING and _is_foreign(headers, host):
+            return ProblemError(403, "origin", "a page of another origin may not change anything here")
+        length = headers.get("content-length", "0")
+        if length.isdecimal() and int(length) > _limit(scope):
+            return _too_large(_limit(scope))
+        return None
+
+
+def _name(host: str) -> str:
+    try:
+        return (urlsplit(f"//{host}").hostname or "").lower()
+    except ValueError:
+        return ""
+
+
+def _is_foreign(headers: Headers, host: str) -> bool:
+    origin = headers.get("origin")
+    if origin is not None:
+        return urlsplit(origin).netloc.lower() != host.lower() if _name(host) else True
+    return headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
+
+
+def _limit(scope: Scope) -> int:
+    return UPLOAD_LIMIT + FORM_SLACK if scope["path"] == UPLOAD_PATH else BODY_LIMIT
+
+
+def _too_large(limit: int) -> ProblemError:
+    return ProblemError(413, "too-large", f"the request body is larger than {limit / 2**20:.0f} MiB")
+
+
+def _limited(receive: Receive, limit: int) -> Receive:
+    taken = 0
+
+    async def counted() -> Message:
+        nonlocal taken
+        message = await receive()
+        if message["type"] == "http.request":
+            taken += len(message.get("body", b""))
+            if taken > limit:
+                raise HTTPException(413, _too_large(limit).detail)
+        return message
+
+    return counted
+
+
+def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:
+    async def headed(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in SECURITY_HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return headed

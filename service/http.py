@@ -1,0 +1,86 @@
+"""Small pieces that the routes share: documented errors, repeated requests, answers sent once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from http import HTTPStatus
+from typing import Annotated, Any
+
+from fastapi import Header, Query, Request
+from pydantic import BaseModel
+from sqlalchemy.orm import Session
+from starlette.responses import JSONResponse, Response
+
+from service import problems, store
+from service.database import Database
+
+Limit = Annotated[int, Query(ge=1, le=200, description="items on a page")]
+Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the last page")]
+RepeatKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        description="names this request: the same key and body give the same answer again",
+    ),
+]
+IfNoneMatch = Annotated[str | None, Header(alias="If-None-Match", description="the ETag that the caller has")]
+
+Responses = dict[int | str, dict[str, Any]]
+LOCATION = {"Location": {"description": "where it is", "schema": {"type": "string"}}}
+
+
+def errors(*statuses: int) -> Responses:
+    """Documents the problems that a route may answer with; `default` stands for those of every route."""
+    content = {problems.MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    documented: Responses = {
+        status: {"description": HTTPStatus(status).phrase, "content": content} for status in (422, *statuses)
+    }
+    documented["default"] = {
+        "description": "host (400), foreign origin (403), too large (413), internal (500), stopping (503)",
+        "content": content,
+    }
+    return documented
+
+
+def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | None:
+    """What makes a request the same as an earlier one with the same key."""
+    if key is None:
+        return None
+    return store.Repeat(request.url.path, key, hashlib.sha256(json.dumps(parts).encode()).hexdigest())
+
+
+def created(
+    database: Database, again: store.Repeat | None, create: Callable[[Session], store.Answer]
+) -> tuple[store.Answer, bool]:
+    """Create once: the answer, and whether it is new. Creation and answer are one transaction."""
+    with database.write() as session:
+        earlier = store.earlier_answer(session, again)
+        if earlier:
+            return earlier, False
+        answer = create(session)
+        store.keep_answer(session, again, answer)
+    return answer, True
+
+
+def sent(answer: store.Answer) -> Response:
+    """``answer`` on the wire."""
+    return JSONResponse(answer.body, answer.status, {"Location": answer.location})
+
+
+def tagged(model: BaseModel, known: str | None) -> Response:
+    """``model`` with an ETag, or 304 when the caller has it."""
+    body = model.model_dump_json().encode()
+    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    if matches(known, tag):
+        return Response(status_code=304, headers={"ETag": tag})
+    return Response(body, media_type="application/json", headers={"ETag": tag, "Cache-Control": "no-cache"})
+
+
+def matches(known: str | None, tag: str) -> bool:
+    """Whether an ``If-None-Match`` names ``tag``."""
+    given = [part.strip().removeprefix("W/") for part in (known or "").split(",")]
+    return tag in given or "*" in given

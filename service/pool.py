@@ -1,0 +1,80 @@
+"""Starts the evaluator in the background, so that the API answers at once, and keeps trying when it fails."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Literal
+
+from calibration.evaluator import Evaluator
+from service.runner import lower_priority, message
+
+LOG = logging.getLogger("wingfit.evaluator")
+RETRY_SECONDS = (2.0, 5.0, 15.0, 60.0)
+CLOSE_SECONDS = 5.0
+
+
+class Pool:
+    """The evaluator that all runs share. ``error`` says why there is none yet."""
+
+    def __init__(self, make: Callable[[], Evaluator], on_ready: Callable[[Evaluator], None]) -> None:
+        self._make, self._on_ready = make, on_ready
+        self._stop = threading.Event()
+        self._lock = threading.Lock()
+        self._evaluator: Evaluator | None = None
+        self.error: str | None = None
+        self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
+
+    def start(self) -> None:
+        """Begin to start the evaluator."""
+        self._thread.start()
+
+    @property
+    def status(self) -> Literal["starting", "ok", "degraded"]:
+        """Standing of the evaluator, in the words of the health call."""
+        if self._evaluator:
+            return "ok"
+        return "degraded" if self.error else "starting"
+
+    @property
+    def workers(self) -> int | None:
+        """Number of workers, where the evaluator knows it."""
+        count = getattr(self._evaluator, "workers", None)
+        return count if isinstance(count, int) else None
+
+    def close(self) -> bool:
+        """Close the evaluator, or abandon it after a few seconds; whether it closed."""
+        self._stop.set()
+        with self._lock:
+            evaluator, self._evaluator = self._evaluator, None
+        if evaluator is None:
+            return not self._thread.is_alive()
+        closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)
+        closing.start()
+        closing.join(CLOSE_SECONDS)
+        return not closing.is_alive()
+
+    def _start(self) -> None:
+        # Worker processes inherit the priority of the thread that starts them.
+        lower_priority()
+        attempt = 0
+        while not self._stop.is_set():
+            try:
+                self._adopt(self._make())
+                return
+            except Exception as error:
+                self.error = message(error)
+                LOG.exception("cannot start the evaluator")
+            self._stop.wait(RETRY_SECONDS[min(attempt, len(RETRY_SECONDS) - 1)])
+            attempt += 1
+
+    def _adopt(self, evaluator: Evaluator) -> None:
+        with self._lock:
+            if not self._stop.is_set():
+                self._evaluator, self.error = evaluator, None
+        if self._stop.is_set():
+            evaluator.close()
+            return
+        LOG.info("the evaluator is ready")
+        self._on_ready(evaluator)

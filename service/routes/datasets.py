@@ -1,0 +1,136 @@
+"""Upload, list, fetch and delete datasets."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import PurePath
+from typing import Annotated
+
+from fastapi import APIRouter, Form, Request, UploadFile
+from sqlalchemy.orm import Session
+from starlette.responses import Response
+
+from records import Dataset
+from service import http, store, views
+from service.guard import UPLOAD_LIMIT
+from service.problems import ProblemError, error_item, invalid
+from service.schemas import DatasetOut, Page
+from service.state import Service, ServiceDep
+from service.tables import ArchiveRow, DatasetRow
+
+router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
+MEDIA_TYPES = {".zip": "application/zip", ".nc": "application/x-netcdf"}
+
+
+@router.post(
+    "",
+    status_code=201,
+    response_model=DatasetOut,
+    responses={201: {"headers": http.LOCATION}, **http.errors(400, 413)},
+    summary="Upload a dataset",
+)
+def upload(
+    request: Request,
+    service: ServiceDep,
+    file: UploadFile,
+    name: Annotated[str | None, Form(min_length=1, max_length=200, description="instead of the dataset's own")] = None,
+    idempotency_key: http.RepeatKey = None,
+) -> Response:
+    """Upload a zip of a dataset folder, or a NetCDF file; stored byte for byte if it reads without error."""
+    data = file.file.read(UPLOAD_LIMIT + 1)
+    if len(data) > UPLOAD_LIMIT:
+        raise ProblemError(413, "too-large", f"the archive is larger than {UPLOAD_LIMIT // 2**20} MiB")
+    filename = PurePath(file.filename or "dataset.zip").name[:200] or "dataset.zip"
+    digest = hashlib.sha256(data).hexdigest()
+    again = http.repeat(request, idempotency_key, digest, filename, name or "")
+    with service.database.read() as session:
+        earlier = store.earlier_answer(session, again)
+    if earlier:
+        return http.sent(earlier)
+    loaded = _load(service, data, filename)
+
+    def create(session: Session) -> store.Answer:
+        row = _row(loaded, name, filename, digest, len(data))
+        session.add(row)
+        session.flush()
+        session.add(ArchiveRow(dataset_id=row.id, body=data))
+        body = views.dataset(row).model_dump(mode="json")
+        return store.Answer(201, f"/v1/datasets/{row.id}", body)
+
+    answer, new = http.created(service.database, again, create)
+    if new:
+        service.datasets.keep(answer.body["id"], loaded)
+    return http.sent(answer)
+
+
+@router.get("", response_model=Page[DatasetOut], responses=http.errors(), summary="List datasets")
+def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Cursor = None) -> Page[DatasetOut]:
+    """List datasets, newest first."""
+    with service.database.read() as session:
+        rows, following = store.page(session, DatasetRow, limit, cursor)
+    return Page(items=[views.dataset(row) for row in rows], next_cursor=following)
+
+
+@router.get("/{dataset_id}", response_model=DatasetOut, responses=http.errors(404), summary="Fetch a dataset")
+def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Describe one dataset."""
+    with service.database.read() as session:
+        row = store.dataset(session, dataset_id)
+    return http.tagged(views.dataset(row), if_none_match)
+
+
+@router.get(
+    "/{dataset_id}/archive",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
+        **http.errors(404),
+    },
+    summary="Fetch the archive",
+)
+def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return the bytes that were uploaded."""
+    with service.database.read() as session:
+        row = store.dataset(session, dataset_id)
+        tag = f'"{row.sha256}"'
+        if http.matches(if_none_match, tag):
+            return Response(status_code=304, headers={"ETag": tag})
+        body = store.archive(session, dataset_id)
+    suffix = PurePath(row.filename).suffix.lower()
+    known = suffix in MEDIA_TYPES
+    headers = {
+        "ETag": tag,
+        "Content-Disposition": f'attachment; filename="{dataset_id}{suffix if known else ".bin"}"',
+    }
+    return Response(body, media_type=MEDIA_TYPES.get(suffix, "application/octet-stream"), headers=headers)
+
+
+@router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")
+def delete(service: ServiceDep, dataset_id: str) -> None:
+    """Delete a dataset that no run refers to."""
+    with service.database.write() as session:
+        service.datasets.delete(session, dataset_id)
+
+
+def _load(service: Service, data: bytes, filename: str) -> Dataset:
+    try:
+        return service.engine.load(data, filename)
+    except ValueError as error:
+        faults = getattr(error, "errors", None) or []
+        listed = [error_item(fault.where, fault.value, fault.message) for fault in faults]
+        fallback = [error_item(filename, None, str(error))]
+        raise invalid("the dataset cannot be read", listed or fallback) from None
+
+
+def _row(loaded: Dataset, name: str | None, filename: str, digest: str, size: int) -> DatasetRow:
+    return DatasetRow(
+        id=store.new_id("ds"),
+        name=name or loaded.name,
+        description=loaded.description,
+        filename=filename,
+        created_at=store.now(),
+        sha256=digest,
+        size_bytes=size,
+        markers=len(loaded.wing.markers),
+        recordings=views.recordings(loaded),
+    )

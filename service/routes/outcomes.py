@@ -1,0 +1,190 @@
+"""What a run has found: history, genome, result, tracks, events; and simulations of a given genome."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Header, Query
+from starlette.responses import JSONResponse, Response, StreamingResponse
+
+from calibration.search import CalibrationSpec
+from records import Dataset
+from service import http, store, views
+from service.events import stream
+from service.problems import ProblemError, conflict, error_item, invalid
+from service.routes.runs import gene_names, load
+from service.schemas import (
+    ComparisonOut,
+    GenomeOut,
+    HistoryItem,
+    Page,
+    ResultOut,
+    SimulationIn,
+    SimulationOut,
+)
+from service.state import Service, ServiceDep
+from service.tables import RunRow
+from workers.jobs import State
+
+router = APIRouter(prefix="/v1", tags=["outcomes"])
+# A simulation may leave the box of a search; how far is the limit of `bounds_factor` itself.
+WIDEST_BOUNDS = 100.0
+
+_EVENTS = """id: 12
+event: generation
+data: {"sequence": 12, "stage": "structural", "generation": 11, "best_mm": 1.84, "progress": 0.31}
+
+id: 12
+event: state
+data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
+
+"""
+
+
+@router.get(
+    "/runs/{run_id}/history",
+    response_model=Page[HistoryItem],
+    responses=http.errors(404),
+    summary="Fetch the history",
+)
+def history(
+    service: ServiceDep,
+    run_id: str,
+    after: Annotated[int, Query(ge=0, le=2**53 - 1, description="last sequence that the caller has")] = 0,
+    limit: Annotated[int, Query(ge=1, le=10_000)] = 1000,
+) -> Page[HistoryItem]:
+    """Return finished generations, ascending; ``next_cursor`` is the next ``after``."""
+    with service.database.read() as session:
+        store.run(session, run_id)
+        rows = store.history(session, run_id, after, limit + 1)
+    following = str(rows[limit - 1].sequence) if len(rows) > limit else None
+    return Page(items=[views.history_item(row) for row in rows[:limit]], next_cursor=following)
+
+
+@router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
+def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return the best genome so far, beside the nominal one."""
+    row = _row(service, run_id)
+    if row.result is not None:
+        found = GenomeOut(genes=row.result["genes"], final=True)
+    else:
+        dataset = service.datasets.get(row.dataset_id)
+        genes = service.engine.genes(store.spec(row), dataset, _best(row))
+        found = GenomeOut(genes=[views.gene(gene) for gene in genes], final=False)
+    return http.tagged(found, if_none_match)
+
+
+@router.get("/runs/{run_id}/result", response_model=ResultOut, responses=http.errors(404, 409), summary="Result")
+def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return the outcome of a run that has succeeded."""
+    row = _row(service, run_id)
+    if row.result is None:
+        raise conflict(_no_result(row), state=row.state)
+    return http.tagged(ResultOut.model_validate(row.result), if_none_match)
+
+
+@router.get(
+    "/runs/{run_id}/comparison",
+    response_model=ComparisonOut,
+    responses=http.errors(404, 409),
+    summary="Tracks",
+)
+def comparison(
+    service: ServiceDep,
+    run_id: str,
+    recording: Annotated[str | None, Query(max_length=200, description="default: the first of the dataset")] = None,
+    genome: Literal["best", "nominal"] = "best",
+) -> Response:
+    """Return simulated beside recorded markers over one recording."""
+    row = _row(service, run_id)
+    dataset = service.datasets.get(row.dataset_id)
+    wanted = dataset.recordings[0].name if recording is None else recording
+    _check_recording(dataset, wanted, "query.recording")
+    spec = store.spec(row)
+    values = _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    try:
+        tracks = service.engine.compare(spec, dataset, values, wanted)
+    except ValueError as error:
+        raise _failed(error) from None
+    return JSONResponse(views.comparison(tracks))
+
+
+@router.get(
+    "/runs/{run_id}/events",
+    response_class=StreamingResponse,
+    responses={
+        200: {"content": {"text/event-stream": {"schema": {"type": "string"}, "example": _EVENTS}}},
+        **http.errors(404),
+    },
+    summary="Watch a run",
+)
+def events(
+    service: ServiceDep,
+    run_id: str,
+    last_event_id: Annotated[
+        str | None, Header(alias="Last-Event-ID", description="id of the last event that the caller has")
+    ] = None,
+) -> StreamingResponse:
+    """Send generations and states as they happen; ends after the final state."""
+    _row(service, run_id)
+    text = (last_event_id or "0").strip()
+    if not (text.isascii() and text.isdecimal() and len(text) <= 15):
+        item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
+        raise invalid("the Last-Event-ID is not one of this stream", [item])
+    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+    body = stream(service.database, service.changes, run_id, int(text))
+    return StreamingResponse(body, headers=headers, media_type="text/event-stream")
+
+
+@router.post(
+    "/simulations",
+    response_model=SimulationOut,
+    responses=http.errors(409),
+    summary="Simulate one recording's condition",
+)
+def simulate(service: ServiceDep, body: SimulationIn) -> Response:
+    """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
+    dataset = load(service, body.dataset_id)
+    _check_recording(dataset, body.recording, "body.recording")
+    spec = CalibrationSpec(division=body.division, bounds_factor=WIDEST_BOUNDS)
+    known = gene_names(service, spec, dataset)
+    unknown = [name for name in body.genome if name not in known]
+    if unknown:
+        message = f"unknown gene; known are {', '.join(known)}"
+        raise invalid("unknown genes", [error_item("body.genome", name, message) for name in unknown])
+    try:
+        values = service.engine.genome(spec, dataset, body.genome)
+    except ValueError as error:
+        raise invalid("a value is out of bounds", [error_item("body.genome", None, str(error))]) from None
+    try:
+        tracks = service.engine.compare(spec, dataset, values, body.recording)
+    except ValueError as error:
+        raise _failed(error) from None
+    return JSONResponse(views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)})
+
+
+def _row(service: Service, run_id: str) -> RunRow:
+    with service.database.read() as session:
+        return store.run(session, run_id)
+
+
+def _best(row: RunRow) -> dict[str, float]:
+    if row.genome is None:
+        raise conflict("no generation has finished yet", state=row.state)
+    return row.genome
+
+
+def _no_result(row: RunRow) -> str:
+    if row.state in (State.FAILED, State.CANCELLED):
+        return f"run {row.id} is {row.state} and has no result; /v1/runs/{row.id}/genome has its best genome"
+    return f"run {row.id} is {row.state}; it has a result when it has SUCCEEDED"
+
+
+def _check_recording(dataset: Dataset, name: str, where: str) -> None:
+    known = [recording.name for recording in dataset.recordings]
+    if name not in known:
+        raise invalid("unknown recording", [error_item(where, name, f"unknown; known are {', '.join(known)}")])
+
+
+def _failed(error: ValueError) -> ProblemError:
+    return conflict(f"the simulation failed: {error}")

@@ -1,0 +1,145 @@
+"""Submit, list, fetch, control and delete runs."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from sqlalchemy.orm import Session
+from starlette.responses import Response
+
+from calibration.search import CalibrationSpec
+from records import Dataset
+from service import http, store, views
+from service.problems import ProblemError, error_item, invalid
+from service.schemas import Page, RunIn, RunOut
+from service.state import Service, ServiceDep
+from service.tables import RunRow
+from workers import jobs
+
+router = APIRouter(prefix="/v1/runs", tags=["runs"])
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=RunOut,
+    responses={202: {"headers": http.LOCATION}, **http.errors()},
+    summary="Submit a calibration",
+)
+def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: http.RepeatKey = None) -> Response:
+    """Submit a calibration; it is stored when this answers, and computed when its turn comes."""
+    again = http.repeat(request, idempotency_key, body.model_dump_json())
+    with service.database.read() as session:
+        earlier = store.earlier_answer(session, again)
+    if earlier:
+        return http.sent(earlier)
+    dataset = load(service, body.dataset_id)
+    spec = CalibrationSpec(
+        **body.model_dump(exclude={"dataset_id", "name", "recordings", "genes"}),
+        recordings=tuple(body.recordings),
+        genes=tuple(body.genes),
+    )
+    _check(service, spec, dataset)
+    name = body.name or f"{dataset.name}, division {spec.division}"[:200]
+
+    def create(session: Session) -> store.Answer:
+        store.dataset(session, body.dataset_id)
+        row = RunRow(id=store.new_id("run"), name=name, dataset_id=body.dataset_id, spec=store.spec_json(spec))
+        row.created_at, row.evaluations, row.elapsed_seconds = store.now(), 0, 0.0
+        store.put_job(row, jobs.step(None, jobs.Submit())[0])
+        session.add(row)
+        return store.Answer(202, f"/v1/runs/{row.id}", views.run(row).model_dump(mode="json"))
+
+    answer, new = http.created(service.database, again, create)
+    if new:
+        service.runner.enqueue(answer.body["id"])
+    return http.sent(answer)
+
+
+@router.get("", response_model=Page[RunOut], responses=http.errors(), summary="List runs")
+def list_runs(
+    service: ServiceDep,
+    dataset_id: Annotated[str | None, Query(max_length=200)] = None,
+    state: jobs.State | None = None,
+    limit: http.Limit = 50,
+    cursor: http.Cursor = None,
+) -> Page[RunOut]:
+    """List runs, newest first."""
+    with service.database.read() as session:
+        rows, following = store.page(session, RunRow, limit, cursor, dataset_id=dataset_id, state=state)
+    return Page(items=[views.run(row) for row in rows], next_cursor=following)
+
+
+@router.get("/{run_id}", response_model=RunOut, responses=http.errors(404), summary="Fetch a run")
+def fetch(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return one run with its progress."""
+    with service.database.read() as session:
+        row = store.run(session, run_id)
+    return http.tagged(views.run(row), if_none_match)
+
+
+@router.delete("/{run_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a run")
+def delete(service: ServiceDep, run_id: str) -> None:
+    """Delete a run that has ended, with its history."""
+    with service.database.write() as session:
+        store.delete_run(session, run_id)
+    service.changes.publish(run_id)
+
+
+@router.post("/{run_id}/cancel", status_code=202, responses=http.errors(404, 409), summary="Cancel a run")
+def cancel(service: ServiceDep, run_id: str) -> RunOut:
+    """Cancel a run; one under way ends with its present generation."""
+    return views.run(service.runner.control(run_id, jobs.Cancel()))
+
+
+@router.post("/{run_id}/pause", status_code=202, responses=http.errors(404, 409), summary="Pause a run")
+def pause(service: ServiceDep, run_id: str) -> RunOut:
+    """Pause a run; one under way pauses after its present generation."""
+    return views.run(service.runner.control(run_id, jobs.Pause()))
+
+
+@router.post("/{run_id}/resume", status_code=202, responses=http.errors(404, 409), summary="Resume a run")
+def resume(service: ServiceDep, run_id: str) -> RunOut:
+    """Go on after the last finished generation."""
+    return views.run(service.runner.control(run_id, jobs.Resume()))
+
+
+def load(service: Service, dataset_id: str) -> Dataset:
+    """The dataset that a body names, or a 422."""
+    try:
+        return service.datasets.get(dataset_id)
+    except ProblemError as problem:
+        if problem.status != 404:
+            raise
+        message = "there is no such dataset; GET /v1/datasets lists them"
+        raise invalid(problem.detail, [error_item("body.dataset_id", dataset_id, message)]) from None
+
+
+def gene_names(service: Service, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+    """Genes of the model that a body asks for, or a 422."""
+    try:
+        return service.engine.gene_names(spec, dataset)
+    except ValueError as error:
+        item = error_item("body.division", spec.division, str(error))
+        raise invalid("there is no such model of this wing", [item]) from None
+
+
+def _check(service: Service, spec: CalibrationSpec, dataset: Dataset) -> None:
+    known_genes = gene_names(service, spec, dataset)
+    known_recordings = tuple(recording.name for recording in dataset.recordings)
+    faults = _unknown("recordings", spec.recordings, known_recordings) + _unknown("genes", spec.genes, known_genes)
+    if faults:
+        raise invalid("the request names what does not exist", faults)
+    try:
+        service.engine.check(spec, dataset)
+    except ValueError as error:
+        raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
+
+
+def _unknown(key: str, names: tuple[str, ...], known: tuple[str, ...]) -> list[dict[str, object]]:
+    return [
+        error_item(f"body.{key}.{place}", name, f"unknown; known are {', '.join(known)}")
+        for place, name in enumerate(names)
+        if name not in known
+    ]

@@ -1,0 +1,72 @@
+"""Health, the schema of datasets, and a page that shows the API."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+from fastapi import APIRouter, Request
+from starlette.responses import HTMLResponse
+
+from service import http
+from service.schemas import HealthOut
+from service.state import ServiceDep
+
+router = APIRouter(tags=["service"])
+
+
+@router.get("/v1/health", responses=http.errors(), summary="Health")
+def health(service: ServiceDep) -> HealthOut:
+    """Say whether the service is up, and whether it can compute."""
+    return service.health()
+
+
+@router.get("/v1/schemas/dataset", responses=http.errors(), summary="Schema of dataset.yaml")
+def dataset_schema() -> dict[str, Any]:
+    """Return the JSON Schema of ``dataset.yaml``."""
+    from records.schema import dataset_schema as schema
+
+    return schema()
+
+
+@router.get("/docs", include_in_schema=False)
+def docs(request: Request) -> HTMLResponse:
+    """Show the calls of the API. Plain HTML, because the usual viewers load their scripts from elsewhere."""
+    specification: dict[str, Any] = request.app.openapi()
+    sections = [
+        _operation(method, path, operation)
+        for path, methods in specification["paths"].items()
+        for method, operation in methods.items()
+    ]
+    return HTMLResponse(_PAGE.format(version=escape(specification["info"]["version"]), sections="\n".join(sections)))
+
+
+def _operation(method: str, path: str, operation: dict[str, Any]) -> str:
+    parameters = "".join(
+        f"<li><code>{escape(p['name'])}</code> ({escape(p['in'])}) {escape(p.get('description', ''))}</li>"
+        for p in operation.get("parameters", ())
+    )
+    answers = ", ".join(
+        f"{escape(status)} {escape(answer.get('description', ''))}"
+        for status, answer in operation["responses"].items()
+        if status != "default"
+    )
+    return (
+        f"<section><h2><code>{method.upper()} {escape(path)}</code></h2>"
+        f"<p>{escape(operation.get('description', ''))}</p>"
+        f"<ul>{parameters}</ul><p>Answers: {answers}</p></section>"
+    )
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>wingfit API</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }}
+h2 {{ font-size: 1.1rem; margin: 2rem 0 0.3rem }}
+</style></head><body>
+<h1>wingfit API {version}</h1>
+<p>Machine-readable, with all shapes and examples:
+<a href="/openapi.json">openapi.json</a>.</p>
+{sections}
+</body></html>
+"""

@@ -1,0 +1,103 @@
+"""Runs the service: claims the data folder and the port with clear refusals, then hands over to uvicorn."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import socket
+import sys
+from dataclasses import replace
+from types import FrameType
+
+import uvicorn
+from fastapi import FastAPI
+
+from service.app import create_app
+from service.database import Database, DataFolderError
+from service.engine import Engine
+from service.settings import Settings, SettingsError, is_loopback
+from service.state import MakeEvaluator
+
+LOG = logging.getLogger("wingfit")
+GRACE_SECONDS = 2
+
+
+class ServeError(RuntimeError):
+    """The service cannot start; the message says why and what to do."""
+
+
+class _Server(uvicorn.Server):
+    """Tells the service of a signal at once, because open event streams would hold up uvicorn's own stop."""
+
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
+    async def on_tick(self, counter: int) -> bool:
+        """Take the signals back from Ray, whose handler aborts the process three seconds after a SIGTERM."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self.handle_exit)
+        return await super().on_tick(counter)
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002  uvicorn's signature
+        service = getattr(self._app.state, "service", None)
+        if service is not None:
+            service.begin_stop()
+        # Not uvicorn's own, which ends the process by raising the signal again: a clean stop is no death by signal.
+        self.force_exit = self.should_exit and sig == signal.SIGINT
+        self.should_exit = True
+
+
+def serve(settings: Settings, *, engine: Engine | None = None, make_evaluator: MakeEvaluator | None = None) -> None:
+    """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logging.getLogger("alembic").setLevel(logging.WARNING)
+    listening = _listen(settings)
+    try:
+        database = Database(settings.data)
+    except DataFolderError as error:
+        listening.close()
+        raise ServeError(str(error)) from None
+    settings = replace(settings, port=listening.getsockname()[1])
+    if not is_loopback(settings.host):
+        LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
+    app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator)
+    config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE_SECONDS, server_header=False)
+    LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
+    try:
+        _Server(config, app).run(sockets=[listening])
+    finally:
+        database.close()
+    if not getattr(app.state, "stopped", True):
+        # A thread is still computing what will be computed again after the next start; do not wait for it.
+        logging.shutdown()
+        os._exit(0)
+
+
+def main() -> None:
+    """Serve with the settings of the environment."""
+    try:
+        serve(Settings.from_env())
+    except (ServeError, SettingsError) as error:
+        sys.exit(f"wingfit: {error}")
+
+
+def _listen(settings: Settings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    # Naming the protocol lets asyncio switch off Nagle's algorithm, which would delay every answer by 40 ms.
+    listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((settings.host, settings.port))
+        listening.listen(128)
+    except OSError as error:
+        listening.close()
+        raise ServeError(
+            f"cannot listen on {settings.host}, port {settings.port}: {error.strerror}; set WINGFIT_PORT to a free port"
+        ) from None
+    return listening
+
+
+if __name__ == "__main__":
+    main()

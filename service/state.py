@@ -1,0 +1,103 @@
+"""The parts of a running service, put together and taken apart in order."""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated, cast
+
+from fastapi import Depends, Request
+
+from calibration.evaluator import Evaluator
+from service import store
+from service.changes import Changes
+from service.database import Database
+from service.datasets import Datasets
+from service.engine import Engine, WingEngine
+from service.pool import Pool
+from service.runner import Runner
+from service.schemas import HealthOut
+from service.settings import Settings
+
+LOG = logging.getLogger("wingfit")
+STOP_SECONDS = 3.0
+
+MakeEvaluator = Callable[[], Evaluator]
+
+
+class Service:
+    """What request handlers work with."""
+
+    def __init__(
+        self,
+        settings: Settings,
+        database: Database,
+        engine: Engine | None = None,
+        make_evaluator: MakeEvaluator | None = None,
+    ) -> None:
+        self.settings, self.database = settings, database
+        self.engine: Engine = engine or WingEngine()
+        self.changes = Changes()
+        self.datasets = Datasets(database, self.engine)
+        self.runner = Runner(database, self.engine, self.datasets, self.changes, settings.max_runs)
+        self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
+
+    def start(self) -> None:
+        """Take up what was left and start the evaluator."""
+        with self.database.write() as session:
+            store.forget_answers(session)
+        self.runner.recover()
+        self._pool.start()
+
+    def begin_stop(self) -> None:
+        """Let go of whoever watches, start nothing more. Safe in a signal handler."""
+        self.runner.begin_stop()
+        self.changes.close()
+
+    def stop(self) -> bool:
+        """Stop within seconds, leaving runs as stored; whether all threads ended."""
+        self.begin_stop()
+        ended = self.runner.stop(STOP_SECONDS)
+        closed = self._pool.close()
+        self.database.close()
+        return ended and closed
+
+    def health(self) -> HealthOut:
+        """Standing of the service."""
+        with self.database.read() as session:
+            active = store.active_runs(session)
+        return HealthOut(
+            status=self._pool.status,
+            version=wingfit_version(),
+            sqlite_version=sqlite3.sqlite_version,
+            evaluator=self.settings.evaluator,
+            workers=self._pool.workers,
+            runs_active=active,
+            detail=self._pool.error,
+        )
+
+
+def wingfit_version() -> str:
+    """Version of the installed package."""
+    try:
+        return version("wingfit")
+    except PackageNotFoundError:
+        return "0+uninstalled"
+
+
+def _maker(settings: Settings) -> MakeEvaluator:
+    def make() -> Evaluator:
+        from workers import make_evaluator
+
+        return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)
+
+    return make
+
+
+def _service(request: Request) -> Service:
+    return cast(Service, request.app.state.service)
+
+
+ServiceDep = Annotated[Service, Depends(_service)]

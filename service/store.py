@@ -1,0 +1,229 @@
+"""What the database is asked and told. Every function works in a session: callers decide what is atomic."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import secrets
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any, TypeVar
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session
+
+from calibration.search import CalibrationSpec
+from service.problems import conflict, error_item, invalid, not_found
+from service.tables import AnswerRow, ArchiveRow, CheckpointRow, DatasetRow, GenerationRow, RunRow
+from workers.jobs import Job, State, Wish
+
+ANSWERS_KEPT = timedelta(days=7)
+ACTIVE = tuple(state.value for state in State if not state.final)
+
+Row = TypeVar("Row", DatasetRow, RunRow)
+
+
+def now() -> str:
+    """Give the time, RFC 3339 in UTC."""
+    return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
+
+
+def new_id(prefix: str) -> str:
+    """An id that nobody can guess."""
+    return f"{prefix}_{secrets.token_hex(8)}"
+
+
+# -- lists -----------------------------------------------------------------------------------------------
+
+
+def page(
+    session: Session, table: type[Row], limit: int, cursor: str | None, **equal: str | None
+) -> tuple[list[Row], str | None]:
+    """Up to ``limit`` rows, newest first, and the cursor to the next ones."""
+    query = select(table).order_by(table.number.desc()).limit(limit + 1)
+    if cursor is not None:
+        query = query.where(table.number < _number(cursor))
+    for column, value in equal.items():
+        if value is not None:
+            query = query.where(getattr(table, column) == value)
+    rows = list(session.scalars(query))
+    following = _cursor(rows[limit - 1].number) if len(rows) > limit else None
+    return rows[:limit], following
+
+
+def _cursor(number: int) -> str:
+    return base64.urlsafe_b64encode(f"before:{number}".encode()).decode().rstrip("=")
+
+
+def _number(cursor: str) -> int:
+    try:
+        text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
+        if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
+            return int(text[7:])
+    except (binascii.Error, UnicodeError, ValueError):
+        pass
+    raise invalid(
+        "the cursor is not one of this server",
+        [error_item("query.cursor", cursor, "use next_cursor of the last page")],
+    )
+
+
+# -- datasets --------------------------------------------------------------------------------------------
+
+
+def dataset(session: Session, dataset_id: str) -> DatasetRow:
+    """The dataset's row, or a 404."""
+    row = session.scalar(select(DatasetRow).where(DatasetRow.id == dataset_id))
+    if row is None:
+        raise not_found("dataset", dataset_id)
+    return row
+
+
+def archive(session: Session, dataset_id: str) -> bytes:
+    """The dataset's bytes as uploaded, or a 404."""
+    body = session.scalar(select(ArchiveRow.body).where(ArchiveRow.dataset_id == dataset_id))
+    if body is None:
+        raise not_found("dataset", dataset_id)
+    return body
+
+
+def delete_dataset(session: Session, dataset_id: str) -> None:
+    """Delete a dataset that no run refers to."""
+    row = dataset(session, dataset_id)
+    runs = session.scalar(select(func.count()).where(RunRow.dataset_id == dataset_id)) or 0
+    if runs:
+        raise conflict(f"{runs} run(s) refer to dataset {dataset_id}; delete them first")
+    session.delete(row)
+
+
+# -- runs ------------------------------------------------------------------------------------------------
+
+
+def run(session: Session, run_id: str) -> RunRow:
+    """The run's row, or a 404."""
+    row = session.scalar(select(RunRow).where(RunRow.id == run_id))
+    if row is None:
+        raise not_found("run", run_id)
+    return row
+
+
+def delete_run(session: Session, run_id: str) -> None:
+    """Delete a run that has ended, with its history."""
+    row = run(session, run_id)
+    if row.state in ACTIVE:
+        raise conflict(f"run {run_id} is {row.state}; cancel it first", state=row.state)
+    session.delete(row)
+
+
+def active_runs(session: Session) -> int:
+    """Number of runs that have not ended."""
+    return session.scalar(select(func.count()).select_from(RunRow).where(RunRow.state.in_(ACTIVE))) or 0
+
+
+def runs_in(session: Session, *states: State) -> Sequence[RunRow]:
+    """Runs in any of ``states``, oldest first."""
+    wanted = [state.value for state in states]
+    return session.scalars(select(RunRow).where(RunRow.state.in_(wanted)).order_by(RunRow.number)).all()
+
+
+def history(session: Session, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
+    """Generations of a run after sequence ``after``, ascending."""
+    query = select(GenerationRow).where(GenerationRow.run_id == run_id, GenerationRow.sequence > after)
+    return list(session.scalars(query.order_by(GenerationRow.sequence).limit(limit)))
+
+
+def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
+    """Where the run goes on, or None at its start."""
+    return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
+
+
+def job(row: RunRow) -> Job:
+    """The row's job."""
+    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error)
+
+
+def put_job(row: RunRow, after: Job) -> None:
+    """Store a job in its row; the times follow from the states."""
+    row.state, row.wish = after.state.value, after.wish.value
+    row.generations, row.progress, row.error = after.generations, after.progress, after.error
+    if after.state is State.RUNNING and row.started_at is None:
+        row.started_at = now()
+    if after.state.final:
+        row.finished_at = now()
+    if after.state.final or after.state is State.PAUSED:
+        row.eta_seconds = None
+
+
+def spec(row: RunRow) -> CalibrationSpec:
+    """The row's specification."""
+    return spec_from(row.spec)
+
+
+def spec_from(values: dict[str, Any]) -> CalibrationSpec:
+    """A specification from its JSON form."""
+    tuples = {"recordings": tuple(values["recordings"]), "genes": tuple(values["genes"])}
+    return CalibrationSpec(**(values | tuples))
+
+
+def spec_json(given: CalibrationSpec) -> dict[str, Any]:
+    """A specification as JSON."""
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
+    return plain
+
+
+# -- answers to repeated requests ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """The key of a request that may be repeated, and what must be equal for it to be the same request."""
+
+    path: str
+    key: str
+    fingerprint: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer that created something."""
+
+    status: int
+    location: str
+    body: dict[str, Any]
+
+
+def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
+    """What the same request was answered before; a 422 when the key was used for another one."""
+    row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
+    if row is None or repeat is None:
+        return None
+    if row.fingerprint != repeat.fingerprint:
+        raise invalid(
+            "this Idempotency-Key was used for another request",
+            [error_item("header.Idempotency-Key", repeat.key, "use a new key for a new request")],
+        )
+    return Answer(row.status, row.location, row.body)
+
+
+def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
+    """Remember an answer together with what it created."""
+    if repeat:
+        session.add(
+            AnswerRow(
+                path=repeat.path,
+                key=repeat.key,
+                fingerprint=repeat.fingerprint,
+                status=answer.status,
+                location=answer.location,
+                body=answer.body,
+                created_at=now(),
+            )
+        )
+
+
+def forget_answers(session: Session) -> None:
+    """Drop answers that nobody will ask for again."""
+    oldest = (datetime.now(UTC) - ANSWERS_KEPT).isoformat(timespec="microseconds").replace("+00:00", "Z")
+    session.execute(delete(AnswerRow).where(AnswerRow.created_at < oldest))

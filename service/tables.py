@@ -1,0 +1,120 @@
+"""Tables of the database; `service/migrations` creates and changes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import JSON, ForeignKey, LargeBinary, MetaData
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class Table(DeclarativeBase):
+    """Base of all tables. Times are RFC 3339 text in UTC; ``number`` is the order of creation."""
+
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map = {dict[str, Any]: JSON, list[dict[str, Any]]: JSON}  # noqa: RUF012  # read by SQLAlchemy
+
+
+class DatasetRow(Table):
+    """An uploaded dataset: what lists show. Its bytes are in :class:`ArchiveRow`."""
+
+    __tablename__ = "dataset"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    description: Mapped[str]
+    filename: Mapped[str]
+    created_at: Mapped[str]
+    sha256: Mapped[str]
+    size_bytes: Mapped[int]
+    markers: Mapped[int]
+    recordings: Mapped[list[dict[str, Any]]]
+
+
+class ArchiveRow(Table):
+    """The bytes of a dataset as they were uploaded."""
+
+    __tablename__ = "archive"
+
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class RunRow(Table):
+    """A calibration run; state, wish, generations, progress and error are the job of :mod:`workers.jobs`."""
+
+    __tablename__ = "run"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
+    spec: Mapped[dict[str, Any]]
+    state: Mapped[str] = mapped_column(index=True)
+    wish: Mapped[str]
+    stage: Mapped[str | None]
+    progress: Mapped[float] = mapped_column(default=0.0)
+    eta_seconds: Mapped[float | None]
+    created_at: Mapped[str]
+    started_at: Mapped[str | None]
+    finished_at: Mapped[str | None]
+    generations: Mapped[int] = mapped_column(default=0)
+    evaluations: Mapped[int] = mapped_column(default=0)
+    elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
+    best_mm: Mapped[float | None]
+    error: Mapped[str | None]
+    genome: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+
+
+class CheckpointRow(Table):
+    """All that a run needs to go on after its last stored generation."""
+
+    __tablename__ = "checkpoint"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
+class GenerationRow(Table):
+    """One finished generation of a run; ``sequence`` counts from 1 over all stages."""
+
+    __tablename__ = "generation"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
+    sequence: Mapped[int] = mapped_column(primary_key=True)
+    stage: Mapped[str]
+    generation: Mapped[int]
+    best: Mapped[float | None]
+    mean: Mapped[float | None]
+    diversity: Mapped[float | None]
+    best_mm: Mapped[float | None]
+    evaluations: Mapped[int]
+    failed: Mapped[int]
+    elapsed_seconds: Mapped[float]
+    progress: Mapped[float]
+    eta_seconds: Mapped[float | None]
+
+
+class AnswerRow(Table):
+    """The answer to a request that carried an ``Idempotency-Key``, stored with what the request created."""
+
+    __tablename__ = "answer"
+
+    path: Mapped[str] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    fingerprint: Mapped[str]
+    status: Mapped[int]
+    location: Mapped[str]
+    body: Mapped[dict[str, Any]]
+    created_at: Mapped[str]

@@ -1,0 +1,148 @@
+"""From rows and domain objects to the wire: SI to mm, degrees and mbar; numbers that do not exist to null."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.result import Comparison, GeneResult, Result
+from records import Dataset, Recording
+from service import schemas
+from service.tables import DatasetRow, GenerationRow, RunRow
+from workers.jobs import Wish
+
+MM = 1e3
+PASCAL_PER_MBAR = 100.0
+ZERO_CELSIUS = 273.15
+# Digits that a page can show; a track in full precision is three times as long on the wire.
+TRACK_DECIMALS = 6
+
+
+def dataset(row: DatasetRow) -> schemas.DatasetOut:
+    """A dataset as lists show it."""
+    return schemas.DatasetOut.model_validate(_columns(row))
+
+
+def recording(record: Recording, held_out: bool) -> schemas.RecordingOut:
+    """One recording with its condition."""
+    condition = record.condition
+    seen = np.isfinite(record.positions).all(axis=2)
+    return schemas.RecordingOut(
+        name=record.name,
+        rig=record.rig,
+        held_out=held_out,
+        frames=len(record.times),
+        markers=int(seen.any(axis=0).sum()),
+        missing_percent=round(100.0 * (1.0 - float(seen.mean())), 3) if seen.size else 0.0,
+        flap_frequency_hz=condition.flap_frequency,
+        phase_lag_deg=math.degrees(condition.phase_lag),
+        pressure_mbar=condition.pressure / PASCAL_PER_MBAR,
+        temperature_c=condition.temperature - ZERO_CELSIUS,
+        airspeed_m_s=condition.airspeed,
+        angle_of_attack_deg=math.degrees(condition.angle_of_attack),
+    )
+
+
+def recordings(loaded: Dataset) -> list[dict[str, Any]]:
+    """All recordings of a dataset, as its row keeps them."""
+    return [recording(r, r.name in loaded.held_out).model_dump(mode="json") for r in loaded.recordings]
+
+
+def run(row: RunRow) -> schemas.RunOut:
+    """A run."""
+    columns = _columns(row)
+    wish = None if row.wish == Wish.NONE else row.wish
+    return schemas.RunOut.model_validate(columns | {"wish": wish})
+
+
+def history_item(row: GenerationRow) -> schemas.HistoryItem:
+    """A generation of the history."""
+    return schemas.HistoryItem.model_validate(_columns(row))
+
+
+def generation_event(row: GenerationRow) -> schemas.GenerationEvent:
+    """A generation as an event."""
+    return schemas.GenerationEvent.model_validate(_columns(row))
+
+
+def gene(result: GeneResult) -> schemas.GeneOut:
+    """One gene after the calibration."""
+    error = result.standard_error
+    return schemas.GeneOut(
+        name=result.name,
+        unit=result.unit,
+        description=result.description,
+        nominal=result.nominal,
+        best=result.best,
+        lower=result.lower,
+        upper=result.upper,
+        searched=result.searched,
+        standard_error_percent=None if error is None else finite(100.0 * error),
+        identifiable=result.identifiable,
+    )
+
+
+def result(outcome: Result) -> schemas.ResultOut:
+    """The outcome of a calibration."""
+    return schemas.ResultOut(
+        before_mm=mm(outcome.before),
+        after_mm=mm(outcome.after),
+        held_out_before_mm=mm(outcome.held_out_before),
+        held_out_after_mm=mm(outcome.held_out_after),
+        noise_mm=mm(outcome.noise),
+        recordings=[
+            schemas.RecordingResultOut(
+                name=r.name,
+                held_out=r.held_out,
+                stage=r.stage,
+                samples=r.samples,
+                before_mm=mm(r.before),
+                after_mm=mm(r.after),
+            )
+            for r in outcome.recordings
+        ],
+        genes=[gene(g) for g in outcome.genes],
+    )
+
+
+def comparison(tracks: Comparison) -> dict[str, Any]:
+    """Tracks as plain JSON: validating every coordinate would take longer than simulating them."""
+    return {
+        "recording": tracks.recording,
+        "phase": np.round(tracks.phase, 9).tolist(),
+        "markers": list(tracks.markers),
+        "recorded_mm": _track(tracks.recorded),
+        "simulated_mm": _track(tracks.simulated),
+    }
+
+
+def mean_distance_mm(tracks: Comparison) -> float | None:
+    """Mean distance per marker and frame, over what was recorded."""
+    distance = np.linalg.norm(tracks.simulated - tracks.recorded, axis=2)
+    seen = np.isfinite(distance)
+    return mm(float(distance[seen].mean())) if seen.any() else None
+
+
+def mm(value: float | None) -> float | None:
+    """Metres to millimetres."""
+    return None if value is None else finite(value * MM)
+
+
+def finite(value: float) -> float | None:
+    """``value``, or None where JSON has no number for it."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]:
+    rounded = np.round(positions * MM, TRACK_DECIMALS)
+    plain = rounded.astype(object)
+    plain[~np.isfinite(rounded)] = None
+    nested: list[list[list[float | None]]] = plain.tolist()
+    return nested
+
+
+def _columns(row: DatasetRow | RunRow | GenerationRow) -> dict[str, Any]:
+    return {column.key: getattr(row, column.key) for column in row.__table__.columns}

@@ -1,0 +1,80 @@
+// Calls of the REST API. Every failure is an ApiError with the server's own words.
+
+const FINAL = new Set(["SUCCEEDED", "FAILED", "CANCELLED"]);
+
+export class ApiError extends Error {
+  constructor(message, { status = null, errors = [] } = {}) {
+    super(message);
+    this.status = status;
+    this.errors = errors;
+  }
+
+  // The server cannot be reached, as opposed to having refused something.
+  get away() {
+    return this.status === null || this.status === 502 || this.status === 503 || this.status === 504;
+  }
+}
+
+export const isFinal = (run) => FINAL.has(run.state);
+
+export async function call(method, path, { body, headers = {} } = {}) {
+  let response;
+  try {
+    response = await fetch(`v1/${path}`, { method, body, headers });
+  } catch {
+    throw new ApiError("The server does not answer. Start it with 'wingfit serve'.");
+  }
+  if (response.ok) return response.status === 204 ? null : response.json();
+  let problem = {};
+  try {
+    problem = await response.json();
+  } catch { /* not a problem document: the status says enough */ }
+  const message = problem.detail || problem.title || `${response.status} ${response.statusText}`;
+  throw new ApiError(message, { status: response.status, errors: problem.errors || [] });
+}
+
+export const get = (path) => call("GET", path);
+
+export const postJson = (path, value, headers = {}) =>
+  call("POST", path, { body: JSON.stringify(value), headers: { "Content-Type": "application/json", ...headers } });
+
+export const part = encodeURIComponent;
+
+export async function history(id) {
+  const items = [];
+  for (let after = 0; ;) {
+    const page = await get(`runs/${part(id)}/history?limit=1000&after=${after}`);
+    items.push(...page.items);
+    if (!page.items.length || page.next_cursor === null) return items;
+    after = page.items.at(-1).sequence;
+  }
+}
+
+// Follow the events of a run. The browser reconnects by itself and says where it was; where it gives up we start again.
+export function follow(id, { onGeneration, onState, onAway }) {
+  let source = null;
+  let timer = null;
+  let closed = false;
+  const open = () => {
+    source = new EventSource(`v1/runs/${part(id)}/events`);
+    source.addEventListener("generation", (event) => onGeneration(JSON.parse(event.data)));
+    source.addEventListener("state", (event) => {
+      const run = JSON.parse(event.data);
+      if (isFinal(run)) close();
+      onState(run);
+    });
+    source.onopen = () => onAway(false);
+    source.onerror = () => {
+      if (closed) return;
+      onAway(true);
+      if (source.readyState === EventSource.CLOSED) timer = setTimeout(open, 3000);
+    };
+  };
+  const close = () => {
+    closed = true;
+    clearTimeout(timer);
+    source.close();
+  };
+  open();
+  return close;
+}

@@ -1,0 +1,71 @@
+// The lists of runs and datasets at the side.
+
+import { isFinal } from "./api.js";
+import { $, duration, el, mm, plural, size, when } from "./format.js";
+
+const WORDS = {
+  QUEUED: "waiting", RUNNING: "running", PAUSED: "paused", SUCCEEDED: "done", FAILED: "failed", CANCELLED: "cancelled",
+};
+const LOOKS = { RUNNING: "live", SUCCEEDED: "good", FAILED: "bad" };
+const WISHES = { PAUSE: "pausing", CANCEL: "cancelling" };
+
+export const badge = (run) => el("span", { className: `badge ${LOOKS[run.state] ?? ""}` }, WISHES[run.wish] ?? WORDS[run.state]);
+
+export const runName = (run) => run.name || `${run.spec.division} bodies, ${run.spec.mode}`;
+
+export function setBar(bar, run) {
+  const percent = Math.round(100 * run.progress);
+  bar.firstElementChild.style.width = `${percent}%`;
+  bar.setAttribute("aria-valuenow", percent);
+  bar.classList.toggle("ended", isFinal(run) && run.state !== "SUCCEEDED");
+}
+
+export function timeLeft(run) {
+  const left = duration(run.eta_seconds);
+  if (run.state === "RUNNING") return left ? `${left} left` : "";
+  return "";
+}
+
+// Replaced only when something changed, so that a focus or a press in the list survives the polling.
+function replace(list, items) {
+  const fresh = el("ul", {}, ...items);
+  if (list.dataset.shown === fresh.innerHTML) return;
+  list.dataset.shown = fresh.innerHTML;
+  const focused = list.contains(document.activeElement) ? document.activeElement.dataset.key : null;
+  list.replaceChildren(...items);
+  if (focused) list.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+}
+
+const keyed = (node, key) => {
+  node.dataset.key = key;
+  return node;
+};
+
+export function drawRuns(runs, currentId) {
+  const items = runs.map((run) => {
+    const bar = el("div", { className: "bar" }, el("span"));
+    setBar(bar, run);
+    const best = run.best_mm === null ? "" : `${mm(run.best_mm)} mm`;
+    const card = el("a", { className: "card", href: `#run=${encodeURIComponent(run.id)}` },
+      el("span", { className: "line" }, el("strong", {}, runName(run)), badge(run)), bar,
+      el("span", { className: "line" }, el("span", {}, timeLeft(run) || when(run.created_at)), el("span", {}, best)));
+    if (run.id === currentId) card.setAttribute("aria-current", "true");
+    return el("li", { className: run.id === currentId ? "current" : "" }, keyed(card, run.id));
+  });
+  replace($("runs"), items.length ? items : [el("li", { className: "none" }, "No runs yet.")]);
+}
+
+export function drawDatasets(datasets, { onRun, onDelete }) {
+  const items = datasets.map((dataset) => {
+    const held = dataset.recordings.filter((recording) => recording.held_out).length;
+    const about = `${plural(dataset.recordings.length, "recording")}${held ? `, ${held} held out` : ""}`;
+    const button = (text, action, key) => keyed(el("button", { type: "button", onclick: () => action(dataset) }, text), `${key}-${dataset.id}`);
+    return el("li", {}, el("div", { className: "card" },
+      el("strong", { title: dataset.description }, dataset.name),
+      el("span", { className: "line" }, el("span", {}, about), el("span", {}, size(dataset.size_bytes))),
+      el("div", { className: "buttons" }, button("New run", onRun, "run"),
+        keyed(el("a", { className: "link-button", href: `v1/datasets/${encodeURIComponent(dataset.id)}/archive`, download: "" }, "Download"), `get-${dataset.id}`),
+        button("Delete", onDelete, "delete"))));
+  });
+  replace($("datasets"), items.length ? items : [el("li", { className: "none" }, "No datasets yet. Upload a zip of a folder with dataset.yaml.")]);
+}

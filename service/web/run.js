@@ -1,0 +1,167 @@
+// The selected run: progress, figures, tables, actions.
+
+import { call, follow, get, history, isFinal, part } from "./api.js";
+import { $, copy, curl, plural, toast, when } from "./format.js";
+import { drawHistory } from "./history.js";
+import { badge, runName, setBar, timeLeft } from "./lists.js";
+import { remove } from "./submit.js";
+import { drawGenes, drawMisfit, drawNumbers } from "./tables.js";
+import { redrawWing, setUpViewer, showWing } from "./viewer.js";
+
+const ALLOWED = {
+  pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],
+  delete: ["SUCCEEDED", "FAILED", "CANCELLED"],
+};
+const GENES_MS = 3000;
+
+let run = null;
+let dataset = null;
+let result = null;
+let items = new Map();
+let stopFollowing = () => {};
+let drawing = false;
+let genesAt = 0;
+let hooks = {};
+
+export function setUpRun(given) {
+  hooks = given;
+  setUpViewer();
+  $("actions").addEventListener("click", (event) => {
+    const action = event.target.dataset?.action;
+    if (action) act(action);
+  });
+  $("copy-curl").addEventListener("click", () => {
+    const name = run.name ? { name: run.name } : {};
+    copy(curl("runs", { dataset_id: run.dataset_id, ...run.spec, ...name }));
+  });
+}
+
+export async function selectRun(id) {
+  stopFollowing();
+  stopFollowing = () => {};
+  [run, dataset, result, items, genesAt] = [null, null, null, new Map(), 0];
+  drawGenes(null);
+  drawMisfit(null);
+  $("run").hidden = true;
+  $("empty").hidden = Boolean(id);
+  if (!id) return;
+  try {
+    const found = await get(`runs/${part(id)}`);
+    const its = await get(`datasets/${part(found.dataset_id)}`);
+    const past = isFinal(found) ? await history(id) : [];
+    if (hooks.currentId() !== id) return;
+    [run, dataset] = [found, its];
+    past.forEach((item) => items.set(item.sequence, item));
+  } catch (error) {
+    if (hooks.currentId() !== id) return;
+    $("empty").hidden = false;
+    toast(error.message);
+    // The server may be back in a moment; an unknown run stays unknown.
+    if (error.away) setTimeout(() => hooks.currentId() === id && !run && selectRun(id), 3000);
+    return;
+  }
+  $("run").hidden = false;
+  update();
+  if (!isFinal(run)) listen();
+}
+
+export function redraw() {
+  if (!run) return;
+  drawFitness();
+  redrawWing();
+}
+
+function listen() {
+  stopFollowing();
+  const id = run.id;
+  stopFollowing = follow(id, {
+    onGeneration(item) {
+      items.set(item.sequence, item);
+      if (item.sequence > run.generations) {
+        run = {
+          ...run, stage: item.stage, generations: item.sequence, evaluations: item.evaluations,
+          best_mm: item.best_mm, progress: item.progress, eta_seconds: item.eta_seconds,
+        };
+      }
+      schedule();
+    },
+    onState(state) {
+      run = state;
+      hooks.onChange(run);
+      schedule();
+    },
+    onAway: hooks.onAway,
+  });
+}
+
+// Generations may come faster than a screen can show them.
+function schedule() {
+  if (drawing) return;
+  drawing = true;
+  setTimeout(() => {
+    drawing = false;
+    if (run) update();
+  }, 120);
+}
+
+async function update() {
+  drawHead();
+  drawFitness();
+  showWing(run, dataset);
+  const id = run.id;
+  if (run.state === "SUCCEEDED" && !result) {
+    await get(`runs/${part(id)}/result`).then((answer) => {
+      if (run?.id !== id) return;
+      result = answer;
+      drawNumbers(run, result);
+      drawMisfit(result);
+      drawGenes({ genes: result.genes, final: true });
+    }, (error) => toast(error.message));
+  } else if (!result && run.generations > 0 && (isFinal(run) || Date.now() - genesAt > GENES_MS)) {
+    genesAt = Date.now();
+    await get(`runs/${part(id)}/genome`).then((answer) => run?.id === id && !result && drawGenes(answer), () => {});
+  }
+}
+
+function drawHead() {
+  document.title = `${runName(run)} · wingfit`;
+  $("run-name").replaceChildren(runName(run), " ", badge(run));
+  $("run-about").textContent = `${dataset.name} · ${run.spec.division} bodies, ${run.spec.mode} · population ${run.spec.population}, `
+    + `seed ${run.spec.seed} · ${when(run.created_at)}`;
+  $("run-error").hidden = !run.error;
+  $("run-error").textContent = run.error ?? "";
+  setBar($("run-bar"), run);
+  $("run-bar").hidden = run.state === "SUCCEEDED";
+  const percent = `${Math.round(100 * run.progress)} %`;
+  const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && `${run.stage} stage` : null,
+    plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
+  $("run-progress").textContent = parts.filter(Boolean).join(" · ");
+  for (const button of $("actions").querySelectorAll("[data-action]")) {
+    button.hidden = !ALLOWED[button.dataset.action].includes(run.state);
+    button.disabled = Boolean(run.wish);
+  }
+  drawNumbers(run, result);
+}
+
+function drawFitness() {
+  const sorted = [...items.values()].sort((a, b) => a.sequence - b.sequence);
+  $("history").hidden = !sorted.length;
+  $("history-note").hidden = sorted.length > 0;
+  $("history-note").textContent = {
+    QUEUED: "The run waits for its turn.", RUNNING: "The first generation is being computed.",
+  }[run.state] ?? "No generation was finished.";
+  if (sorted.length) drawHistory($("history"), sorted).catch((error) => toast(error.message));
+}
+
+async function act(action) {
+  if (action === "delete") {
+    if (await remove("runs", run.id, runName(run))) hooks.onDeleted();
+    return;
+  }
+  try {
+    // The new state arrives as an event; this answer may be older than an event that overtook it.
+    await call("POST", `runs/${part(run.id)}/${action}`);
+  } catch (error) {
+    toast(error.message);
+  }
+}

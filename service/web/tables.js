@@ -1,0 +1,108 @@
+// Tables of a run: numbers at the top, misfit by recording, genes.
+
+import { $, el, mm, plural, significant } from "./format.js";
+
+export function drawNumbers(run, result) {
+  const cell = (label, value, unit = "", main = false) =>
+    el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
+  const cells = result ? outcome(result, cell) : [
+    cell("best so far, mean distance per marker", mm(run.best_mm), "mm", true),
+    cell("stage", run.stage ?? "–"),
+    cell("generations", String(run.generations)),
+    cell("evaluations", run.evaluations.toLocaleString("en")),
+  ];
+  $("numbers").replaceChildren(...cells);
+}
+
+function outcome(result, cell) {
+  const judged = result.held_out_after_mm ?? result.after_mm;
+  const cells = [
+    cell("before, fitted recordings", mm(result.before_mm), "mm"),
+    cell("after, fitted recordings", mm(result.after_mm), "mm", true),
+  ];
+  if (result.held_out_after_mm !== null) {
+    cells.push(cell("before, held out", mm(result.held_out_before_mm), "mm"));
+    cells.push(cell("after, held out", mm(result.held_out_after_mm), "mm", true));
+  }
+  if (result.noise_mm) {
+    cells.push(cell("floor: tracking noise alone", mm(result.noise_mm), "mm"));
+    cells.push(cell("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
+  }
+  return cells;
+}
+
+export function drawMisfit(result) {
+  $("misfit-section").hidden = !result;
+  if (!result) return;
+  const all = result.recordings.flatMap((r) => [r.before_mm, r.after_mm]).filter((value) => value !== null);
+  const largest = Math.max(...all, result.noise_mm ?? 0) || 1;
+  const share = (value) => `${(100 * (value ?? 0)) / largest}%`;
+  const bars = (before, after) => {
+    const twin = el("div", { className: "twin", ariaHidden: "true" }, el("i"), el("i"));
+    [before, after].forEach((value, i) => { twin.children[i].style.width = share(value); });
+    if (result.noise_mm) {
+      const floor = el("span", { className: "floor" });
+      floor.style.left = share(result.noise_mm);
+      twin.append(floor);
+    }
+    return twin;
+  };
+  const row = (name, badge, before, after, className = "") => el("tr", { className },
+    el("td", {}, name), el("td", {}, badge), el("td", { className: "n" }, mm(before)),
+    el("td", { className: "n" }, mm(after)), el("td", { className: "wide" }, bars(before, after)));
+  const use = (held) => el("span", { className: held ? "badge held" : "badge" }, held ? "held out" : "fitted");
+  const rows = result.recordings.map((r) => row(r.name, use(r.held_out), r.before_mm, r.after_mm));
+  rows.push(row("All fitted", "", result.before_mm, result.after_mm, "total"));
+  if (result.held_out_after_mm !== null) {
+    rows.push(row("All held out", "", result.held_out_before_mm, result.held_out_after_mm, "total"));
+  }
+  $("misfit").tBodies[0].replaceChildren(...rows);
+  $("misfit-note").textContent = "Grey: nominal genome. Coloured: best genome."
+    + (result.noise_mm ? ` Dotted: what tracking noise alone leaves, ${mm(result.noise_mm)} mm.` : "");
+}
+
+export function drawGenes(genome) {
+  $("genes-section").hidden = !genome;
+  if (!genome) return;
+  $("genes").tBodies[0].replaceChildren(...genome.genes.map(geneRow));
+  const searched = genome.genes.filter((gene) => gene.searched);
+  const known = searched.filter((gene) => gene.identifiable);
+  const told = genome.final
+    ? `The data tell ${known.length} of ${plural(searched.length, "searched gene")}; hollow dots are those they cannot tell.`
+    : "Best so far; what the data can tell is judged at the end.";
+  $("genes-note").textContent = `${told} The grey tick is the nominal value.`;
+}
+
+function geneRow(gene) {
+  const vague = gene.searched && gene.identifiable === false;
+  const name = el("abbr", { title: gene.description }, gene.name);
+  return el("tr", { className: gene.searched ? (vague ? "vague" : "") : "off" },
+    el("td", {}, name), el("td", { className: "n" }, significant(gene.nominal)),
+    el("td", { className: "n" }, significant(gene.best)), el("td", {}, gene.unit === "1" ? "" : gene.unit),
+    el("td", { className: "wide" }, boundsBar(gene)), el("td", {}, told(gene)));
+}
+
+function boundsBar(gene) {
+  const bar = el("div", { className: "span", title: `${significant(gene.lower)} to ${significant(gene.upper)} ${gene.unit}` });
+  const place = (tag, value) => {
+    const mark = el(tag);
+    mark.style.left = `${100 * Math.min(1, Math.max(0, position(gene, value)))}%`;
+    bar.append(mark);
+  };
+  place("i", gene.nominal);
+  if (gene.searched) place("b", gene.best);
+  return bar;
+}
+
+// Bounds that span decades are searched, and shown, logarithmically.
+function position({ lower, upper }, value) {
+  const f = lower > 0 && upper / lower > 4 ? Math.log : (x) => x;
+  return (f(value) - f(lower)) / (f(upper) - f(lower));
+}
+
+function told(gene) {
+  if (!gene.searched) return "not searched";
+  if (gene.identifiable === null) return "judged at the end";
+  const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
+  return `${gene.identifiable ? "yes" : "no"}${error && `, ${error.trim()}`}`;
+}

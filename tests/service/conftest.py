@@ -1,0 +1,129 @@
+"""The application behind a real socket, over a database in a temporary folder."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+from service.app import create_app
+from service.settings import Settings
+from tests.service import toy
+
+FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
+
+Json = dict[str, Any]
+
+
+class Gate:
+    """Holds the toy search before each generation until opened."""
+
+    def __init__(self) -> None:
+        self.open = threading.Semaphore(0)
+
+    def __call__(self, done: int) -> None:  # noqa: ARG002
+        assert self.open.acquire(timeout=20)
+
+    def let(self, generations: int) -> None:
+        self.open.release(generations)
+
+
+class Api:
+    """The calls that most tests make."""
+
+    def __init__(self, client: httpx.Client) -> None:
+        self.client = client
+
+    def upload(self, **changes: Any) -> Json:
+        answer = self.client.post("/v1/datasets", files={"file": ("toy.zip", toy.archive(**changes))})
+        assert answer.status_code == 201, answer.text
+        return dict(answer.json())
+
+    def submit(self, dataset_id: str, **body: Any) -> Json:
+        answer = self.client.post("/v1/runs", json={"dataset_id": dataset_id, "max_generations": 5} | body)
+        assert answer.status_code == 202, answer.text
+        return dict(answer.json())
+
+    def get(self, path: str) -> Json:
+        answer = self.client.get(path)
+        assert answer.status_code == 200, answer.text
+        return dict(answer.json())
+
+    def run(self, run_id: str) -> Json:
+        return self.get(f"/v1/runs/{run_id}")
+
+    def control(self, run_id: str, what: str) -> Json:
+        answer = self.client.post(f"/v1/runs/{run_id}/{what}")
+        assert answer.status_code == 202, answer.text
+        return dict(answer.json())
+
+    def until(self, run_id: str, condition: Callable[[Json], bool], seconds: float = 20.0) -> Json:
+        deadline = time.monotonic() + seconds
+        while not condition(run := self.run(run_id)):
+            assert time.monotonic() < deadline, f"the run stays as {run}"
+            time.sleep(0.01)
+        return run
+
+    def finish(self, run_id: str, seconds: float = 20.0) -> Json:
+        return self.until(run_id, lambda run: run["state"] in FINAL, seconds)
+
+    def history(self, run_id: str) -> list[Json]:
+        return list(self.get(f"/v1/runs/{run_id}/history?limit=10000")["items"])
+
+
+@contextmanager
+def serving(app: FastAPI) -> Iterator[httpx.Client]:
+    """Serve ``app`` on a free loopback port from a thread."""
+    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="critical", timeout_graceful_shutdown=2))
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    while not server.started:
+        assert thread.is_alive(), "the application did not start"
+        time.sleep(0.005)
+    port = server.servers[0].sockets[0].getsockname()[1]
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=20.0) as client:
+            yield client
+    finally:
+        service = getattr(app.state, "service", None)
+        if service is not None:
+            service.begin_stop()
+        server.should_exit = True
+        thread.join(15.0)
+        assert not thread.is_alive(), "the server does not stop"
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path / "data")
+
+
+@pytest.fixture
+def gate() -> Gate:
+    """Asked for, it holds every generation of the toy search until the test lets it go."""
+    return Gate()
+
+
+@pytest.fixture
+def engine(request: pytest.FixtureRequest) -> toy.ToyEngine:
+    held = "gate" in request.fixturenames
+    return toy.ToyEngine(gate=request.getfixturevalue("gate")) if held else toy.ToyEngine(seconds=0.01)
+
+
+@pytest.fixture
+def client(settings: Settings, engine: toy.ToyEngine) -> Iterator[httpx.Client]:
+    with serving(create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator)) as client:
+        yield client
+
+
+@pytest.fixture
+def api(client: httpx.Client) -> Api:
+    return Api(client)

@@ -1,0 +1,98 @@
+"""Who may call, and what the browser is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import httpx
+import pytest
+
+from service.settings import Settings, SettingsError
+from tests.service.conftest import Api
+
+
+@pytest.mark.parametrize(("host", "status"), [("localhost", 200), ("LOCALHOST:99", 200), ("[::1]:8321", 200)])
+def test_loopback_names_are_served(client: httpx.Client, host: str, status: int) -> None:
+    assert client.get("/v1/health", headers={"Host": host}).status_code == status
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:8321", "127.0.0.1.evil.example", "[", "192.168.0.1", ""]
+)
+def test_other_names_are_not(client: httpx.Client, host: str) -> None:
+    answer = client.get("/v1/health", headers={"Host": host})
+    assert (answer.status_code, answer.headers["Content-Type"]) == (400, "application/problem+json")
+    assert "WINGFIT_ALLOWED_HOSTS" in answer.json()["detail"]
+
+
+def test_a_page_of_another_site_changes_nothing(api: Api) -> None:
+    own = str(api.client.base_url).rstrip("/")
+    run = {"dataset_id": api.upload()["id"], "max_generations": 1}
+    for headers in (
+        {"Origin": "https://evil.example"},
+        {"Origin": "null"},
+        {"Origin": "http://127.0.0.1:1"},
+        {"Sec-Fetch-Site": "cross-site"},
+    ):
+        assert api.client.post("/v1/runs", json=run, headers=headers).status_code == 403, headers
+    assert api.get("/v1/runs")["items"] == []
+    assert api.client.post("/v1/runs", json=run, headers={"Origin": own}).status_code == 202
+    assert api.client.get("/v1/runs", headers={"Origin": "https://evil.example"}).status_code == 200
+
+
+def test_a_large_body_is_refused_where_no_file_is_expected(client: httpx.Client) -> None:
+    answer = client.post("/v1/runs", content=b" " * (2**20 + 1), headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["type"]) == (413, "urn:wingfit:problem:too-large")
+
+
+@pytest.mark.parametrize("path", ["/v1/health", "/docs", "/v1/nothing", "/assets/plotly.min.js"])
+def test_every_answer_carries_the_security_headers(client: httpx.Client, path: str) -> None:
+    headers = client.get(path).headers
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_unknown_paths_and_methods_are_told_apart(client: httpx.Client) -> None:
+    assert client.get("/v1/nothing").status_code == 404
+    assert client.get("/v1/runs/x/y/z").json()["type"] == "urn:wingfit:problem:not-found"
+    answer = client.put("/v1/runs")
+    assert (answer.status_code, answer.headers["Allow"]) == (405, "GET, POST")
+    assert client.get("/../../etc/passwd").status_code == 404
+    assert client.get("/%2e%2e/app.py").status_code == 404
+
+
+def test_plotly_comes_from_here(client: httpx.Client) -> None:
+    answer = client.get("/assets/plotly.min.js")
+    assert answer.status_code == 200
+    assert answer.headers["Content-Type"].startswith("text/javascript")
+    assert len(answer.content) > 10**6
+
+
+def test_remote_addresses_need_consent() -> None:
+    with pytest.raises(SettingsError, match="WINGFIT_ALLOW_REMOTE=1"):
+        Settings.from_env({"WINGFIT_HOST": "0.0.0.0"})  # noqa: S104
+    allowed = {"WINGFIT_HOST": "0.0.0.0", "WINGFIT_ALLOW_REMOTE": "1", "WINGFIT_ALLOWED_HOSTS": "api, Rig.local"}  # noqa: S104
+    settings = Settings.from_env(allowed)
+    assert settings.allowed_hosts == ("localhost", "127.0.0.1", "::1", "api", "rig.local")
+    assert settings.url == "http://localhost:8321/"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("WINGFIT_PORT", "eighty"),
+        ("WINGFIT_PORT", "65536"),
+        ("WINGFIT_MAX_RUNS", "0"),
+        ("WINGFIT_WORKERS", "0"),
+        ("WINGFIT_EVALUATOR", "dask"),
+    ],
+)
+def test_a_setting_that_cannot_be_names_itself(name: str, value: str) -> None:
+    with pytest.raises(SettingsError, match=name):
+        Settings.from_env({name: value})
+
+
+def test_settings_come_from_the_environment() -> None:
+    read = Settings.from_env({"WINGFIT_DATA": "/d", "WINGFIT_WORKERS": "3", "WINGFIT_RAY_ADDRESS": "h:1"})
+    assert (read.data, read.port, read.workers, read.ray_address, read.evaluator) == (Path("/d"), 8321, 3, "h:1", "ray")

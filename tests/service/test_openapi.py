@@ -1,0 +1,92 @@
+"""The published description: complete, and in step with docs/api.md."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from pydantic import BaseModel
+
+from service import schemas
+
+DOCS = Path(__file__).parents[2] / "docs" / "api.md"
+Specification = dict[str, Any]
+
+
+@pytest.fixture
+def specification(client: httpx.Client) -> Specification:
+    answer = client.get("/openapi.json")
+    assert answer.status_code == 200
+    return dict(answer.json())
+
+
+def operations(specification: Specification) -> list[tuple[str, str, Specification]]:
+    return [
+        (method.upper(), path, operation)
+        for path, methods in specification["paths"].items()
+        for method, operation in methods.items()
+    ]
+
+
+def test_every_operation_is_described(specification: Specification) -> None:
+    assert specification["openapi"].startswith("3.1")
+    for method, path, operation in operations(specification):
+        assert operation["summary"], (method, path)
+        assert operation["description"], (method, path)
+        default = operation["responses"]["default"]["content"]
+        assert list(default) == ["application/problem+json"], (method, path)
+        assert "application/json" not in operation["responses"]["422"]["content"], (method, path)
+        if "{" in path:
+            assert "404" in operation["responses"], (method, path)
+
+
+def test_every_reference_leads_somewhere(specification: Specification) -> None:
+    names = set(re.findall(r"#/components/schemas/([\w-]+)", str(specification)))
+    assert names <= set(specification["components"]["schemas"])
+    assert "Problem" in names
+
+
+def test_every_call_is_in_the_documentation_and_every_documented_one_exists(specification: Specification) -> None:
+    text = DOCS.read_text()
+    documented = {
+        (method, path.split("?")[0].replace("{id}", "{}"))
+        for method, path in re.findall(r"`(GET|POST|DELETE) (/v1/[^`\s]*)", text)
+    }
+    for action in ("pause", "resume"):
+        assert f"(`/{action}`" in text.replace(", `/", "`(`/") or f"/{action}" in text
+        documented.add(("POST", f"/v1/runs/{{}}/{action}"))
+    existing = {
+        (method, re.sub(r"{\w+}", "{}", path))
+        for method, path, _ in operations(specification)
+        if path.startswith("/v1")
+    }
+    assert documented == existing
+
+
+@pytest.mark.parametrize(
+    "model", [schemas.RunIn, schemas.RunOut, schemas.DatasetOut, schemas.SimulationIn, schemas.ProblemOut]
+)
+def test_examples_are_valid(model: type[BaseModel]) -> None:
+    extra = model.model_config["json_schema_extra"]
+    assert isinstance(extra, dict)
+    examples = extra["examples"]
+    assert isinstance(examples, list)
+    for example in examples:
+        model.model_validate(example)
+
+
+def test_the_page_to_read_needs_no_other_origin(client: httpx.Client, specification: Specification) -> None:
+    page = client.get("/docs")
+    assert page.status_code == 200
+    assert not re.findall(r"""(?:src|href)=["'](?:https?:)?//""", page.text)
+    for method, path, _ in operations(specification):
+        assert f"{method} {path}" in page.text
+
+
+def test_the_schema_of_datasets_is_published(client: httpx.Client) -> None:
+    schema = client.get("/v1/schemas/dataset").json()
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    assert schema["properties"]

@@ -1,0 +1,93 @@
+"""Specifications and simulations that cannot be meant are refused with where, value and remedy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.service.conftest import Api
+
+
+@pytest.mark.parametrize(
+    ("body", "where"),
+    [
+        ({"population": 3}, "body.population"),
+        ({"population": 1001}, "body.population"),
+        ({"population": True}, "body.population"),
+        ({"population": "50"}, "body.population"),
+        ({"stall": 0}, "body.stall"),
+        ({"stall": 1001}, "body.stall"),
+        ({"max_generations": 0}, "body.max_generations"),
+        ({"max_generations": 10001}, "body.max_generations"),
+        ({"seed": -1}, "body.seed"),
+        ({"seed": 2**53}, "body.seed"),
+        ({"bounds_factor": 1.0}, "body.bounds_factor"),
+        ({"bounds_factor": 101}, "body.bounds_factor"),
+        ({"tolerance": -0.1}, "body.tolerance"),
+        ({"tolerance": 1.1}, "body.tolerance"),
+        ({"division": "eleven"}, "body.division"),
+        ({"division": "3,,2"}, "body.division"),
+        ({"division": "0,1"}, "body.division"),
+        ({"division": "99"}, "body.division"),
+        ({"mode": "both"}, "body.mode"),
+        ({"name": ""}, "body.name"),
+        ({"dataset_id": "ds_0"}, "body.dataset_id"),
+        ({"generations": 5}, "body.generations"),
+        ({"recordings": ["slow", "nope"]}, "body.recordings.1"),
+        ({"genes": ["nope"]}, "body.genes.0"),
+        ({"recordings": ["unseen"]}, "body"),
+    ],
+)
+def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, Any], where: str) -> None:
+    dataset = api.upload()["id"]
+    answer = api.client.post("/v1/runs", json={"dataset_id": dataset} | body)
+    assert answer.status_code == 422, answer.text
+    assert [error["where"] for error in answer.json()["errors"]] == [where]
+    assert api.get("/v1/runs")["items"] == []
+
+
+def test_an_unknown_name_lists_the_known_ones(api: Api) -> None:
+    body = {"dataset_id": api.upload()["id"], "genes": ["stifness"], "recordings": ["slo"]}
+    errors = api.client.post("/v1/runs", json=body).json()["errors"]
+    assert "stiffness, damping" in errors[1]["message"]
+    assert "slow, fast, unseen" in errors[0]["message"]
+    assert errors[1]["value"] == "stifness"
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"dataset_id": "\\ud800"}', '{"dataset_id": "x", "tolerance": NaN}'])
+def test_a_body_that_is_no_json_object_is_a_problem(api: Api, text: str) -> None:
+    answer = api.client.post("/v1/runs", content=text, headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.headers["Content-Type"]) == (422, "application/problem+json")
+    assert answer.json()["errors"]
+
+
+def test_a_simulation(api: Api) -> None:
+    dataset = api.upload()["id"]
+    body: dict[str, Any] = {"dataset_id": dataset, "recording": "fast", "genome": {"stiffness": 2.0}}
+    answer = api.client.post("/v1/simulations", json=body)
+    assert answer.status_code == 200, answer.text
+    tracks = answer.json()
+    assert tracks["recording"] == "fast"
+    assert tracks["recorded_mm"][1][1] == [None, None, None]
+    # 1e-3 (1^2 + 0.1^2) m along every axis
+    assert tracks["mean_distance_mm"] == pytest.approx(1.01 * 3**0.5)
+    nominal = api.client.post("/v1/simulations", json=body | {"genome": {}}).json()
+    assert nominal["mean_distance_mm"] > tracks["mean_distance_mm"]
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "where"),
+    [
+        ({"genome": {"stiffness": 11.0}}, 422, "body.genome"),
+        ({"genome": {"stifness": 1.0}}, 422, "body.genome"),
+        ({"recording": "nope"}, 422, "body.recording"),
+        ({"division": "99"}, 422, "body.division"),
+        ({"genome": {"stiffness": 9.5}}, 409, None),
+    ],
+)
+def test_a_simulation_that_cannot_be(api: Api, body: dict[str, Any], status: int, where: str | None) -> None:
+    complete = {"dataset_id": api.upload()["id"], "recording": "slow"} | body
+    answer = api.client.post("/v1/simulations", json=complete)
+    assert answer.status_code == status, answer.text
+    assert ([e["where"] for e in answer.json().get("errors", ())] or [None]) == [where]
