@@ -42,7 +42,7 @@ class Outcome:
 def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: str) -> Outcome:
     """Calibrate and judge, with progress on standard error."""
     start, last = time.perf_counter(), None
-    for last in calibrate(spec, dataset, evaluator):  # noqa: B007
+    for last in calibrate(spec, dataset, evaluator):
         note = f"{label}: {last.stage} generation {last.index}, {last.distance * 1e3:.3f} mm"
         print(f"\r{note}, {time.perf_counter() - start:.0f} s   ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
@@ -51,7 +51,9 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
     return Outcome(last, summarise(spec, dataset, evaluator, last.genome), time.perf_counter() - start)
 
 
-def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: dict[str, float]) -> tuple[float, float]:
+def floor(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: dict[str, float]
+) -> tuple[float, float]:
     """Mean distance (m) that the true genome leaves on fitted and on held-out recordings."""
     found = summarise(spec, dataset, evaluator, truth)
     if found.held_out_after is None:

@@ -43,7 +43,8 @@ class Gene:
         """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
         if not (math.isfinite(value) and self.lower <= value <= self.upper):
             raise ValueError(
-                f"gene '{self.name}' is {value:g} {self.unit}; it must lie in [{self.lower:g}, {self.upper:g}] {self.unit}"
+                f"gene '{self.name}' is {value:g} {self.unit}; "
+                f"it must lie in [{self.lower:g}, {self.upper:g}] {self.unit}"
             )
 
     def to_unit(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:

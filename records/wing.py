@@ -22,7 +22,7 @@ class Station:
 class Rod:
     """Carbon rod that slides in a straw glued into the foam, straight from (x_root, y_root) to (x_tip, y_tip), in m.
 
-    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod continues the driving rod of the same name.
+    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod goes on into the driving rod of its name.
     """
 
     name: str

@@ -27,8 +27,7 @@ from service.commands.output import mm, note, number, progress, say, table
 from service.commands.runs import misfits, told
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "robird"
-# At most so many generations a stage as two cores do in four minutes.
-SPEC: dict[str, Any] = {"division": "11", "mode": "staged", "seed": 1, "max_generations": 40, "name": "demo"}
+SPEC: dict[str, Any] = {"division": "11", "mode": "staged", "seed": 1, "name": "demo"}
 SERVER = ["service.server"]
 START_S = 120.0
 STOP_S = 15.0
