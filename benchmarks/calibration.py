@@ -22,6 +22,8 @@ from calibration.problem import Problem, base_genome
 from calibration.result import Result, summarise
 from calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
 from records import Dataset, load_dataset
+from sim.flexible_wing import FlexibleWing
+from sim.rig import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
 from workers import make_evaluator
 from workers.factory import EvaluatorKind
 
@@ -90,6 +92,16 @@ def share_group(name: str) -> str | None:
     return prefix if number.isdigit() else None
 
 
+def thesis_campaign() -> Dataset:
+    """The thesis's search (V-A): one vacuum and one tunnel recording, here of a wing of 24 bodies."""
+    model = FlexibleWing(robird_wing(), "24", numerics=REFERENCE)
+    truth, conditions = true_genome(model, 2), (vacuum(10.0, 0.0524, 3.0), tunnel(0.0524, 3.0, 6.0))
+    recordings = tuple(
+        record(model, truth, condition, Tracking(), np.random.default_rng(k)) for k, condition in enumerate(conditions)
+    )
+    return Dataset("thesis", model.wing, recordings)
+
+
 def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
     """Cut a short calibration in each stage; the rest must come out the same, through JSON."""
     spec = CalibrationSpec(division="11", population=16, max_generations=3, seed=5)
@@ -130,10 +142,7 @@ def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
         floor_fitted, floor_held_out = floor(spec, dataset, evaluator, truth)
         rows = gene_table(outcome.result, truth)
         known = [row for row in rows if row["identifiable"]]
-        thesis = CalibrationSpec(
-            division="24", seed=seed, recordings=("vac-0010mbar-lag3-3.0hz", "wt-06.0ms-lag7-4.0hz")
-        )
-        big = run(thesis, dataset, evaluator, "24 bodies, the thesis's search")
+        big = run(CalibrationSpec(division="24", seed=seed), thesis_campaign(), evaluator, "24 bodies, two recordings")
         figures: dict[str, Any] = {
             "mm_before": outcome.result.before * 1e3,
             "mm_after": outcome.result.after * 1e3,

@@ -73,7 +73,7 @@ class Run(TypedDict):
 class HistoryItem(TypedDict):
     """One generation; ``best`` and ``mean`` are Eq. 14 in m^2, ``best_mm`` the mean distance per marker.
 
-    ``evaluations`` counts since the run began, ``failed`` in this generation.
+    ``evaluations`` counts since the run began, ``failed`` in this generation, with up to ten of their ``reasons``.
     """
 
     sequence: int
@@ -85,6 +85,7 @@ class HistoryItem(TypedDict):
     best_mm: float | None
     evaluations: int
     failed: int
+    reasons: list[str]
     elapsed_seconds: float
 
 

@@ -220,6 +220,7 @@ def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> G
         best_mm=views.mm(generation.distance),
         evaluations=generation.evaluations,
         failed=generation.failed,
+        reasons=list(generation.reasons),
         elapsed_seconds=row.elapsed_seconds,
         progress=row.progress,
         eta_seconds=eta,

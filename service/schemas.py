@@ -226,6 +226,7 @@ class HistoryItem(BaseModel):
     best_mm: float | None
     evaluations: int
     failed: int
+    reasons: list[str]
     elapsed_seconds: float
 
 

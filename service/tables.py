@@ -101,6 +101,7 @@ class GenerationRow(Table):
     best_mm: Mapped[float | None]
     evaluations: Mapped[int]
     failed: Mapped[int]
+    reasons: Mapped[list[str]] = mapped_column(JSON)
     elapsed_seconds: Mapped[float]
     progress: Mapped[float]
     eta_seconds: Mapped[float | None]

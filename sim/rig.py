@@ -36,6 +36,8 @@ from sim.simulate import Numerics
 
 Array = npt.NDArray[np.float64]
 
+# How the true wing is simulated: three times the steps of a calibration, periodic to 2 micrometres.
+REFERENCE = Numerics(steps=720, max_beats=60, periodic=2e-6)
 FRAMES_PER_BEAT = 30
 LOST_MARKERS = 9
 _MBAR, _ZERO_C = 100.0, 273.15
@@ -235,8 +237,7 @@ def campaign(
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Dataset, Genome]:
     """Record a campaign; the true genome comes beside it. ``small`` is ten recordings, else all 72 of the thesis."""
-    fine = Numerics(steps=720, max_beats=60, periodic=2e-6)
-    model = FlexibleWing(robird_wing(), division, numerics=fine)
+    model = FlexibleWing(robird_wing(), division, numerics=REFERENCE)
     truth = true_genome(model, seed)
     plan, recordings, held_out = list(_plan(small)), [], []
     for k, (condition, hidden) in enumerate(plan):

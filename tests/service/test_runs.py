@@ -44,6 +44,7 @@ def test_history_comes_in_pages(api: Api) -> None:
     rest = api.get(f"/v1/runs/{run['id']}/history?limit=6&after={first['next_cursor']}")
     assert [item["sequence"] for item in first["items"] + rest["items"]] == list(range(1, 11))
     assert rest["next_cursor"] is None
+    assert {(item["failed"], *item["reasons"]) for item in first["items"]} == {(1, "diverged at 0.1 s")}
 
 
 def test_same_seed_same_history_and_another_seed_another(api: Api) -> None:
@@ -157,6 +158,7 @@ def test_runs_are_listed_newest_first_by_dataset_and_state(api: Api, gate: Gate)
     rest = api.get(f"/v1/runs?dataset_id={one}&limit=2&cursor={first['next_cursor']}")
     assert [r["id"] for r in first["items"] + rest["items"]] == runs[2::-1]
     assert rest["next_cursor"] is None
+    assert {(item["failed"], *item["reasons"]) for item in first["items"]} == {(1, "diverged at 0.1 s")}
     assert api.get("/v1/runs?state=FAILED")["items"] == []
     assert len(api.get("/v1/runs?state=SUCCEEDED")["items"]) == 4
 

@@ -101,6 +101,7 @@ def _runs() -> None:
         sa.Column("best_mm", sa.Double),
         sa.Column("evaluations", sa.Integer, nullable=False),
         sa.Column("failed", sa.Integer, nullable=False),
+        sa.Column("reasons", sa.JSON, nullable=False),
         sa.Column("elapsed_seconds", sa.Double, nullable=False),
         sa.Column("progress", sa.Double, nullable=False),
         sa.Column("eta_seconds", sa.Double),
