@@ -158,7 +158,6 @@ def test_runs_are_listed_newest_first_by_dataset_and_state(api: Api, gate: Gate)
     rest = api.get(f"/v1/runs?dataset_id={one}&limit=2&cursor={first['next_cursor']}")
     assert [r["id"] for r in first["items"] + rest["items"]] == runs[2::-1]
     assert rest["next_cursor"] is None
-    assert {(item["failed"], *item["reasons"]) for item in first["items"]} == {(1, "diverged at 0.1 s")}
     assert api.get("/v1/runs?state=FAILED")["items"] == []
     assert len(api.get("/v1/runs?state=SUCCEEDED")["items"]) == 4
 
