@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.problem import Evaluation, Misfit, Problem, concatenate, misfit
-
-LANES = 8
+from sim.kernels import LANES
 
 
 class Evaluator(Protocol):

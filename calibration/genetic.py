@@ -108,7 +108,7 @@ def _child(parents: list[_Individual], key: str) -> list[float]:
     draw = random.random()  # noqa: S311
     if draw < DIFFERENTIAL:
         (origin,) = tools.selTournament(parents, 1, TOURNAMENT)
-        ahead, behind = tools.selRandom(parents, 2)
+        ahead, behind = random.sample(parents, 2)
         scale = random.uniform(*DIFFERENCE_SCALE)  # noqa: S311
         child = [u + scale * (v - w) for u, v, w in zip(origin, ahead, behind, strict=True)]
     elif draw < DIFFERENTIAL + BLEND:
@@ -116,7 +116,9 @@ def _child(parents: list[_Individual], key: str) -> list[float]:
         tools.cxBlend(child, other, BLEND_ALPHA)
     else:
         child = _Individual(tools.selTournament(parents, 1, TOURNAMENT)[0])
-        tools.mutPolynomialBounded(child, MUTATION_ETA, 0.0, 1.0, 1.0 / len(child))
+        before = list(child)
+        while list(child) == before:  # a child equal to its parent would be simulated for nothing
+            tools.mutPolynomialBounded(child, MUTATION_ETA, 0.0, 1.0, 1.0 / len(child))
     return [_reflected(u) for u in child]
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
+from scipy.signal import lfilter
 
 from records import Recording
 
 Array = npt.NDArray[np.float64]
 
 HARMONICS = 8  # of the mean beat
+LONGEST_MEMORY = 0.97
 
 
 def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
@@ -59,23 +61,40 @@ def _memory(basis: Array, residuals: list[Array]) -> float:
     The fit removes slow waves, so residuals are less alike than the noise; the memory is that whose residuals, after
     the same fit, would be as alike as these, pooled over all markers and axes.
     """
-    lagged = [np.nanmean(np.concatenate([(x[k:] * x[: len(x) - k]).ravel() for x in residuals])) for k in (0, 1)]
-    observed = lagged[1] / lagged[0]
-    apart = np.abs(np.subtract.outer(np.arange(len(basis)), np.arange(len(basis))))
+    products = [np.concatenate([(x[k:] * x[: len(x) - k]).ravel() for x in residuals]) for k in (0, 1)]
+    own, next_ = (float(p[np.isfinite(p)].mean()) if np.isfinite(p).any() else 0.0 for p in products)
+    if own <= 0:
+        return 0.0
     q, _ = np.linalg.qr(basis)
-    keep = np.eye(len(basis)) - q @ q.T
 
     def excess(memory: float) -> float:
-        left = keep @ memory**apart @ keep
-        return float(np.diag(left, 1).mean() / np.diag(left).mean() - observed)
+        kept, alike = _after_fit(q, memory)
+        return alike / kept - next_ / own
 
     if excess(0.0) > 0:
         return 0.0
-    return 0.97 if excess(0.97) < 0 else float(brentq(excess, 0.0, 0.97, xtol=1e-3))
+    return LONGEST_MEMORY if excess(LONGEST_MEMORY) < 0 else float(brentq(excess, 0.0, LONGEST_MEMORY, xtol=1e-3))
+
+
+def _after_fit(q: Array, memory: float) -> tuple[float, float]:
+    """Mean variance, and mean product of neighbours, of unit noise of that memory after a fit of ``q`` [T, P]."""
+    covered = _covariance_times(q, memory)
+    inner = q.T @ covered
+    kept = 1.0 - np.trace(inner) / len(q)
+    alike = memory - (q[:-1] * covered[1:] + covered[:-1] * q[1:] - (q[:-1] @ inner) * q[1:]).sum() / (len(q) - 1)
+    return float(kept), float(alike)
 
 
 def _swallowed(basis: Array, frames: npt.NDArray[np.int64], memory: float) -> float:
-    """Fraction of the variance of first-order autoregressive noise that a fit of ``basis`` removes."""
+    """Fraction of the variance of first-order autoregressive noise that a fit of ``basis`` at ``frames`` removes."""
     q, _ = np.linalg.qr(basis)
-    covariance = memory ** np.abs(frames[:, None] - frames[None, :])
-    return float(np.einsum("tk,ts,sk->", q, covariance, q) / len(frames))
+    whole = np.zeros((int(frames[-1]) + 1, q.shape[1]))
+    whole[frames] = q
+    return float((whole * _covariance_times(whole, memory)).sum() / len(frames))
+
+
+def _covariance_times(q: Array, memory: float) -> Array:
+    """The matrix memory^|t - s| times ``q`` [T, P], by a filter forwards and one backwards."""
+    forward = lfilter([1.0], [1.0, -memory], q, axis=0)
+    backward = lfilter([1.0], [1.0, -memory], q[::-1], axis=0)[::-1]
+    return np.asarray(forward + backward - q)

@@ -72,11 +72,15 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
     square = difference.reshape(len(difference), -1, 3) ** 2
     distance2 = square.sum(axis=2)
     seen = np.isfinite(record.positions).all(axis=2).ravel()
-    failed = np.array([reason is not None for reason in observed.reasons])
     kept = distance2[:, seen]
+    reasons = tuple(
+        reason or (None if finite else "the simulated tracks are not finite")
+        for reason, finite in zip(observed.reasons, np.isfinite(kept).all(axis=1), strict=True)
+    )
+    failed = np.array([reason is not None for reason in reasons])
     squares = np.where(failed, np.inf, kept.sum(axis=1))
     mean = np.where(failed, np.inf, np.sqrt(kept).mean(axis=1))
-    return Misfit(squares, mean, int(seen.sum()), observed.reasons, difference if residuals else None)
+    return Misfit(squares, mean, int(seen.sum()), reasons, difference if residuals else None)
 
 
 @dataclass(frozen=True)

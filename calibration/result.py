@@ -20,7 +20,7 @@ from sim.flexible_wing import FlexibleWing
 
 @dataclass(frozen=True)
 class GeneResult:
-    """One gene after the calibration. Shares are normalised to sum to one.
+    """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
 
     ``standard_error`` is relative to the value, from the misfit's curvature and the residual scatter; ``identifiable``
     says whether the data can tell the gene; None where the gene was not searched.
@@ -139,8 +139,8 @@ def _genes(
             gene.description,
             before[gene.name],
             after[gene.name],
-            gene.lower,
-            gene.upper,
+            gene.lower if gene.share_of is None else 0.0,
+            gene.upper if gene.share_of is None else 1.0,
             gene.name in known,
             known[gene.name].standard_error if gene.name in known else None,
             known[gene.name].identifiable if gene.name in known else None,

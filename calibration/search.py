@@ -11,14 +11,14 @@ import numpy as np
 from calibration.evaluator import Evaluator
 from calibration.genetic import FAILED, Population, first_generation, offspring, survive
 from calibration.problem import Problem, base_genome
-from records import Dataset, Gene, Recording
+from records import Dataset, Gene, Recording, Wing
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.wing_genes import FACTOR, group
 
 Mode = Literal["staged", "joint"]
 
-VACUUM_LIMIT = 10_000.0  # Pa: still air at most this dense counts as vacuum in a staged calibration
+VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
 EXPECTED_GENERATIONS = 45
 
 
@@ -37,6 +37,7 @@ class CalibrationSpec:
         bounds_factor: the box is [estimate / factor, estimate * factor].
         recordings: names to fit; empty means all that are not held out.
         genes: names to search; empty means all.
+        fixed: values of genes that keep them instead of their estimates.
     """
 
     division: str = "11"
@@ -102,7 +103,9 @@ def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
     for recording in recordings:
         if recording.name in dataset.held_out:
             raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
-        recorded_crossing(dataset.wing, recording)
+    _refuse_repeated("recording", spec.recordings)
+    for recording in dataset.recordings:  # all of them are judged in the end
+        _refuse_unusable(dataset.wing, recording)
     free = [name for name in known if (not spec.genes or name in spec.genes) and name not in spec.fixed]
     stages = _joint(free, recordings) if spec.mode == "joint" else _staged(free, recordings)
     if not stages:
@@ -124,7 +127,7 @@ def _staged(free: list[str], recordings: tuple[Recording, ...]) -> tuple[Stage, 
         lacking, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
         raise ValueError(
             f"a staged calibration fits the {which} genes on recordings in {lacking}, and there is none "
-            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or fix those genes"
+            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or name other genes"
         )
     stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
     return tuple(stage for stage in stages if stage.free)
@@ -134,6 +137,21 @@ def _refuse_unknown(what: str, names: Iterable[str], known: list[str]) -> None:
     for name in names:
         if name not in known:
             raise ValueError(f"unknown {what} {name!r}; there are {', '.join(known)}")
+
+
+def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{what} {name!r} is named {names.count(name)} times; name it once")
+
+
+def _refuse_unusable(wing: Wing, recording: Recording) -> None:
+    if not np.isfinite(recording.positions).all(axis=2).any():
+        raise ValueError(
+            f"recording {recording.name!r} has no marker with all of x, y and z in any frame; "
+            "there is nothing to compare: leave the recording out of the dataset"
+        )
+    recorded_crossing(wing, recording)
 
 
 def calibrate(

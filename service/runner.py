@@ -20,7 +20,7 @@ from service.changes import Changes
 from service.database import Database, DatabaseClosedError
 from service.datasets import Datasets
 from service.engine import Engine
-from service.problems import ProblemError, conflict
+from service.problems import conflict
 from service.tables import CheckpointRow, GenerationRow, RunRow
 from workers import jobs
 from workers.jobs import Instruction
@@ -184,8 +184,9 @@ class Runner:
         LOG.error("run %s failed", run_id, exc_info=error)
         try:
             self._advance(run_id, jobs.Fail(message(error)))
-        except (DatabaseClosedError, jobs.IllegalTransition, ProblemError) as late:
-            LOG.info("run %s: failure not stored (%s)", run_id, late)
+        except Exception as late:
+            # A full disk, say: the run stays as stored and goes on at the next start of the service.
+            LOG.error("run %s: failure not stored (%s)", run_id, late)
 
 
 def message(error: Exception) -> str:

@@ -20,21 +20,23 @@ Array = npt.NDArray[np.float64]
 
 # Scales that make rotations (rad) and rates comparable with displacements (m): a chord, and the beat's angular rate.
 _LENGTH = 0.1
+LONGEST = 10.0  # admits modes that keep up to about 0.9 of their amplitude over a beat
 
 
 def extrapolate(states: Sequence[State], lanes: npt.ArrayLike, angular_rate: float, into: State) -> None:
     """Replace the lanes of ``into`` by the extrapolated state; ``states`` are those after successive beats.
 
-    At least three states are needed; all lanes are treated on their own. A lane whose extrapolation moves the wing
-    further than the beats themselves have (no useful linear map yet) is left alone.
+    At least three states are needed; all lanes are treated on their own. A lane whose extrapolation would move the wing
+    LONGEST times as far as the first of the beats did has no useful linear map yet, and is left alone.
     """
     for lane in np.flatnonzero(np.asarray(lanes)):
         x = np.stack([_coordinates(s, into, int(lane), angular_rate) for s in states])
         change = np.diff(x, axis=0)
-        base, steps = change[-1], np.diff(change, axis=0)
-        c, *_ = np.linalg.lstsq(steps.T, -base, rcond=1e-10)
-        correction = np.diff(x, axis=0)[1:].T @ c
-        if not np.all(np.isfinite(correction)) or np.linalg.norm(correction) > 3 * np.linalg.norm(change[0]):
+        if not np.all(np.isfinite(change)):
+            continue
+        c, *_ = np.linalg.lstsq(np.diff(change, axis=0).T, -change[-1], rcond=1e-10)
+        correction = change[1:].T @ c
+        if np.linalg.norm(correction) > LONGEST * np.linalg.norm(change[0]):
             continue
         _apply(correction, into, int(lane), angular_rate)
 

@@ -15,6 +15,7 @@ from sim.sections import round_area
 Array = npt.NDArray[np.float64]
 
 _CELLS = 24  # quadrature cells along each side of a panel: mass and inertia to about 1e-4
+_ROD_CELLS = 2000
 
 
 @dataclass(frozen=True)
@@ -25,11 +26,6 @@ class Panel:
     y1: float
     s0: float
     s1: float
-
-    def holds(self, wing: Planform, x: float, y: float, last: bool) -> bool:
-        """Whether the point lies on the panel, edges going to the outer and rear neighbour unless it is ``last``."""
-        s = wing.fraction(x, y)
-        return self.y0 <= y < self.y1 and (self.s0 <= s < self.s1 or (last and s >= self.s1))
 
 
 @dataclass(frozen=True)
@@ -97,12 +93,18 @@ def rod_at(rod: Rod, y: float) -> float | None:
 
 def carrier(planform: Planform, panels: list[Panel], x: float, y: float) -> int:
     """Number of the panel under a point; the nearest one for a point beyond the edges."""
-    y_in = min(max(y, panels[0].y0), math.nextafter(panels[-1].y1, 0))
-    last = [p for p in panels if p.y0 <= y_in < p.y1][-1]
-    for number, panel in enumerate(panels):
-        if panel.holds(planform, x, y_in, panel is last):
-            return number
-    raise AssertionError("panels cover the planform")  # pragma: no cover
+    return int(carriers(planform, panels, np.array([x]), np.array([y]))[0])
+
+
+def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> npt.NDArray[np.int64]:
+    """Numbers of the panels under many points; edges belong to the outer and rear neighbour."""
+    edges = np.unique([panel.y0 for panel in panels])
+    strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(edges) - 1)
+    first = np.searchsorted([panel.y0 for panel in panels], edges)
+    count = np.diff(np.append(first, len(panels)))
+    fraction = np.clip((x - planform.leading_edge(y)) / planform.chord(y), 0.0, 1.0)
+    along = np.minimum((fraction * count[strip]).astype(np.int64), count[strip] - 1)
+    return np.asarray(first[strip] + along, np.int64)
 
 
 def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
@@ -110,12 +112,11 @@ def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
     lumps: list[list[tuple[float, Array]]] = [[] for _ in panels]
     for rod in planform.wing.rods:
         linear = rod.density * round_area(rod.diameter) + rod.glue_linear_density
-        cells = 40 * len(panels)
         length = math.hypot(rod.x_tip - rod.x_root, rod.y_tip - rod.y_root)
-        for k in range(cells):
-            t = (k + 0.5) / cells
-            x, y = rod.x_root + t * (rod.x_tip - rod.x_root), rod.y_root + t * (rod.y_tip - rod.y_root)
-            lumps[carrier(planform, panels, x, y)].append((linear * length / cells, np.array([x, y, 0.0])))
+        t = (np.arange(_ROD_CELLS) + 0.5) / _ROD_CELLS
+        x, y = rod.x_root + t * (rod.x_tip - rod.x_root), rod.y_root + t * (rod.y_tip - rod.y_root)
+        for number, *place in zip(carriers(planform, panels, x, y), x, y, strict=True):
+            lumps[number].append((linear * length / _ROD_CELLS, np.array([*place, 0.0])))
     for marker in planform.wing.markers:
         number = carrier(planform, panels, marker.position[0], marker.position[1])
         lumps[number].append((marker.mass, np.array(marker.position)))
@@ -141,11 +142,15 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
     inertia = np.eye(3) * (masses @ (r**2).sum(axis=1)) - (r * masses[:, None]).T @ r
     # thickness: foam through it, skin half on each face
     through = float((foam * h**2 / 12 + skin * h**2 / 4).sum())
-    inertia += np.diag([through, through, 0.0])
+    # extent of the cells themselves in the plane
+    deep, wide = np.repeat(chord, _CELLS) * (panel.s1 - panel.s0) / _CELLS, (panel.y1 - panel.y0) / _CELLS
+    along_x, along_y = float((foam + skin) @ deep**2) / 12, float((foam + skin).sum()) * wide**2 / 12
+    inertia += np.diag([through + along_y, through + along_x, along_x + along_y])
     area = float(cell.sum())
     return Body(total, centre, inertia, area, cell @ points / area)
 
 
 def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> npt.NDArray[np.int64]:
     """Which body carries each marker."""
-    return np.array([carrier(planform, panels, m.position[0], m.position[1]) for m in markers], np.int64)
+    places = np.array([marker.position for marker in markers])
+    return carriers(planform, panels, places[:, 0], places[:, 1])

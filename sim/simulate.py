@@ -40,6 +40,12 @@ class Numerics:
     periodic: float = 5e-5
     window: int = 4
 
+    def __post_init__(self) -> None:
+        if self.steps < 8 or self.ramp_beats < 1 or self.max_beats <= self.ramp_beats:
+            raise ValueError(
+                f"{self} is not usable: at least 8 steps a beat, at least one beat of ramp and more beats than that"
+            )
+
 
 @dataclass(frozen=True)
 class Beat:
@@ -160,7 +166,7 @@ def _run_group(
         if beat >= numerics.ramp_beats - 1 and numerics.window:
             history.append(State(*(array.copy() for array in state)))
         if len(history) > numerics.window:
-            extrapolate(history, ~done, 2 * np.pi * condition.flap_frequency, state)
+            extrapolate(history, ~done & alive, 2 * np.pi * condition.flap_frequency, state)
             history, before = [], np.full_like(before, np.inf)
     reasons = tuple(
         _reason(bool(alive[k]), bool(done[k]), int(beats[k]), float(change[k]), numerics) for k in range(count)

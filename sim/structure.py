@@ -106,7 +106,7 @@ def _along_span(planform: Planform, division: Division, parts: list[Body]) -> li
                 rod = np.zeros(6)
                 for r in planform.wing.rods:
                     x = rod_at(r, y)
-                    if x is not None and s0 <= planform.fraction(x, y) < s1:
+                    if x is not None and s0 <= min(planform.fraction(x, y), 1 - 1e-9) < s1:
                         rod = rod + _rod_rigidities(r.diameter) / length
                 point = np.array([planform.x(0.5 * (s0 + s1), y), y, 0.0])
                 found.append(Connector(first, second, point, foam, rod, SPANWISE_MODULUS))

@@ -3,7 +3,8 @@
 A strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
 shared among them. Beyond what is printed: alpha lies in [-pi/2, pi/2], drag grows with |alpha| (as printed it would
 push the wing at negative angles), and in reversed flow the lift keeps the sign of the normal flow; the change of sign
-is smoothed over ``REVERSAL`` (about 3 degrees around 90) so that the force has no jump.
+is smoothed within 5 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law itself is
+good to about 15 degrees and is used as printed beyond.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ import numpy.typing as npt
 
 from sim.kernels import LANES
 from sim.kernels.jit import kernel
-from sim.kernels.vector import Vector, load, load0, load1, magnitude, root, store, store0, store1
+from sim.kernels.vector import Vector, greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-REVERSAL = 0.05
+REVERSAL = math.sin(math.radians(5.0))
 STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
@@ -88,7 +89,8 @@ def strip_forces(
         uc = ux * cx + uy * cy + uz * cz
         un = ux * nx + uy * ny + uz * nz
         q = root(uc * uc + un * un + STILL * STILL)
-        forward = uc / root(uc * uc + REVERSAL * REVERSAL * q * q)
+        x = least(greatest(uc / (REVERSAL * q), -1.0), 1.0)
+        forward = 0.5 * x * (3.0 - x * x)
         alpha = angle(un, uc * forward)
         cl = load1(coefficients, 0) * alpha + load1(coefficients, 1)
         cd = load1(coefficients, 2) * magnitude(alpha) + load1(coefficients, 3)

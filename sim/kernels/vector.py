@@ -147,6 +147,18 @@ def _unary(name: str) -> Callable[..., Any]:
     return function
 
 
+def _binary_intrinsic(name: str) -> Callable[..., Any]:
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
+        declared = cgutils.get_or_insert_function(builder.module, ir.FunctionType(_LLVM, [_LLVM, _LLVM]), name)
+        return builder.call(declared, [args[0], _splat(builder, args[1])])
+
+    @intrinsic
+    def function(typingctx: Any, x: Any, limit: Any) -> Any:  # noqa: ARG001
+        return vector_type(x, types.float64), codegen
+
+    return function
+
+
 @intrinsic
 def splat(typingctx: Any, value: Any) -> Any:  # noqa: ARG001
     """A vector whose lanes all equal a float."""
@@ -164,3 +176,5 @@ load, store = _accessors(2)
 load3, store3 = _accessors(3)
 root = _unary(f"llvm.sqrt.v{LANES}f64")
 magnitude = _unary(f"llvm.fabs.v{LANES}f64")
+least = _binary_intrinsic(f"llvm.minnum.v{LANES}f64")  # of a vector and a float
+greatest = _binary_intrinsic(f"llvm.maxnum.v{LANES}f64")
