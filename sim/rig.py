@@ -37,7 +37,7 @@ from sim.simulate import Numerics
 Array = npt.NDArray[np.float64]
 
 # How the true wing is simulated: three times the steps of a calibration, periodic to 2 micrometres.
-REFERENCE = Numerics(steps=720, max_beats=60, periodic=2e-6)
+REFERENCE = Numerics(steps=1080, max_beats=60, periodic=2e-6)
 FRAMES_PER_BEAT = 30
 LOST_MARKERS = 9
 _MBAR, _ZERO_C = 100.0, 273.15

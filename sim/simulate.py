@@ -34,7 +34,7 @@ class Numerics:
         window: beats between extrapolations to the periodic motion; 0 waits for transients to die.
     """
 
-    steps: int = 240
+    steps: int = 360
     ramp_beats: int = 1
     max_beats: int = 24
     periodic: float = 5e-5

@@ -7,15 +7,14 @@ import pytest
 
 from records import Dataset, Genome
 from sim.flexible_wing import FlexibleWing
-from sim.rig import Tracking, record, robird_wing, true_genome, tunnel, vacuum
-from sim.simulate import Numerics
+from sim.rig import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
 
 
 @pytest.fixture(scope="session")
 def small() -> tuple[Dataset, Genome]:
     """Four recordings of a 4-body wing, one of each kind held out, and the truth."""
     wing = robird_wing()
-    model = FlexibleWing(wing, "4", numerics=Numerics(steps=240, periodic=2e-6, max_beats=60))
+    model = FlexibleWing(wing, "4", numerics=REFERENCE)
     truth = true_genome(model, 2)
     conditions = [vacuum(10, 0.05, 3.0), tunnel(0.05, 3.0, 6.0), vacuum(10, 0.12, 2.0), tunnel(0.0, 3.0, 8.5)]
     recordings = tuple(
