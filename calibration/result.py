@@ -13,9 +13,11 @@ from calibration.noise import noise_distance
 from calibration.problem import Problem, base_genome
 from calibration.search import CalibrationSpec, Stage, model_for, plan
 from calibration.standing import Standing, standing
-from records import Dataset, Genome
+from records import Dataset, Gene, Genome
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
+
+ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,8 @@ class GeneResult:
     """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
 
     ``standard_error`` is relative to the value, from the misfit's curvature and the residual scatter; ``identifiable``
-    says whether the data can tell the gene; None where the gene was not searched.
+    says whether the data can tell the gene: an error of at most 7.5 %, a value off its bounds, and a misfit that noise
+    explains (ADEQUATE); None where the gene was not searched.
     """
 
     name: str
@@ -55,6 +58,7 @@ class Result:
     """Outcome of a calibration; distances in m, means over recordings weighted by samples.
 
     ``noise`` is the mean distance that tracking noise alone leaves, estimated from the scatter between beats.
+    ``remarks`` say in words what a reader must know before trusting the rest.
     """
 
     genes: tuple[GeneResult, ...]
@@ -64,6 +68,7 @@ class Result:
     held_out_before: float | None
     held_out_after: float | None
     noise: float | None
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -102,14 +107,28 @@ def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, gen
     )
     fitted = [r for r in recordings if r.stage is not None]
     held_out = [r for r in recordings if r.held_out]
+    after, noise = _mean(fitted, "after"), noise_distance(dataset.recordings)
+    adequate = noise is None or after <= ADEQUATE * noise
+    remarks = [
+        f"recording {recording.name!r} cannot be simulated with the best genome: {part.reasons[1]}"
+        for recording, part in zip(dataset.recordings, both.per_recording, strict=True)
+        if part.reasons[1]
+    ]
+    if noise is not None and not adequate:
+        remarks.append(
+            f"the best genome leaves {after * 1e3:.2f} mm on the fitted recordings, {after / noise:.1f} times what "
+            f"tracking noise leaves: the search was cut short, or the model (its division, say) lacks something. "
+            f"Standard errors count on a misfit of at most {ADEQUATE:g} times the noise, so no gene is called told"
+        )
     return Result(
-        genes=_genes(model, stages, nominal, best, evaluator),
+        genes=_genes(model, stages, nominal, best, evaluator, adequate),
         recordings=recordings,
         before=_mean(fitted, "before"),
-        after=_mean(fitted, "after"),
+        after=after,
         held_out_before=_mean(held_out, "before") if held_out else None,
         held_out_after=_mean(held_out, "after") if held_out else None,
-        noise=noise_distance(dataset.recordings),
+        noise=noise,
+        remarks=tuple(remarks),
     )
 
 
@@ -126,7 +145,12 @@ def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]
 
 
 def _genes(
-    model: FlexibleWing, stages: tuple[Stage, ...], nominal: Genome, best: Genome, evaluator: Evaluator
+    model: FlexibleWing,
+    stages: tuple[Stage, ...],
+    nominal: Genome,
+    best: Genome,
+    evaluator: Evaluator,
+    adequate: bool,
 ) -> tuple[GeneResult, ...]:
     known: dict[str, Standing] = {}
     for stage in stages:
@@ -143,10 +167,15 @@ def _genes(
             gene.upper if gene.share_of is None else 1.0,
             gene.name in known,
             known[gene.name].standard_error if gene.name in known else None,
-            known[gene.name].identifiable if gene.name in known else None,
+            known[gene.name].identifiable and adequate and not _at_bound(gene, best) if gene.name in known else None,
         )
         for gene in model.genes
     )
+
+
+def _at_bound(gene: Gene, best: Genome) -> bool:
+    """Whether the search was stopped by the box: within a hundredth of it from either side."""
+    return not 0.01 < float(gene.to_unit(best[gene.name])) < 0.99
 
 
 def _mean(recordings: list[RecordingResult], which: str) -> float:

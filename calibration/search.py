@@ -100,6 +100,8 @@ def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
     _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
     base_genome(model, spec.fixed)
     recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
+    if not recordings:
+        raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
     for recording in recordings:
         if recording.name in dataset.held_out:
             raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")

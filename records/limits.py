@@ -48,5 +48,5 @@ MAX_ERRORS = 20
 PLANFORM_MARGIN = 0.01
 """How far outside the planform a marker may sit at rest, m."""
 
-IMPLAUSIBLE_SPANS = 20.0
+IMPLAUSIBLE_SPANS = 1.5
 """Markers further than this many spans from the hinge (median) were not recorded in metres."""

@@ -53,16 +53,19 @@ def _check_times(times: Array, at: Locate, faults: Faults) -> None:
 
 
 def _check_unit(values: Array, wing: Wing, where: str, faults: Faults) -> None:
-    """Markers stay within about a span of the hinge; a thousand times that is another unit."""
+    """Markers stay within about a span of the hinge; typical ones further out are in another unit or frame."""
     from_hinge = values.reshape(len(values), -1, 3) - np.array([0.0, wing.hinge.y, wing.hinge.z])
     along_axes = [np.abs(axis[np.isfinite(axis)]) for axis in np.moveaxis(from_hinge, 2, 0)]
     distance = max(float(np.median(axis)) for axis in along_axes if axis.size)
     limit = IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
-        unit = "millimetres" if distance > 100 * wing.span else "centimetres or millimetres"
+        far = distance / wing.span
+        unit = (
+            "millimetres" if far > 100 else "centimetres" if far > 10 else "feet, or a frame whose origin is elsewhere,"
+        )
         message = (
             f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span "
-            f"(limit {limit:.4g} m); they look like {unit} in columns named _m: "
+            f"(limit {limit:.4g} m); that looks like {unit} in columns named _m: "
             "convert to metres, in the wing frame"
         )
         faults.add(where, f"{distance:.4g}", message)

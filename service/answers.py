@@ -130,6 +130,7 @@ class Result(TypedDict):
     held_out_before_mm: float | None
     held_out_after_mm: float | None
     noise_mm: float | None
+    remarks: list[str]
     recordings: list[RecordingResult]
     genes: list[GeneInfo]
 

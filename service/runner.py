@@ -174,6 +174,8 @@ class Runner:
             instructions = _step(row, event)
             if row.state == jobs.State.SUCCEEDED:
                 row.result = result
+                # while it runs, the best of the present stage; in the end, over all that was fitted
+                row.best_mm = row.best_mm if result is None else result["after_mm"]
         self._obey(run_id, instructions)
         return row
 

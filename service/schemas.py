@@ -278,6 +278,7 @@ class ResultOut(BaseModel):
     held_out_before_mm: float | None
     held_out_after_mm: float | None
     noise_mm: float | None
+    remarks: list[str]
     recordings: list[RecordingResultOut]
     genes: list[GeneOut]
 

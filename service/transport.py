@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import math
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -108,6 +109,8 @@ class Transport:
 
     def _call(self, method: str, path: str, *, key: str | None = None, **options: Any) -> httpx.Response:
         headers = {"Idempotency-Key": key} if key else {}
+        if "json" in options:
+            _refuse_not_finite(options["json"])
         safe = key is not None or method in SENT_TWICE_IS_HARMLESS
         return self._repeat(lambda: self._http.request(method, path, headers=headers, **options), safe=safe)
 
@@ -154,6 +157,15 @@ class Transport:
         headers = {"Accept": "text/event-stream"} | given(**{"Last-Event-ID": last_event_id})
         with self._stream("GET", path, headers=headers) as response:
             yield from parse_events(response.iter_lines())
+
+
+def _refuse_not_finite(body: Any, where: str = "") -> None:
+    """JSON has no infinity and no NaN; say which value it was."""
+    if isinstance(body, dict):
+        for name, value in body.items():
+            _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
+    elif isinstance(body, float) and not math.isfinite(body):
+        raise WingfitError("not sent", f"{where} is {body}; it must be a finite number")
 
 
 class CountedFile(io.FileIO):

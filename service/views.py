@@ -93,6 +93,7 @@ def result(outcome: Result) -> schemas.ResultOut:
         held_out_before_mm=mm(outcome.held_out_before),
         held_out_after_mm=mm(outcome.held_out_after),
         noise_mm=mm(outcome.noise),
+        remarks=list(outcome.remarks),
         recordings=[
             schemas.RecordingResultOut(
                 name=r.name,

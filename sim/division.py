@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PRESETS = {"4": (1, 1, 1, 1), "11": (3, 3, 3, 2), "24": (4, 4, 4, 4, 4, 4)}
-MAX_STRIPS, MAX_CHORDWISE = 64, 16
+MAX_STRIPS, MAX_CHORDWISE, MAX_BODIES = 64, 16, 128
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,12 @@ class Division:
         except ValueError:
             counts = ()
         good = 2 <= len(counts) <= MAX_STRIPS and all(1 <= n <= MAX_CHORDWISE for n in counts)
+        good = good and sum(counts) <= MAX_BODIES
         if not good:
             raise ValueError(
                 f"division {text!r} is not understood; give a preset ({', '.join(PRESETS)}), strips x bodies along the "
                 f"chord such as 6x4, or bodies per strip from the root such as 3,3,3,2 "
-                f"(2 to {MAX_STRIPS} strips of 1 to {MAX_CHORDWISE} bodies)"
+                f"(2 to {MAX_STRIPS} strips of 1 to {MAX_CHORDWISE} bodies, at most {MAX_BODIES} bodies in all)"
             )
         return cls(counts)
 

@@ -63,7 +63,7 @@ class FlexibleWing:
         beat = self.beat(genomes, recording)
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
-        series = _series(beat.tracks[:, :, columns].reshape(len(beat.tracks), self.numerics.steps, -1))
+        series = _series(beat.tracks[:, :, columns].reshape(*beat.tracks.shape[:2], -1))
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
         psi = 2 * np.pi * recording.condition.flap_frequency * recording.times

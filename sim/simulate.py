@@ -22,26 +22,37 @@ ENERGIES = ("kinetic", "elastic", "gravitational")
 PORT_NAMES = ("dampers", "front_motor", "rear_motor", "air")
 
 
+STEPS_PER_HZ = 120.0
+STEPS_LIMITS = (120, 1200)
+
+
 @dataclass(frozen=True)
 class Numerics:
     """How finely to integrate.
 
     Attributes:
-        steps: per beat.
+        steps: per beat; None takes STEPS_PER_HZ for each Hz of flapping. The faster a wing flaps, the nearer its
+            harmonics come to its resonances, and the shorter a step must be even as a part of the beat.
         ramp_beats: the drive's amplitude grows from rest over these first beats.
         max_beats: after which a wing that is still not periodic is reported.
         periodic: largest marker displacement between successive beats (m) that counts as periodic.
         window: beats between extrapolations to the periodic motion; 0 waits for transients to die.
     """
 
-    steps: int = 360
+    steps: int | None = None
     ramp_beats: int = 1
     max_beats: int = 24
     periodic: float = 5e-5
     window: int = 4
 
+    def per_beat(self, condition: Condition) -> int:
+        """Steps in one beat under a condition."""
+        if self.steps is not None:
+            return self.steps
+        return int(np.clip(8 * round(STEPS_PER_HZ * condition.flap_frequency / 8), *STEPS_LIMITS))
+
     def __post_init__(self) -> None:
-        if self.steps < 8 or self.ramp_beats < 1 or self.max_beats <= self.ramp_beats:
+        if (self.steps is not None and self.steps < 8) or self.ramp_beats < 1 or self.max_beats <= self.ramp_beats:
             raise ValueError(
                 f"{self} is not usable: at least 8 steps a beat, at least one beat of ramp and more beats than that"
             )
@@ -90,7 +101,7 @@ def periodic_beat(
 
 def drive_table(structure: Structure, condition: Condition, numerics: Numerics, beat: int) -> Array:
     """[n, 4, 2, 3]: angle, rate and acceleration (rad, s) of both rods at the stages of beat number ``beat``."""
-    n, omega = numerics.steps, 2 * np.pi * condition.flap_frequency
+    n, omega = numerics.per_beat(condition), 2 * np.pi * condition.flap_frequency
     phase = 2 * np.pi * (np.arange(n)[:, None, None] + NODES[None, :, None]) / n - np.array([0.0, condition.phase_lag])
     angle = flap_angle(structure.wing.drive, phase) * np.array([1.0, omega, omega**2])
     if beat >= numerics.ramp_beats:
@@ -121,7 +132,7 @@ def setting(condition: Condition, numerics: Numerics) -> Setting:
     """The kernel's view of a condition."""
     a = condition.angle_of_attack
     wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
-    step = 1.0 / (condition.flap_frequency * numerics.steps)
+    step = 1.0 / (condition.flap_frequency * numerics.per_beat(condition))
     return Setting(density(condition.pressure, condition.temperature), wind, condition.gravity, step)
 
 
@@ -140,7 +151,7 @@ def _run_group(
     structure: Structure, genes: tuple[Gene, ...], genomes: Array, condition: Condition, numerics: Numerics
 ) -> Beat:
     """Up to LANES individuals. Each keeps the first beat that repeats the one before, whatever its neighbours do."""
-    count, n = len(genomes), numerics.steps
+    count, n = len(genomes), numerics.per_beat(condition)
     group, here, state = lanes(structure, genes, genomes), setting(condition, numerics), at_rest(structure)
     work = new_work(structure.wiring, group, here.step)
     trace, kept = new_trace(structure, n), new_trace(structure, n)
@@ -181,7 +192,7 @@ def _run_group(
 
 def _reason(alive: bool, done: bool, beats: int, change: float, numerics: Numerics) -> str | None:
     if not alive:
-        return f"diverged in beat {beats}: a body turned more than 1 rad within one of {numerics.steps} steps"
+        return f"diverged in beat {beats}: a body turned more than 1 rad within one step"
     if not done:
         return (
             f"not periodic after {beats} beats: markers still move by {change * 1e3:.3g} mm from beat to beat, "

@@ -17,6 +17,7 @@ Array = npt.NDArray[np.float64]
 Group = Literal["structure", "aerodynamics"]
 
 QUARTERS = 4
+UNIT_SLIP = 1e4  # an estimate further than this from the typical value is taken for a wrong unit
 FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
 
 # name, unit, default estimate, description
@@ -59,8 +60,12 @@ def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[
     for name, value in estimates.items():
         if name not in known:
             raise ValueError(f"estimate for unknown gene {name!r}; the flexible wing has {', '.join(known)}")
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"estimate of gene {name!r} is {value:g}; it must be positive and finite")
+        unit, typical = next((row[1], row[2]) for row in rows if row[0] == name)
+        if not (np.isfinite(value) and typical / UNIT_SLIP <= value <= typical * UNIT_SLIP):
+            raise ValueError(
+                f"estimate of gene {name!r} is {value:g} {unit}; it must lie in "
+                f"[{typical / UNIT_SLIP:g}, {typical * UNIT_SLIP:g}] {unit}: check its unit"
+            )
     return tuple(_gene(name, unit, estimates.get(name, default), text, factor) for name, unit, default, text in rows)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,8 @@ def campaign(
 
     Example: wingfit campaign my-campaign --division 11 --small --seed 7
     """
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
     from sim.rig import write_campaign  # compiled kernels wait until they are needed
 
     try:
@@ -31,4 +34,4 @@ def campaign(
     except ValueError as error:
         raise WingfitError("no campaign written", str(error)) from error
     say(f"campaign written to {out}")
-    say(f"next: wingfit datasets upload {out}")
+    say(f"next: wingfit datasets upload {shlex.quote(str(out))}")

@@ -246,16 +246,22 @@ def told(gene: a.GeneInfo) -> str:
 
 def misfits(answer: a.Result) -> None:
     """Print the mean distance per marker before and after, in mm."""
-    rows = [
-        [r["name"], "held out" if r["held_out"] else "fitted", mm(r["before_mm"]), mm(r["after_mm"])]
-        for r in answer["recordings"]
-    ]
+    rows = [[r["name"], use(r), mm(r["before_mm"]), mm(r["after_mm"])] for r in answer["recordings"]]
     rows.append(["all fitted", "", mm(answer["before_mm"]), mm(answer["after_mm"])])
     if answer["held_out_after_mm"] is not None:
         rows.append(["all held out", "", mm(answer["held_out_before_mm"]), mm(answer["held_out_after_mm"])])
     table(["mean distance per marker", "use", ">before mm", ">after mm"], rows)
     if answer["noise_mm"] is not None:
         say(f"tracking noise alone leaves {mm(answer['noise_mm'])} mm")
+    for remark in answer["remarks"]:
+        note(f"note: {remark}")
+
+
+def use(recording: a.RecordingResult) -> str:
+    """What a run did with a recording."""
+    if recording["held_out"]:
+        return "held out"
+    return "not fitted" if recording["stage"] is None else "fitted"
 
 
 def follow(client: Client, run_id: str) -> a.Run:

@@ -73,6 +73,8 @@ def _read_file(path: Path) -> dict[str, Any]:
         raise typer.BadParameter(f"{path} is not JSON: {error}", param_hint="--genome") from error
     if isinstance(content, dict) and isinstance(content.get("genes"), list):
         return {gene["name"]: gene["best"] for gene in content["genes"]}
+    if isinstance(content, dict) and isinstance(content.get("genome"), dict):
+        return dict(content["genome"])  # the truth that the virtual rig writes beside its dataset
     if not isinstance(content, dict):
         raise typer.BadParameter(f"{path} must hold {{name: value}}", param_hint="--genome")
     return content

@@ -50,15 +50,17 @@ export function drawMisfit(result) {
   const row = (name, badge, before, after, className = "") => el("tr", { className },
     el("td", {}, name), el("td", {}, badge), el("td", { className: "n" }, mm(before)),
     el("td", { className: "n" }, mm(after)), el("td", { className: "wide" }, bars(before, after)));
-  const use = (held) => el("span", { className: held ? "badge held" : "badge" }, held ? "held out" : "fitted");
-  const rows = result.recordings.map((r) => row(r.name, use(r.held_out), r.before_mm, r.after_mm));
+  const use = (r) => el("span", { className: r.held_out ? "badge held" : "badge" },
+    r.held_out ? "held out" : r.stage === null ? "not fitted" : "fitted");
+  const rows = result.recordings.map((r) => row(r.name, use(r), r.before_mm, r.after_mm));
   rows.push(row("All fitted", "", result.before_mm, result.after_mm, "total"));
   if (result.held_out_after_mm !== null) {
     rows.push(row("All held out", "", result.held_out_before_mm, result.held_out_after_mm, "total"));
   }
   $("misfit").tBodies[0].replaceChildren(...rows);
   $("misfit-note").textContent = "Grey: nominal genome. Coloured: best genome."
-    + (result.noise_mm ? ` Dotted: what tracking noise alone leaves, ${mm(result.noise_mm)} mm.` : "");
+    + (result.noise_mm ? ` Dotted: what tracking noise alone leaves, ${mm(result.noise_mm)} mm.` : "")
+    + result.remarks.map((remark) => ` Note: ${remark}.`).join("");
 }
 
 export function drawGenes(genome) {

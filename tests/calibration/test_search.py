@@ -274,3 +274,31 @@ def test_noise_estimate_scales_to_long_recordings() -> None:
 
 def nominal_values(dataset: Dataset) -> Mapping[str, float]:
     return base_genome(model_for(dataset, "4")).as_dict()
+
+
+def test_a_poor_fit_tells_no_gene_and_says_why(small: tuple[Dataset, Genome]) -> None:
+    """Standard errors count on a misfit that is noise; with the nominal genome it is far more."""
+    dataset, truth = small
+    poor = summarise(SPEC, dataset, Here(), nominal_values(dataset))
+    assert not any(gene.identifiable for gene in poor.genes)
+    assert any("times what tracking noise leaves" in remark for remark in poor.remarks)
+    good = summarise(SPEC, dataset, Here(), truth.as_dict())
+    assert good.remarks == ()
+    assert any(gene.identifiable for gene in good.genes)
+
+
+def test_a_gene_at_its_bound_is_not_told(small: tuple[Dataset, Genome]) -> None:
+    from calibration.result import _at_bound
+
+    dataset, _ = small
+    nominal = base_genome(model_for(dataset, "4"))
+    gene = nominal.genes[0]
+    assert not _at_bound(gene, nominal)
+    assert _at_bound(gene, nominal.replace({gene.name: gene.lower}))
+    assert _at_bound(gene, nominal.replace({gene.name: gene.upper}))
+
+
+def test_estimates_in_another_unit_are_refused(small: tuple[Dataset, Genome]) -> None:
+    dataset, _ = small
+    gigapascal = replace(dataset, wing=replace(dataset.wing, estimates={"E_r": 180.0}))
+    refused(SPEC, gigapascal, r"E_r.* Pa.*check its unit")

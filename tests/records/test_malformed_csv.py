@@ -68,7 +68,8 @@ CASES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "nul": (lambda: edited(5, 2, "\0"), ["line 5"], []),
     "stray quote": (lambda: edited(5, 2, '"1'), [TRACKS], []),
     "millimetres": (lambda: _scaled(1000.0), [TRACKS], ["millimetres", "span", "convert to metres"]),
-    "centimetres": (lambda: _scaled(100.0), [TRACKS], ["centimetres or millimetres"]),
+    "centimetres": (lambda: _scaled(100.0), [TRACKS], ["looks like centimetres"]),
+    "feet": (lambda: _scaled(3.28084), [TRACKS], ["looks like feet"]),
     "all empty": (
         lambda: {**good_files(), TRACKS: "\n".join([HEADER, *(f"{k}" + "," * 36 for k in range(9))]).encode()},
         [TRACKS],
