@@ -75,3 +75,8 @@ class ServerProcess:
             return self.client.get("/v1/health").status_code == 200
         except httpx.TransportError:
             return False
+
+
+def heed_interrupts() -> None:
+    """For a child that is to be interrupted: one started in the background inherits that SIGINT is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

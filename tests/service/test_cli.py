@@ -24,7 +24,7 @@ from service.commands.output import duration, mm, number
 from service.commands.simulate import marker_distances
 from sim.rig import blank_recording, robird_wing, vacuum
 from tests.service import toy
-from tests.service.processes import ROOT, ServerProcess, free_port
+from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
 
 Wingfit = Callable[..., tuple[int, str, str]]
 
@@ -221,6 +221,7 @@ def test_ctrl_c_while_watching_leaves_the_run_going(server: ServerProcess, wingf
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=heed_interrupts,
     )
     assert watching.stderr is not None
     first = watching.stderr.readline()

@@ -16,7 +16,7 @@ import pytest
 
 from service import demo
 from tests.service import toy
-from tests.service.processes import ROOT
+from tests.service.processes import ROOT, heed_interrupts
 
 INTERRUPTIBLE = """
 import sys
@@ -85,6 +85,7 @@ def test_a_signal_stops_everything(example: Path, how: signal.Signals) -> None:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=heed_interrupts,
     )
     assert running.stdout is not None
     page = ""
