@@ -18,9 +18,6 @@ from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 
-ENERGIES = ("kinetic", "elastic", "gravitational")
-PORT_NAMES = ("dampers", "front_motor", "rear_motor", "air")
-
 
 STEPS_PER_HZ = 120.0
 STEPS_LIMITS = (120, 1200)

@@ -159,16 +159,6 @@ def _binary_intrinsic(name: str) -> Callable[..., Any]:
     return function
 
 
-@intrinsic
-def splat(typingctx: Any, value: Any) -> Any:  # noqa: ARG001
-    """A vector whose lanes all equal a float."""
-
-    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
-        return _splat(builder, args[0])
-
-    return vector_type(value), codegen
-
-
 # lanes of array[:], array[i, :], array[i, j, :] and array[i, j, k, :]
 load0, store0 = _accessors(0)
 load1, store1 = _accessors(1)
