@@ -21,9 +21,9 @@ from calibration.evaluator import Evaluator
 from calibration.problem import Problem, base_genome
 from calibration.result import Result, summarise
 from calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
-from records import Dataset, load_dataset
+from records import Dataset, Genome, load_dataset
 from sim.flexible_wing import FlexibleWing
-from sim.rig import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
+from sim.rig import REFERENCE, Tracking, read_truth, record, robird_wing, true_genome, tunnel, vacuum
 from workers import make_evaluator
 from workers.factory import EvaluatorKind
 
@@ -53,43 +53,28 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
     return Outcome(last, summarise(spec, dataset, evaluator, last.genome), time.perf_counter() - start)
 
 
-def floor(
-    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: dict[str, float]
-) -> tuple[float, float]:
+def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
     """Mean distance (m) that the true genome leaves on fitted and on held-out recordings."""
-    found = summarise(spec, dataset, evaluator, truth)
+    found = summarise(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
         raise ValueError("the campaign holds no recording out")
     return found.after, found.held_out_after
 
 
-def gene_table(result: Result, truth: dict[str, float]) -> list[dict[str, Any]]:
+def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
     """Deviation from the truth of each gene (shares normalised), in per cent, beside its standard error."""
-    sums: dict[str, float] = {}
-    for name, value in truth.items():
-        group = share_group(name)
-        if group:
-            sums[group] = sums.get(group, 0.0) + value
-    rows = []
-    for gene in result.genes:
-        true = truth[gene.name] / sums.get(share_group(gene.name) or "", 1.0)
-        rows.append(
-            {
-                "gene": gene.name,
-                "best": gene.best,
-                "true": true,
-                "error_percent": round(100 * (gene.best / true - 1), 2),
-                "standard_error_percent": None if gene.standard_error is None else round(100 * gene.standard_error, 2),
-                "identifiable": gene.identifiable,
-            }
-        )
-    return rows
-
-
-def share_group(name: str) -> str | None:
-    """``L`` for L_1..L_4, ``ID`` for ID_1..ID_4, else None."""
-    prefix, _, number = name.rpartition("_")
-    return prefix if number.isdigit() else None
+    true = truth.normalised()
+    return [
+        {
+            "gene": gene.name,
+            "best": gene.best,
+            "true": true[gene.name],
+            "error_percent": round(100 * (gene.best / true[gene.name] - 1), 2),
+            "standard_error_percent": None if gene.standard_error is None else round(100 * gene.standard_error, 2),
+            "identifiable": gene.identifiable,
+        }
+        for gene in result.genes
+    ]
 
 
 def thesis_campaign() -> Dataset:
@@ -134,7 +119,7 @@ def evaluators_are_identical(dataset: Dataset) -> bool:
 def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
     """All figures of the benchmark."""
     dataset = load_dataset(EXAMPLE)
-    truth: dict[str, float] = json.loads(TRUTH.read_text(encoding="utf-8"))["genome"]
+    truth = read_truth(TRUTH)
     spec = CalibrationSpec(division="11", seed=seed)
     evaluator = make_evaluator(kind)
     try:

@@ -7,7 +7,6 @@ the 11-body wing, and only then opens the true genome, to say how close the cali
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import signal
 import socket
@@ -117,14 +116,9 @@ def keep(url: str) -> NoReturn:
 
 def true_values(path: Path) -> dict[str, float]:
     """Read the genome that made the recordings, shares normalised as the results have them."""
-    from sim.wing_genes import wing_genes
+    from sim.rig import read_truth  # compiled kernels wait until they are needed
 
-    values: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))["genome"]
-    groups = {gene.name: gene.share_of for gene in wing_genes({}) if gene.share_of}
-    sums: dict[str, float] = {}
-    for name, share in groups.items():
-        sums[share] = sums.get(share, 0.0) + values[name]
-    return {name: value / sums[groups[name]] if name in groups else value for name, value in values.items()}
+    return read_truth(path).normalised()
 
 
 def _print_genes(genes: list[a.GeneInfo]) -> None:

@@ -91,11 +91,6 @@ def rod_at(rod: Rod, y: float) -> float | None:
     return rod.x_root + t * (rod.x_tip - rod.x_root)
 
 
-def carrier(planform: Planform, panels: list[Panel], x: float, y: float) -> int:
-    """Number of the panel under a point; the nearest one for a point beyond the edges."""
-    return int(carriers(planform, panels, np.array([x]), np.array([y]))[0])
-
-
 def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> npt.NDArray[np.int64]:
     """Numbers of the panels under many points; edges belong to the outer and rear neighbour."""
     edges = np.unique([panel.y0 for panel in panels])
@@ -117,8 +112,8 @@ def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
         x, y = rod.x_root + t * (rod.x_tip - rod.x_root), rod.y_root + t * (rod.y_tip - rod.y_root)
         for number, *place in zip(carriers(planform, panels, x, y), x, y, strict=True):
             lumps[number].append((linear * length / _ROD_CELLS, np.array([*place, 0.0])))
-    for marker in planform.wing.markers:
-        number = carrier(planform, panels, marker.position[0], marker.position[1])
+    markers = planform.wing.markers
+    for marker, number in zip(markers, marker_carriers(planform, panels, markers), strict=True):
         lumps[number].append((marker.mass, np.array(marker.position)))
     return [_body(planform, panel, extra) for panel, extra in zip(panels, lumps, strict=True)]
 

@@ -149,6 +149,12 @@ def true_genome(model: FlexibleWing, seed: int) -> Genome:
     return Genome.nominal(model.genes).replace(drawn)
 
 
+def read_truth(path: Path) -> Genome:
+    """The true genome that :func:`write_campaign` left beside a dataset."""
+    values: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))["genome"]
+    return Genome.nominal(FlexibleWing(robird_wing()).genes).replace(values)
+
+
 def blank_recording(wing: Wing, condition: Condition, name: str = "blank", frames: int = 8) -> Recording:
     """A recording without data, for simulating under ``condition``."""
     times = np.arange(frames) / (frames * condition.flap_frequency)

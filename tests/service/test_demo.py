@@ -102,9 +102,9 @@ def test_a_signal_stops_everything(example: Path, how: signal.Signals) -> None:
 def test_true_shares_are_normalised(tmp_path: Path) -> None:
     from sim.wing_genes import wing_genes
 
-    raw = {gene.name: 2.0 for gene in wing_genes({})}
+    raw = {gene.name: 0.25 if gene.share_of else gene.nominal for gene in wing_genes({})} | {"L_1": 0.5}
     path = tmp_path / "x.truth.json"
     path.write_text(json.dumps({"division": "11", "genome": raw}))
     values = demo.true_values(path)
-    assert values["E_f"] == 2.0
-    assert [values[f"L_{k}"] for k in range(1, 5)] == [0.25] * 4
+    assert values["E_f"] == raw["E_f"]
+    assert [values[f"L_{k}"] for k in range(1, 5)] == pytest.approx([0.4, 0.2, 0.2, 0.2])
