@@ -49,10 +49,12 @@ class FlexibleWing:
         """Bodies and connectors."""
         return build(self.wing, Division.parse(self.division))
 
-    def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Beat:
+    def beat(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
         """One periodic beat of ``genomes`` [B, G] under the recording's condition, with loads and energies."""
         batch = genome_batch(self.genes, genomes)
-        return periodic_beat(self.structure, self.genes, batch, recording.condition, self.numerics)
+        return periodic_beat(
+            self.structure, self.genes, batch, recording.condition, self.numerics, with_motion=with_motion
+        )
 
     def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
         """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.

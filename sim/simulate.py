@@ -67,6 +67,7 @@ class Beat:
         power: [B, n, 4] into the wing through dampers, front motor, rear motor and air, W.
         beats: [B] beats simulated until periodic.
         reasons: why an individual failed, else None.
+        motion: pose and twist of all bodies and the two rods, when asked for.
     """
 
     tracks: Array
@@ -76,15 +77,30 @@ class Beat:
     power: Array
     beats: npt.NDArray[np.int64]
     reasons: tuple[str | None, ...]
+    motion: State | None = None
 
 
 def periodic_beat(
-    structure: Structure, genes: tuple[Gene, ...], genomes: Array, condition: Condition, numerics: Numerics
+    structure: Structure,
+    genes: tuple[Gene, ...],
+    genomes: Array,
+    condition: Condition,
+    numerics: Numerics,
+    *,
+    with_motion: bool = False,
 ) -> Beat:
-    """Simulate ``genomes`` [B, G] under ``condition`` until each is periodic; groups of LANES at a time."""
+    """Simulate ``genomes`` [B, G] under ``condition`` until each is periodic; groups of LANES at a time.
+
+    ``with_motion`` keeps the motion of every body: rotation [B, n, N+2, 9], position [B, n, N+2, 3] and twist
+    [B, n, N+2, 6].
+    """
     groups = [
-        _run_group(structure, genes, genomes[k : k + LANES], condition, numerics) for k in range(0, len(genomes), LANES)
+        _run_group(structure, genes, genomes[k : k + LANES], condition, numerics, with_motion)
+        for k in range(0, len(genomes), LANES)
     ]
+    motion = None
+    if with_motion:
+        motion = State(*(np.concatenate(parts) for parts in zip(*(g.motion for g in groups if g.motion), strict=True)))
     return Beat(
         tracks=np.concatenate([g.tracks for g in groups]),
         rods=np.concatenate([g.rods for g in groups]),
@@ -93,6 +109,7 @@ def periodic_beat(
         power=np.concatenate([g.power for g in groups]),
         beats=np.concatenate([g.beats for g in groups]),
         reasons=tuple(reason for g in groups for reason in g.reasons),
+        motion=motion,
     )
 
 
@@ -133,25 +150,34 @@ def setting(condition: Condition, numerics: Numerics) -> Setting:
     return Setting(density(condition.pressure, condition.temperature), wind, condition.gravity, step)
 
 
-def new_trace(structure: Structure, steps: int) -> Trace:
-    """Empty arrays for one beat."""
+def new_trace(structure: Structure, steps: int, *, with_motion: bool = False) -> Trace:
+    """Empty arrays for one beat; those of the motion have no room unless asked for."""
+    kept, bodies = steps if with_motion else 0, len(structure.bodies) + 2
     return Trace(
         tracks=np.zeros((steps, len(structure.wing.markers), 3, LANES)),
         rods=np.zeros((steps, 2, 6, LANES)),
         air=np.zeros((steps, 3, LANES)),
         power=np.zeros((steps, PORTS, LANES)),
         energy=np.zeros((steps, 3, LANES)),
+        R=np.zeros((kept, bodies, 9, LANES)),
+        p=np.zeros((kept, bodies, 3, LANES)),
+        V=np.zeros((kept, bodies, 6, LANES)),
     )
 
 
 def _run_group(
-    structure: Structure, genes: tuple[Gene, ...], genomes: Array, condition: Condition, numerics: Numerics
+    structure: Structure,
+    genes: tuple[Gene, ...],
+    genomes: Array,
+    condition: Condition,
+    numerics: Numerics,
+    with_motion: bool,
 ) -> Beat:
     """Up to LANES individuals. Each keeps the first beat that repeats the one before, whatever its neighbours do."""
     count, n = len(genomes), numerics.per_beat(condition)
     group, here, state = lanes(structure, genes, genomes), setting(condition, numerics), at_rest(structure)
     work = new_work(structure.wiring, group, here.step)
-    trace, kept = new_trace(structure, n), new_trace(structure, n)
+    trace, kept = (new_trace(structure, n, with_motion=with_motion) for _ in range(2))
     alive, done = np.ones(LANES, bool), np.arange(LANES) >= count
     beats, change = np.zeros(LANES, np.int64), np.full(LANES, np.inf)
     tables = [drive_table(structure, condition, numerics, beat) for beat in range(numerics.ramp_beats + 1)]
@@ -183,8 +209,9 @@ def _run_group(
         if reason is not None:
             for array in kept:
                 array[..., k] = np.nan
-    tracks, rods, air, power, energy = (np.moveaxis(array, -1, 0)[:count] for array in kept)
-    return Beat(tracks.copy(), rods.copy(), air.copy(), energy.copy(), power.copy(), beats[:count], reasons)
+    found = Trace(*(np.moveaxis(array, -1, 0)[:count].copy() for array in kept))
+    motion = State(found.R, found.p, found.V) if with_motion else None
+    return Beat(found.tracks, found.rods, found.air, found.energy, found.power, beats[:count], reasons, motion)
 
 
 def _reason(alive: bool, done: bool, beats: int, change: float, numerics: Numerics) -> str | None:

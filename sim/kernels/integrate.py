@@ -146,7 +146,8 @@ class Trace(NamedTuple):
     """What a beat leaves behind, per step.
 
     tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
-    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational.
+    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational. R, p, V: the motion
+    of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty where nobody asked.
     """
 
     tracks: Array
@@ -154,6 +155,9 @@ class Trace(NamedTuple):
     air: Array
     power: Array
     energy: Array
+    R: Array
+    p: Array
+    V: Array
 
 
 @kernel
@@ -257,6 +261,10 @@ def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> 
     energy = trace.energy[t]
     kinetic_and_height(wiring.mass, wiring.inertia, work.p, work.V, setting.gravity, energy[0], energy[2])
     energy[1] = work.stored
+    if len(trace.R):
+        trace.R[t] = work.R
+        trace.p[t] = work.p
+        trace.V[t] = work.V
 
 
 @kernel
