@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, NotRequired, TypedDict
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
+
+CONDITION = (
+    "flap_frequency_hz",
+    "phase_lag_deg",
+    "pressure_mbar",
+    "temperature_c",
+    "airspeed_m_s",
+    "angle_of_attack_deg",
+)
 
 
 class Health(TypedDict):
@@ -145,10 +154,89 @@ class Comparison(TypedDict):
     simulated_mm: list[list[list[float | None]]]
 
 
+class Strip(TypedDict):
+    """Air on one strip."""
+
+    name: str
+    span_mm: list[float]
+    lift_n: list[float]
+    thrust_n: list[float]
+    side_n: list[float]
+    power_w: list[float]
+
+
+class SectionLoad(TypedDict):
+    """What the inner part of the wing exerts on the outer through a cut; vectors [phase][x, y, z]."""
+
+    name: str
+    span_mm: float
+    moment_n_m: list[list[float]]
+    force_n: list[list[float]]
+
+
+class ConnectorLoad(TypedDict):
+    """Wrench on, and motion of, the second of the bodies ``between`` relative to the first, in the first's axes."""
+
+    name: str
+    kind: Literal["root", "spanwise", "chordwise"]
+    between: list[str]
+    point_mm: list[float]
+    moment_n_m: list[list[float]]
+    force_n: list[list[float]]
+    angular_velocity_rad_s: list[list[float]]
+    velocity_m_s: list[list[float]]
+    dissipated_w: list[float]
+    stored_j: list[float]
+
+
+class Averages(TypedDict):
+    """Means over the beat, and the largest motor torques."""
+
+    lift_n: float
+    thrust_n: float
+    side_n: float
+    motor_power_w: dict[str, float]
+    peak_motor_torque_n_m: dict[str, float]
+    supplied_w: float
+    dissipated_w: float
+    to_air_w: float
+    closing_error_w: float
+    closing_error_percent: float
+    dissipated_by_connector_w: dict[str, float]
+
+
+class Outputs(TypedDict, total=False):
+    """Loads, powers and energies over one beat in order of ``phase``; only what was asked for is there."""
+
+    phase: list[float]
+    drive_phase: list[float]
+    motor_angle_deg: dict[str, list[float]]
+    motor_rate_rad_s: dict[str, list[float]]
+    motor_torque_n_m: dict[str, list[float]]
+    motor_power_w: dict[str, list[float]]
+    lift_n: list[float]
+    thrust_n: list[float]
+    side_n: list[float]
+    strips: list[Strip]
+    sections: list[SectionLoad]
+    connectors: list[ConnectorLoad]
+    power_w: dict[str, list[float]]
+    energy_j: dict[str, list[float]]
+    averages: Averages
+
+
 class Simulation(Comparison):
-    """A comparison of one simulation with the recording under whose condition it ran."""
+    """A comparison of one simulation with the recording under whose condition it ran; loads where asked for."""
 
     mean_distance_mm: float | None
+    outputs: NotRequired[Outputs]
+
+
+class Loads(TypedDict):
+    """Loads under a recording's condition, or one that differs from it in what was asked."""
+
+    recording: str
+    outputs: Outputs
 
 
 class Event(TypedDict):

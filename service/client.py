@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, cast
@@ -169,6 +169,17 @@ class Client(Transport):
         params = given(recording=recording, genome=genome)
         return cast(a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params))
 
+    def loads(
+        self,
+        run_id: str,
+        recording: str | None = None,
+        genome: Literal["best", "nominal"] = "best",
+        outputs: Sequence[str] | None = None,
+    ) -> a.Loads:
+        """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
+        params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
+        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params))
+
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
 
@@ -215,15 +226,45 @@ class Client(Transport):
         *,
         division: str = "11",
         genome: Mapping[str, float] | None = None,
+        outputs: bool | Sequence[str] = False,
     ) -> a.Simulation:
-        """Simulate one recording; genes not named in ``genome`` keep their nominal value."""
+        """Simulate one recording; genes not named in ``genome`` keep their nominal value.
+
+        ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
+        power, energy, averages.
+        """
         body = {
             "dataset_id": dataset_id,
             "recording": recording,
             "division": division,
             "genome": dict(genome or {}),
+            "outputs": outputs if isinstance(outputs, bool) else list(outputs),
         }
         return cast(a.Simulation, self._json("POST", "/v1/simulations", json=body, key=str(uuid.uuid4())))
+
+    def loads_under(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        condition: Mapping[str, float] | None = None,
+        division: str = "11",
+        genome: Mapping[str, float] | None = None,
+        outputs: Sequence[str] | None = None,
+    ) -> a.Loads:
+        """Simulate a genome for its loads, where ``condition`` may change the recording's.
+
+        Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
+        """
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "condition": dict(condition or {}),
+            "division": division,
+            "genome": dict(genome or {}),
+            "outputs": True if outputs is None else list(outputs),
+        }
+        return cast(a.Loads, self._json("POST", "/v1/loads", json=body, key=str(uuid.uuid4())))
 
 
 def merge(run: a.Run, event: a.Event) -> a.Run:

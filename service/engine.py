@@ -10,8 +10,9 @@ from calibration.evaluator import Evaluator
 from calibration.problem import base_genome
 from calibration.result import Comparison, GeneResult, Result
 from calibration.search import CalibrationSpec, Generation
-from records import Dataset, load_archive
+from records import Dataset, Recording, load_archive
 from sim.model import Model
+from sim.outputs import Outputs, simulate_outputs
 
 
 class Engine(Protocol):
@@ -53,6 +54,12 @@ class Engine(Protocol):
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> Comparison:
         """Tracks of a genome over a recording."""
+        ...
+
+    def loads(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
+    ) -> Outputs:
+        """Loads, powers and energies of a genome under a recording's condition."""
         ...
 
 
@@ -113,6 +120,13 @@ class WingEngine:
     ) -> Comparison:
         """Simulate one recording's condition."""
         return result.compare(spec, dataset, genome, recording)
+
+    def loads(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
+    ) -> Outputs:
+        """Simulate one recording's condition for what acts inside the wing and on it."""
+        model = search.model_for(dataset, spec.division, spec.bounds_factor)
+        return simulate_outputs(model, base_genome(model, genome).values, recording)
 
 
 def _model(spec: CalibrationSpec, dataset: Dataset) -> Model:

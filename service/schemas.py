@@ -6,6 +6,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
+from service.load_schemas import ConditionIn, OutputsOut, Wanted
 from workers.jobs import State
 
 LARGEST_SEED = 2**53 - 1
@@ -308,6 +309,7 @@ class SimulationIn(BaseModel):
                     "recording": _RECORDING["name"],
                     "division": "4",
                     "genome": {"E_f": 7e6},
+                    "outputs": ["motors", "averages"],
                 }
             ]
         },
@@ -317,9 +319,27 @@ class SimulationIn(BaseModel):
     recording: Name
     division: Annotated[str, Field(pattern=DIVISION, max_length=LONGEST_DIVISION)] = "11"
     genome: Annotated[dict[str, Number], Field(max_length=1000)] = {}
+    outputs: Wanted = False
+
+
+class LoadsIn(SimulationIn):
+    """A simulation for its loads alone, under the recording's condition or one that differs from it."""
+
+    model_config = _example(
+        {
+            "dataset_id": _DATASET["id"],
+            "recording": _RECORDING["name"],
+            "condition": {"flap_frequency_hz": 5.0, "airspeed_m_s": 4.0},
+            "outputs": ["motors", "averages"],
+        }
+    )
+
+    condition: ConditionIn = ConditionIn()
+    outputs: Wanted = True
 
 
 class SimulationOut(ComparisonOut):
-    """Tracks and their mean distance per marker."""
+    """Tracks and their mean distance per marker; loads where they were asked for."""
 
     mean_distance_mm: float | None
+    outputs: OutputsOut | None = None

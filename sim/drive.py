@@ -1,4 +1,4 @@
-"""Flap angle of the driving rods over the beat, with its first two derivatives."""
+"""Flap angle of the driving rods over the beat, with its first three derivatives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HARMONICS = 40
 
 
 def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
-    """[..., 3]: angle (rad) and its first and second derivative by the drive phase ``psi`` (rad)."""
+    """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
     phase = np.asarray(psi, float)
     series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
     k = np.arange(1, max(len(series.cosine), len(series.sine)) + 1)
@@ -25,7 +25,8 @@ def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
     angle = series.mean + c @ a + s @ b
     first = c @ (k * b) - s @ (k * a)
     second = -(c @ (k**2 * a) + s @ (k**2 * b))
-    return np.stack([angle, first, second], axis=-1)
+    third = s @ (k**3 * a) - c @ (k**3 * b)
+    return np.stack([angle, first, second, third], axis=-1)
 
 
 def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:

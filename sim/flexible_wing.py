@@ -12,7 +12,7 @@ from records import Gene, Recording, Wing
 from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from sim.division import Division
 from sim.model import Observation, genome_batch
-from sim.simulate import Beat, Numerics, periodic_beat
+from sim.simulate import Beat, Numerics, periodic_beats
 from sim.structure import Structure, build
 from sim.wing_genes import FACTOR, wing_genes
 
@@ -49,12 +49,17 @@ class FlexibleWing:
         """Bodies and connectors."""
         return build(self.wing, Division.parse(self.division))
 
-    def beat(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
-        """One periodic beat of ``genomes`` [B, G] under the recording's condition, with loads and energies."""
+    def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
+        """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies."""
         batch = genome_batch(self.genes, genomes)
-        return periodic_beat(
+        return periodic_beats(
             self.structure, self.genes, batch, recording.condition, self.numerics, with_motion=with_motion
         )
+
+    def beat(self, genome: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
+        """The same for a single genome [G]."""
+        (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
+        return found
 
     def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
         """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
@@ -62,17 +67,17 @@ class FlexibleWing:
         Beats are aligned by the upstroke crossing; what tracking noise leaves of a phase error is then fitted, the
         trigger of the cameras being unknown (docs/decisions/0001).
         """
-        beat = self.beat(genomes, recording)
+        beats = self.beats(genomes, recording)
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
-        series = _series(beat.tracks[:, :, columns].reshape(*beat.tracks.shape[:2], -1))
+        series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
         psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
         since = psi - recorded_crossing(self.wing, recording)
         reasons = tuple(
-            reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
-            for reason, phase in zip(beat.reasons, own, strict=True)
+            beat.reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
+            for beat, phase in zip(beats, own, strict=True)
         )
         channels = np.stack([_laid_over(s, since + p, recording.values) for s, p in zip(series, own, strict=True)])
         return Observation(channels, reasons)
@@ -97,8 +102,10 @@ def _laid_over(series: npt.NDArray[np.complex128], psi: Array, recorded: Array) 
 
 
 def _series(samples: Array) -> npt.NDArray[np.complex128]:
-    """Fourier series [B, K + 1, C] of periodic samples [B, n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
-    n = samples.shape[1]
-    spectrum: npt.NDArray[np.complex128] = np.fft.rfft(samples, axis=1)[:, : min(_HARMONICS, (n - 1) // 2) + 1] / n
-    spectrum[:, 1:] *= 2
-    return spectrum
+    """Fourier series [_HARMONICS + 1, C] of periodic samples [n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
+    n = len(samples)
+    kept = min(_HARMONICS, (n - 1) // 2) + 1
+    series = np.zeros((_HARMONICS + 1, samples.shape[1]), np.complex128)
+    series[:kept] = np.fft.rfft(samples, axis=0)[:kept] / n
+    series[1:] *= 2
+    return series

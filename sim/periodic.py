@@ -1,14 +1,14 @@
 """Finding the periodic motion sooner than by waiting for transients to die.
 
-The beat maps the state at its start to the state at its end; near the periodic motion that map is linear, and a lightly
-damped wing has only a few modes that survive a beat. Reduced-rank extrapolation (Eddy 1979, Mesina 1977; Sidi, *Vector
-Extrapolation Methods*, 2017, ch. 2) combines the states after successive beats, with weights that sum to one, so that
-their combined change over a beat is smallest: with as many beats as surviving modes, the fixed point itself.
+The beat maps the state x at its start to the state F(x) at its end; the periodic motion is its fixed point. Near it the
+map is linear, and a lightly damped wing has only a few modes that survive a beat. From the beats so far, Anderson's
+method (J. ACM 12, 1965; Walker and Ni, SIAM J. Numer. Anal. 49, 2011) takes the combination whose change over a beat is
+smallest: with as many beats as surviving modes, the fixed point itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -18,46 +18,91 @@ from sim.kernels.integrate import State
 
 Array = npt.NDArray[np.float64]
 
-# Scales that make rotations (rad) and rates comparable with displacements (m): a chord, and the beat's angular rate.
-_LENGTH = 0.1
-LONGEST = 10.0  # admits modes that keep up to about 0.9 of their amplitude over a beat
+_LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
+WORSE = 2.0  # a leap after which a beat changes this many times as much as before is taken back
+LONGEST = 20.0  # admits modes that keep up to 0.95 of their amplitude over a beat
+_RANK = 1e-8  # of the largest singular value: less is the integrator's noise
 
 
-def extrapolate(states: Sequence[State], lanes: npt.ArrayLike, angular_rate: float, into: State) -> None:
-    """Replace the lanes of ``into`` by the extrapolated state; ``states`` are those after successive beats.
+@dataclass
+class Secants:
+    """What successive beats of one individual have told about its map.
 
-    At least three states are needed; all lanes are treated on their own. A lane whose extrapolation would move the wing
-    LONGEST times as far as the first of the beats did has no useful linear map yet, and is left alone.
+    Coordinates are taken about the pose ``about``; twists are made displacements by ``angular_rate``, that of the beat,
+    so that all are in metres.
     """
-    for lane in np.flatnonzero(np.asarray(lanes)):
-        x = np.stack([_coordinates(s, into, int(lane), angular_rate) for s in states])
-        change = np.diff(x, axis=0)
-        if not np.all(np.isfinite(change)):
-            continue
-        c, *_ = np.linalg.lstsq(np.diff(change, axis=0).T, -change[-1], rcond=1e-10)
-        correction = change[1:].T @ c
-        if np.linalg.norm(correction) > LONGEST * np.linalg.norm(change[0]):
-            continue
-        _apply(correction, into, int(lane), angular_rate)
 
+    about: State
+    angular_rate: float
+    kept: int
+    starts: list[Array] = field(default_factory=list)
+    ends: list[Array] = field(default_factory=list)
+    columns: list[tuple[Array, Array]] = field(default_factory=list)
+    best: tuple[float, State] | None = None  # smallest change of a beat so far, and the state at its end
+    leapt: bool = False
 
-def _coordinates(state: State, about: State, lane: int, angular_rate: float) -> Array:
-    """State of one lane as a vector, in local coordinates about the pose of another."""
-    n = len(state.V) - 2
-    R0 = about.R[:n, :, lane].reshape(n, 3, 3)
-    R = state.R[:n, :, lane].reshape(n, 3, 3)
-    turn = Rotation.from_matrix(np.swapaxes(R0, 1, 2) @ R).as_rotvec() * _LENGTH
-    shift = np.einsum("nji,nj->ni", R0, state.p[:n, :, lane] - about.p[:n, :, lane])
-    twist = state.V[:n, :, lane] / angular_rate
-    twist = np.concatenate([twist[:, :3] * _LENGTH, twist[:, 3:]], axis=1)
-    return np.concatenate([turn, shift, twist], axis=1).ravel()
+    def add(self, start: State, end: State) -> tuple[State, float]:
+        """Learn from one beat; the state from which to start the next, and how far (m) that is from this start.
 
+        That distance is what is left between this beat and the periodic one, as far as the beats can tell.
+        """
+        x, arrived = self._coordinates(start), self._coordinates(end)
+        change = arrived - x
+        size = float(np.linalg.norm(change))
+        if self.leapt and self.best is not None and not size <= WORSE * self.best[0]:
+            return self.step_back(), np.inf
+        if self.best is None or size <= self.best[0]:
+            self.best = (size, end)
+        if self.starts:
+            moved, left = arrived - self.ends[-1], change - (self.ends[-1] - self.starts[-1])
+            self.columns = [*self.columns, (moved, left)][-self.kept :] if self.kept else []
+        self.starts, self.ends = [x], [arrived]
+        correction = self._correction(change)
+        self.leapt = bool(correction.any())
+        target = arrived + correction
+        return (self._state(target, end) if self.leapt else end), float(np.abs(target - x).max())
 
-def _apply(correction: Array, state: State, lane: int, angular_rate: float) -> None:
-    n = len(state.V) - 2
-    x = correction.reshape(n, 12)
-    R0 = state.R[:n, :, lane].reshape(n, 3, 3)
-    state.p[:n, :, lane] += np.einsum("nij,nj->ni", R0, x[:, 3:6])
-    state.R[:n, :, lane] = (R0 @ Rotation.from_rotvec(x[:, :3] / _LENGTH).as_matrix()).reshape(n, 9)
-    state.V[:n, :3, lane] += x[:, 6:9] / _LENGTH * angular_rate
-    state.V[:n, 3:, lane] += x[:, 9:12] * angular_rate
+    def step_back(self) -> State:
+        """Where to go on after a leap that made things worse: from the end of the best beat, having learnt nothing."""
+        if self.best is None or not self.leapt:
+            raise ValueError("there was no leap to take back")
+        _, state = self.best
+        self.columns, self.starts, self.ends, self.best, self.leapt = [], [], [], None, False
+        return State(*(array.copy() for array in state))
+
+    def restart(self) -> None:
+        """The map has changed a little (another step): keep what is known of its slope, compare no beat across."""
+        self.starts, self.ends, self.best, self.leapt = [], [], None, False
+
+    def _correction(self, change: Array) -> Array:
+        if not self.columns or not np.all(np.isfinite(change)):
+            return np.zeros_like(change)
+        moved, left = (np.array(part).T for part in zip(*self.columns, strict=True))
+        size = np.linalg.norm(left, axis=0)
+        size[size == 0.0] = 1.0
+        weights, *_ = np.linalg.lstsq(left / size, -change, rcond=_RANK)
+        correction = (moved / size) @ weights
+        # a longer one means that there is no useful linear map yet
+        return correction if np.linalg.norm(correction) <= LONGEST * np.linalg.norm(change) else np.zeros_like(change)
+
+    def _coordinates(self, state: State) -> Array:
+        n = len(state.V) - 2
+        R0, R = self.about.R[:n].reshape(n, 3, 3), state.R[:n].reshape(n, 3, 3)
+        if not np.all(np.isfinite(R)):
+            return np.full(12 * n, np.nan)
+        turn = Rotation.from_matrix(np.swapaxes(R0, 1, 2) @ R).as_rotvec() * _LENGTH
+        twist = state.V[:n] / self.angular_rate
+        parts = [turn, state.p[:n] - self.about.p[:n], twist[:, :3] * _LENGTH, twist[:, 3:]]
+        return np.concatenate(parts, axis=1).ravel()
+
+    def _state(self, coordinates: Array, rods: State) -> State:
+        """The state at ``coordinates``, the driving rods as in ``rods``."""
+        n = len(rods.V) - 2
+        x = coordinates.reshape(n, 12)
+        found = State(*(array.copy() for array in rods))
+        R0 = self.about.R[:n].reshape(n, 3, 3)
+        found.R[:n] = (R0 @ Rotation.from_rotvec(x[:, :3] / _LENGTH).as_matrix()).reshape(n, 9)
+        found.p[:n] = self.about.p[:n] + x[:, 3:6]
+        found.V[:n, :3] = x[:, 6:9] / _LENGTH * self.angular_rate
+        found.V[:n, 3:] = x[:, 9:12] * self.angular_rate
+        return found

@@ -13,7 +13,7 @@ def main() -> None:
     """Simulate two beats of the coarsest wing once."""
     start = time.perf_counter()
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=8, max_beats=2))
-    model.beat([[gene.nominal for gene in model.genes]], blank_recording(model.wing, WIND_TUNNEL[0]))
+    model.beat([gene.nominal for gene in model.genes], blank_recording(model.wing, WIND_TUNNEL[0]))
     print(f"kernels ready after {time.perf_counter() - start:.0f} s")
 
 

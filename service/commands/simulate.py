@@ -6,12 +6,13 @@ import csv
 import json
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
+from service.commands.loads import check_suffix, summary, write_loads, write_plot
 from service.commands.output import AsJson, Url, mm, note, print_json, progress, say, table
 
 Track = list[float | None]
@@ -25,27 +26,83 @@ def simulate(
         list[str] | None, typer.Option(help="FILE.json or name=value; repeatable. Others stay nominal.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks as CSV.")] = None,
+    loads: Annotated[
+        Path | None,
+        typer.Option(
+            "--loads",
+            "--outputs",
+            help="Write loads, powers and energies over the beat: FILE.csv (a row per instant) or FILE.json.",
+        ),
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw motor torque, powers, lift, bending moments and energies: FILE.html.")
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="NAME=VALUE; repeatable. Loads under another condition than the recording's, without tracks: "
+            "flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg."
+        ),
+    ] = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
     """Simulate one recording on the server and say how far it is from what was recorded.
 
-    Example: wingfit simulate --dataset ID --genome best.json --genome E_f=6e6 -o tracks.csv
+    With --loads or --plot also what acts inside the wing and on it: motor torque and power, lift and thrust, the load
+    in every connector, and the balance of energy.
+
+    Example: wingfit simulate --dataset ID --genome best.json --genome E_f=6e6 --loads loads.csv --plot loads.html
     """
-    values = read_genome(genome or [])
+    check_suffix(loads, "--loads", (".csv", ".json"))
+    check_suffix(plot, "--plot", (".html",))
+    if at and output:
+        raise typer.BadParameter(
+            "no tracks were recorded under another condition; leave out --output", param_hint="--at"
+        )
+    values, condition = read_genome(genome or []), read_condition(at or [])
+    wanted = loads is not None or plot is not None or bool(condition)
     with Client(url) as client, progress("simulating") as report:
         report(None)
         recording = recording or client.dataset(dataset)["recordings"][0]["name"]
-        answer = client.simulate(dataset, recording, division=division, genome=values)
+        answer: a.Simulation | a.Loads
+        if condition:
+            answer = client.loads_under(dataset, recording, condition=condition, division=division, genome=values)
+        else:
+            answer = client.simulate(dataset, recording, division=division, genome=values, outputs=wanted)
     if output:
-        write_tracks(answer, output)
+        write_tracks(cast(a.Simulation, answer), output)
         note(f"tracks written to {output}")
+    if loads:
+        write_loads(answer["outputs"], loads)
+        note(f"loads written to {loads}")
+    if plot:
+        write_plot(answer["outputs"], plot, ", ".join([f"Loads under {recording}", *(at or []), f"{division} bodies"]))
+        note(f"plots written to {plot}; open it in a browser")
     if as_json:
         print_json(answer)
         return
-    rows = [[name, mm(distance)] for name, distance in marker_distances(answer).items()]
-    table(["marker", ">mean distance mm"], rows)
-    say(f"recording {answer['recording']}: mean distance {mm(answer['mean_distance_mm'])} mm per marker")
+    if not condition:
+        rows = [[name, mm(distance)] for name, distance in marker_distances(cast(a.Simulation, answer)).items()]
+        table(["marker", ">mean distance mm"], rows)
+    if wanted:
+        table(["over one beat", "value"], summary(answer["outputs"]))
+    if not condition:
+        distance = cast(a.Simulation, answer)["mean_distance_mm"]
+        say(f"recording {recording}: mean distance {mm(distance)} mm per marker")
+
+
+def read_condition(words: list[str]) -> dict[str, float]:
+    """What ``name=value`` words change of a condition; the server knows the limits."""
+    values = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        if name not in a.CONDITION:
+            raise typer.BadParameter(f"{word}: the name must be one of {', '.join(a.CONDITION)}", param_hint="--at")
+        if not _is_number(value):
+            raise typer.BadParameter(f"{word}: give NAME=VALUE, such as airspeed_m_s=6", param_hint="--at")
+        values[name] = float(value)
+    return values
 
 
 def read_genome(words: list[str]) -> dict[str, float]:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Header, Query
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from calibration.search import CalibrationSpec
-from records import Dataset
-from service import http, store, views
+from records import Dataset, Recording
+from service import http, load_views, store, views
 from service.events import stream
+from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.routes.runs import gene_names, load
 from service.schemas import (
     ComparisonOut,
     GenomeOut,
     HistoryItem,
+    LoadsIn,
     Page,
     ResultOut,
     SimulationIn,
@@ -24,6 +27,7 @@ from service.schemas import (
 )
 from service.state import Service, ServiceDep
 from service.tables import RunRow
+from sim.outputs import Outputs
 from workers.jobs import State
 
 router = APIRouter(prefix="/v1", tags=["outcomes"])
@@ -109,6 +113,27 @@ def comparison(
     return JSONResponse(views.comparison(tracks))
 
 
+@router.get("/runs/{run_id}/loads", response_model=LoadsOut, responses=http.errors(404, 409), summary="Loads")
+def loads(
+    service: ServiceDep,
+    run_id: str,
+    recording: Annotated[str | None, Query(max_length=200, description="default: the first of the dataset")] = None,
+    genome: Literal["best", "nominal"] = "best",
+    outputs: Annotated[
+        list[OutputName] | None, Query(max_length=100, description="repeatable; default: all of them")
+    ] = None,
+) -> Response:
+    """Return motor torques, forces, powers and energies over one beat under a recording's condition."""
+    row = _row(service, run_id)
+    dataset = service.datasets.get(row.dataset_id)
+    wanted = dataset.recordings[0].name if recording is None else recording
+    _check_recording(dataset, wanted, "query.recording")
+    spec = store.spec(row)
+    values = _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    found = _loads(service, spec, dataset, values, dataset.recording(wanted))
+    return JSONResponse({"recording": wanted, "outputs": load_views.outputs(found, load_views.wanted(outputs or True))})
+
+
 @router.get(
     "/runs/{run_id}/events",
     response_class=StreamingResponse,
@@ -146,6 +171,35 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
     dataset = load(service, body.dataset_id)
     _check_recording(dataset, body.recording, "body.recording")
+    spec, values = _asked(service, dataset, body)
+    try:
+        tracks = service.engine.compare(spec, dataset, values, body.recording)
+    except ValueError as error:
+        raise _failed(error) from None
+    answer = views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)}
+    names = load_views.wanted(body.outputs)
+    if names:
+        found = _loads(service, spec, dataset, values, dataset.recording(body.recording))
+        answer["outputs"] = load_views.outputs(found, names)
+    return JSONResponse(answer)
+
+
+@router.post("/loads", response_model=LoadsOut, responses=http.errors(409), summary="Simulate any condition's loads")
+def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
+    """Simulate a genome of the caller's for its loads, under any condition; nothing is stored."""
+    dataset = load(service, body.dataset_id)
+    _check_recording(dataset, body.recording, "body.recording")
+    spec, values = _asked(service, dataset, body)
+    recorded = dataset.recording(body.recording)
+    changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))
+    found = _loads(service, spec, dataset, values, changed)
+    return JSONResponse(
+        {"recording": body.recording, "outputs": load_views.outputs(found, load_views.wanted(body.outputs))}
+    )
+
+
+def _asked(service: Service, dataset: Dataset, body: SimulationIn) -> tuple[CalibrationSpec, dict[str, float]]:
+    """Division and full genome of a simulation; a 422 where they cannot be."""
     spec = CalibrationSpec(division=body.division, bounds_factor=WIDEST_BOUNDS)
     known = gene_names(service, spec, dataset)
     unknown = [name for name in body.genome if name not in known]
@@ -153,14 +207,18 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
         message = f"unknown gene; known are {', '.join(known)}"
         raise invalid("unknown genes", [error_item("body.genome", name, message) for name in unknown])
     try:
-        values = service.engine.genome(spec, dataset, body.genome)
+        return spec, service.engine.genome(spec, dataset, body.genome)
     except ValueError as error:
         raise invalid("a value is out of bounds", [error_item("body.genome", None, str(error))]) from None
+
+
+def _loads(
+    service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], recording: Recording
+) -> Outputs:
     try:
-        tracks = service.engine.compare(spec, dataset, values, body.recording)
+        return service.engine.loads(spec, dataset, genome, recording)
     except ValueError as error:
         raise _failed(error) from None
-    return JSONResponse(views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)})
 
 
 def _row(service: Service, run_id: str) -> RunRow:

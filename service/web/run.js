@@ -4,6 +4,7 @@ import { call, follow, get, history, isFinal, part } from "./api.js";
 import { $, copy, curl, plural, toast, when } from "./format.js";
 import { drawHistory } from "./history.js";
 import { badge, runName, setBar, timeLeft } from "./lists.js";
+import { redrawLoads } from "./loads.js";
 import { remove } from "./submit.js";
 import { drawGenes, drawMisfit, drawNumbers } from "./tables.js";
 import { redrawWing, setUpViewer, showWing } from "./viewer.js";
@@ -69,6 +70,7 @@ export function redraw() {
   if (!run) return;
   drawFitness();
   redrawWing();
+  redrawLoads();
 }
 
 function listen() {

@@ -2,6 +2,7 @@
 
 import { get, part } from "./api.js";
 import { $, mm } from "./format.js";
+import { clearLoads, setUpLoads, showLoads } from "./loads.js";
 import { byPhase, drawBeat, drawWing, meanDistance } from "./wing.js";
 
 const BEAT_MS = 3000;
@@ -18,6 +19,7 @@ let restart = false;
 const genome = () => document.querySelector("input[name=genome]:checked").value;
 
 export function setUpViewer() {
+  setUpLoads();
   $("recording").addEventListener("change", () => load());
   document.querySelectorAll("input[name=genome]").forEach((input) => input.addEventListener("change", () => load()));
   $("phase").addEventListener("input", () => { stop(); draw(); });
@@ -32,6 +34,7 @@ export function showWing(next, dataset) {
   if (changed) {
     stop();
     tracks = null;
+    clearLoads();
     fillRecordings(dataset);
   }
   const hasBest = run.generations > 0;
@@ -68,7 +71,9 @@ async function load({ quiet = false } = {}) {
     if (mine !== request) return;
     tracks = byPhase(answer);
   } catch (error) {
-    if (mine === request) $("wing-note").textContent = error.message;
+    if (mine !== request) return;
+    $("wing-note").textContent = error.message;
+    clearLoads();
     return;
   }
   const slider = $("phase");
@@ -76,6 +81,7 @@ async function load({ quiet = false } = {}) {
   const which = genome() === "best" ? (run.state === "SUCCEEDED" ? "best genome" : "best genome so far") : "nominal genome";
   $("wing-note").textContent = `Mean distance ${mm(meanDistance(tracks))} mm per marker on ${tracks.recording} with the ${which}.`;
   draw();
+  showLoads(run, tracks.recording, genome(), genome() === "best" ? run.generations : 0);
 }
 
 async function draw() {

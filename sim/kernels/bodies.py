@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.kernels.jit import kernel
+from sim.kernels.matrices import cross, load_vector
 from sim.kernels.vector import load, load0, store, store0
 
 Array = npt.NDArray[np.float64]
@@ -63,6 +64,17 @@ def local_rate(xi: Array, V: Array, rate: Array) -> None:
         store(rate, n, 3, a + u + 0.5 * g + (y * k - z * h) * (1.0 / 6.0))
         store(rate, n, 4, b + v + 0.5 * h + (z * g - x * k) * (1.0 / 6.0))
         store(rate, n, 5, c + q + 0.5 * k + (x * h - y * g) * (1.0 / 6.0))
+
+
+@kernel
+def rate_change(V: Array, xi: Array, factor: float, out: Array) -> None:
+    """Add ``factor`` A xi to ``out``: the change of :func:`local_rate` by xi about xi = 0, (xi x omega / 2, xi x v)."""
+    for n in range(len(V)):
+        x = load_vector(xi, n, 0)
+        a, b = cross(x, load_vector(V, n, 0)), cross(x, load_vector(V, n, 3))
+        for k in range(3):
+            store(out, n, k, load(out, n, k) + 0.5 * factor * a[k])
+            store(out, n, 3 + k, load(out, n, 3 + k) + factor * b[k])
 
 
 @kernel

@@ -2,8 +2,9 @@
 
 A connector joins frame A on body ``first`` (at arm a) to frame B on body ``second`` (at arm b), both aligned with
 their bodies. Q = R_A^T R_B and d = R_A^T (o_B - o_A) are B's pose in A. Energies (physics of the spring):
-V_o = -tr(G_o Q) + tr(G_o), V_t = 1/4 d^T K_t d + 1/4 d^T Q K_t Q^T d. The wrench on B, in A's axes at o_B, is minus
-their gradient; that on A balances it: force and moment vanish in sum, the forces being d apart.
+V_o = -tr(G_o Q) + tr(G_o), V_t = 1/4 d^T K_t d + 1/4 d^T Q K_t Q^T d and, where rotation and translation are coupled,
+V_c = tr(G_c Q^T d~), signed so that it is phi^T K_c d for small rotations phi. The wrench on B, in A's axes at o_B, is
+minus their gradient; that on A balances it: force and moment vanish in sum, the forces being d apart.
 """
 
 from __future__ import annotations
@@ -11,8 +12,23 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import kernel
-from sim.kernels.vector import load, load0, store, store0
+from sim.kernels.jit import inlined, kernel
+from sim.kernels.matrices import (
+    Nine,
+    Three,
+    axial,
+    co_stiffness,
+    co_stiffness_matrix,
+    cross,
+    load_matrix,
+    load_vector,
+    product,
+    times,
+    times_floats,
+    trace_minus,
+    transposed,
+)
+from sim.kernels.vector import Vector, load, load0, store, store0
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -48,6 +64,76 @@ def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: 
         store(Q, c, 8, i2 * j2 + i5 * j5 + i8 * j8)
 
 
+@inlined
+def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three, Vector]:
+    """Moment and force of the spring on B in A's axes at o_B, and its energy (thesis Eqs. 5-7)."""
+    g = co_stiffness(ko)
+    x, y, z = d
+    u = (
+        kt[0] * (Q[0] * x + Q[3] * y + Q[6] * z),
+        kt[1] * (Q[1] * x + Q[4] * y + Q[7] * z),
+        kt[2] * (Q[2] * x + Q[5] * y + Q[8] * z),
+    )
+    s = times(Q, u)  # Q K_t Q^T d
+    bend = cross(d, s)
+    t = (
+        Q[5] * g[2] - Q[7] * g[1] + 0.5 * bend[0],
+        Q[6] * g[0] - Q[2] * g[2] + 0.5 * bend[1],
+        Q[1] * g[1] - Q[3] * g[0] + 0.5 * bend[2],
+    )
+    f = (-0.5 * (kt[0] * x + s[0]), -0.5 * (kt[1] * y + s[1]), -0.5 * (kt[2] * z + s[2]))
+    energy = g[0] * (1.0 - Q[0]) + g[1] * (1.0 - Q[4]) + g[2] * (1.0 - Q[8])
+    return t, f, energy - 0.5 * (f[0] * x + f[1] * y + f[2] * z)
+
+
+@inlined
+def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
+    """The same of the coupling stiffness, with N = Q G_c: V_c = n . d for n~ = N - N^T."""
+    n = axial(N)
+    t = times(transposed(trace_minus(N)), d)
+    return (-t[0], -t[1], -t[2]), (-n[0], -n[1], -n[2]), n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+
+
+@inlined
+def relative_twist(
+    Q: Nine, e: Three, arm: Three, omega: Three, velocity: Three, turning: Three, v: Three
+) -> tuple[Three, Three]:
+    """Angular and linear velocity of B relative to A at o_B, in A's axes.
+
+    ``omega``, ``velocity`` are the first body's; ``turning`` is the second's angular velocity in A's axes, ``v`` its
+    velocity in its own; e and ``arm`` lead from the two centres to o_B, in A's axes.
+    """
+    there, here, moving = cross(turning, arm), cross(omega, e), times(Q, v)
+    return (
+        (turning[0] - omega[0], turning[1] - omega[1], turning[2] - omega[2]),
+        (
+            moving[0] + there[0] - velocity[0] - here[0],
+            moving[1] + there[1] - velocity[1] - here[1],
+            moving[2] + there[2] - velocity[2] - here[2],
+        ),
+    )
+
+
+@inlined
+def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Three, Three]:
+    """Moment and force with which the damper resists (thesis Eq. 4)."""
+    return (
+        (do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]),
+        (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]),
+    )
+
+
+@inlined
+def add_wrench(wrench: Array, n: int, t: Three, f: Three) -> None:
+    """Add a wrench to that of body n."""
+    store(wrench, n, 0, load(wrench, n, 0) + t[0])
+    store(wrench, n, 1, load(wrench, n, 1) + t[1])
+    store(wrench, n, 2, load(wrench, n, 2) + t[2])
+    store(wrench, n, 3, load(wrench, n, 3) + f[0])
+    store(wrench, n, 4, load(wrench, n, 4) + f[1])
+    store(wrench, n, 5, load(wrench, n, 5) + f[2])
+
+
 @kernel
 def connect(
     first: Index,
@@ -56,8 +142,9 @@ def connect(
     b: Array,
     K: Array,
     D: Array,
-    Q: Array,
-    d: Array,
+    coupling: Array,
+    Q_: Array,
+    d_: Array,
     V: Array,
     wrench: Array,
     dissipated: Array,
@@ -65,66 +152,36 @@ def connect(
 ) -> None:
     """Add spring and damper wrenches to both bodies; power lost in dampers and energy in springs go to the lanes.
 
-    K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A).
+    K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling
+    [C, 9, W]: the symmetric K_c between them, row by row, or empty where there is none.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
-        ax, ay, az = a[c, 0], a[c, 1], a[c, 2]
-        bx, by, bz = b[c, 0], b[c, 1], b[c, 2]
-        q0, q1, q2 = load(Q, c, 0), load(Q, c, 1), load(Q, c, 2)
-        q3, q4, q5 = load(Q, c, 3), load(Q, c, 4), load(Q, c, 5)
-        q6, q7, q8 = load(Q, c, 6), load(Q, c, 7), load(Q, c, 8)
-        x, y, z = load(d, c, 0), load(d, c, 1), load(d, c, 2)
-        ex, ey, ez = ax + x, ay + y, az + z
-        # co-stiffness G = tr(K)/2 - K (Eq. 5)
-        kx, ky, kz = load(K, c, 0), load(K, c, 1), load(K, c, 2)
-        gx, gy, gz = 0.5 * (ky + kz - kx), 0.5 * (kz + kx - ky), 0.5 * (kx + ky - kz)
-        tx, ty, tz = q5 * gz - q7 * gy, q6 * gx - q2 * gz, q1 * gy - q3 * gx
-        energy = gx * (1.0 - q0) + gy * (1.0 - q4) + gz * (1.0 - q8)
-        # S d = Q K_t Q^T d
-        kx, ky, kz = load(K, c, 3), load(K, c, 4), load(K, c, 5)
-        ux = kx * (q0 * x + q3 * y + q6 * z)
-        uy = ky * (q1 * x + q4 * y + q7 * z)
-        uz = kz * (q2 * x + q5 * y + q8 * z)
-        sx, sy, sz = q0 * ux + q1 * uy + q2 * uz, q3 * ux + q4 * uy + q5 * uz, q6 * ux + q7 * uy + q8 * uz
-        tx += 0.5 * (y * sz - z * sy)
-        ty += 0.5 * (z * sx - x * sz)
-        tz += 0.5 * (x * sy - y * sx)
-        fx, fy, fz = -0.5 * (kx * x + sx), -0.5 * (ky * y + sy), -0.5 * (kz * z + sz)
-        energy += -0.5 * (fx * x + fy * y + fz * z)
-        # relative twist of B in A, at o_B
-        ox, oy, oz = load(V, i, 0), load(V, i, 1), load(V, i, 2)
-        wx, wy, wz = load(V, j, 0), load(V, j, 1), load(V, j, 2)
-        vx = load(V, j, 3) + wy * bz - wz * by
-        vy = load(V, j, 4) + wz * bx - wx * bz
-        vz = load(V, j, 5) + wx * by - wy * bx
-        rx = q0 * wx + q1 * wy + q2 * wz - ox
-        ry = q3 * wx + q4 * wy + q5 * wz - oy
-        rz = q6 * wx + q7 * wy + q8 * wz - oz
-        ux = q0 * vx + q1 * vy + q2 * vz - load(V, i, 3) - (oy * ez - oz * ey)
-        uy = q3 * vx + q4 * vy + q5 * vz - load(V, i, 4) - (oz * ex - ox * ez)
-        uz = q6 * vx + q7 * vy + q8 * vz - load(V, i, 5) - (ox * ey - oy * ex)
-        sx, sy, sz = load(D, c, 0) * rx, load(D, c, 1) * ry, load(D, c, 2) * rz
-        loss = sx * rx + sy * ry + sz * rz
-        tx, ty, tz = tx - sx, ty - sy, tz - sz
-        sx, sy, sz = load(D, c, 3) * ux, load(D, c, 4) * uy, load(D, c, 5) * uz
-        loss += sx * ux + sy * uy + sz * uz
-        fx, fy, fz = fx - sx, fy - sy, fz - sz
+        Q, d = load_matrix(Q_, c), load_vector(d_, c, 0)
+        t, f, energy = spring_wrench(Q, d, load_vector(K, c, 0), load_vector(K, c, 3))
+        if len(coupling):
+            more = coupling_wrench(product(Q, co_stiffness_matrix(load_matrix(coupling, c))), d)
+            t = (t[0] + more[0][0], t[1] + more[0][1], t[2] + more[0][2])
+            f = (f[0] + more[1][0], f[1] + more[1][1], f[2] + more[1][2])
+            energy = energy + more[2]
+        e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
+        arm = times_floats(Q, b[c, 0], b[c, 1], b[c, 2])
+        turning = times(Q, load_vector(V, j, 0))
+        rate, slide = relative_twist(
+            Q, e, arm, load_vector(V, i, 0), load_vector(V, i, 3), turning, load_vector(V, j, 3)
+        )
+        loss_t, loss_f = damper_wrench(rate, slide, load_vector(D, c, 0), load_vector(D, c, 3))
+        loss = loss_t[0] * rate[0] + loss_t[1] * rate[1] + loss_t[2] * rate[2]
+        loss += loss_f[0] * slide[0] + loss_f[1] * slide[1] + loss_f[2] * slide[2]
+        t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
+        f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
         store0(dissipated, load0(dissipated) + loss)
         store0(stored, load0(stored) + energy)
-        store(wrench, i, 0, load(wrench, i, 0) - (tx + ey * fz - ez * fy))
-        store(wrench, i, 1, load(wrench, i, 1) - (ty + ez * fx - ex * fz))
-        store(wrench, i, 2, load(wrench, i, 2) - (tz + ex * fy - ey * fx))
-        store(wrench, i, 3, load(wrench, i, 3) - fx)
-        store(wrench, i, 4, load(wrench, i, 4) - fy)
-        store(wrench, i, 5, load(wrench, i, 5) - fz)
-        sx, sy, sz = q0 * fx + q3 * fy + q6 * fz, q1 * fx + q4 * fy + q7 * fz, q2 * fx + q5 * fy + q8 * fz
-        store(wrench, j, 0, load(wrench, j, 0) + q0 * tx + q3 * ty + q6 * tz + by * sz - bz * sy)
-        store(wrench, j, 1, load(wrench, j, 1) + q1 * tx + q4 * ty + q7 * tz + bz * sx - bx * sz)
-        store(wrench, j, 2, load(wrench, j, 2) + q2 * tx + q5 * ty + q8 * tz + bx * sy - by * sx)
-        store(wrench, j, 3, load(wrench, j, 3) + sx)
-        store(wrench, j, 4, load(wrench, j, 4) + sy)
-        store(wrench, j, 5, load(wrench, j, 5) + sz)
+        m = cross(e, f)
+        add_wrench(wrench, i, (-t[0] - m[0], -t[1] - m[1], -t[2] - m[2]), (-f[0], -f[1], -f[2]))
+        m = cross(arm, f)
+        back = transposed(Q)
+        add_wrench(wrench, j, times(back, (t[0] + m[0], t[1] + m[1], t[2] + m[2])), times(back, f))
 
 
 @kernel

@@ -1,9 +1,10 @@
-"""Rosenbrock-W integration of the wing over its beats, eight individuals at a time.
+"""Rosenbrock integration of the wing over its beats, eight individuals at a time.
 
-The method is ROS34PW2 (Rang and Angermann, BIT 45, 2005): four stages, third order for any approximation of the
-Jacobian, L-stable, stiffly accurate. That freedom lets the linearisation keep only what makes it symmetric positive
-definite (inertia, material stiffness, dampers, the air's normal damping). Driving rods are bodies with a prescribed
-acceleration, so that stiff roots see consistent stages; their pose is set to the exact profile at each step's start.
+The method is RODAS4P2 (Steinebach, *Improvement of Rosenbrock-Wanner Method RODASP*, 2020): six stages, fourth order,
+L-stable, stiffly accurate, made to keep its order on stiff problems and to lose little when the Jacobian is not quite
+exact. Ours is exact but for the air, of which it has the damping along the normal. Driving rods are bodies with a
+prescribed acceleration, so that stiff roots see consistent stages; their pose is set to the exact profile at each
+step's start.
 """
 
 from __future__ import annotations
@@ -16,39 +17,46 @@ import numpy.typing as npt
 
 from sim.kernels import LANES
 from sim.kernels.air import strip_forces
-from sim.kernels.bodies import inertial, kinetic_and_height, local_rate, move, times_mass, track
+from sim.kernels.bodies import inertial, kinetic_and_height, local_rate, move, rate_change, times_mass, track
 from sim.kernels.connectors import connect, relative_pose, tangent
 from sim.kernels.jit import kernel
-from sim.kernels.linear import add_connectors, factor, solve, start_blocks
+from sim.kernels.linear import factor, solve, subtract_column
+from sim.kernels.tangents import add_connectors, add_own_damping, start_blocks
 from sim.kernels.vector import load, load0, load3, store, store1, store3
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
-GAMMA = 4.3586652150845900e-01
-ALPHA = np.array(
+STAGES = 6
+GAMMA = 0.25
+NODES = np.array([0.0, 0.75, 0.321448134013046, 0.519745732277726, 1.0, 1.0])
+# Sum of the gammas of each stage: how much of the drive's change of acceleration it sees.
+SLOPES = np.array([0.25, -0.5, -0.189532918363016, 0.085612108792769, 0.0, 0.0])
+# In the variables U = Gamma k (Hairer and Wanner, Solving ODEs II, IV.7) no product with the Jacobian is needed: one is
+# at y + sum of STAGE U, its right-hand side has sum of COUPLING U / h. The last two stages and the result each
+# add the U before to the state before.
+STAGE = np.array(
     [
-        [0.0, 0.0, 0.0, 0.0],
-        [8.7173304301691801e-01, 0.0, 0.0, 0.0],
-        [8.4457060015369423e-01, -1.1299064236484185e-01, 0.0, 0.0],
-        [0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+        [3.0, 0.0, 0.0, 0.0, 0.0],
+        [0.906377755268814, -0.189707390391685, 0.0, 0.0, 0.0],
+        [3.758617027739064, 1.161741776019525, -0.849258085312803, 0.0, 0.0],
+        [7.089566927282776, 4.573591406461604, -8.423496976860259, -0.959280113459775, 0.0],
+        [7.089566927282776, 4.573591406461604, -8.423496976860259, -0.959280113459775, 1.0],
     ]
 )
-GAMMAS = np.array(
+COUPLING = np.array(
     [
-        [GAMMA, 0.0, 0.0, 0.0],
-        [-8.7173304301691801e-01, GAMMA, 0.0, 0.0],
-        [-9.0338057013044082e-01, 5.4180672388095326e-02, GAMMA, 0.0],
-        [2.4212380706095346e-01, -1.2232505839045147e00, 5.4526025533510214e-01, GAMMA],
+        [0.0, 0.0, 0.0, 0.0, 0.0],
+        [-12.0, 0.0, 0.0, 0.0, 0.0],
+        [-6.354581592719008, 0.338972550544623, 0.0, 0.0, 0.0],
+        [-8.575016317114033, -7.606483992117508, 12.224997650124820, 0.0, 0.0],
+        [-5.888975457523102, -8.157396617841821, 24.805546872612922, 12.790401512796979, 0.0],
+        [-4.408651676063871, -6.692003137674639, 24.625568527593117, 16.627521966636085, -5.714285714285718],
     ]
 )
-WEIGHTS = np.array([2.4212380706095346e-01, -1.2232505839045147e00, 1.5452602553351020e00, GAMMA])
-NODES = ALPHA.sum(axis=1)
-# In the variables U = Gamma k (Hairer and Wanner, Solving ODEs II, IV.7) no product with the Jacobian is needed.
-_INVERSE = np.linalg.inv(GAMMAS)
-STAGE = ALPHA @ _INVERSE
-COUPLING = np.diag(np.full(4, 1.0 / GAMMA)) - _INVERSE
-UPDATE = WEIGHTS @ _INVERSE
+
+NO_COUPLING = np.zeros((0, 9, LANES))
 
 # Ports through which power enters the wing.
 DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
@@ -58,14 +66,16 @@ MAX_ROTATION = 1.0  # rad in one step; beyond, the individual has diverged
 class Wiring(NamedTuple):
     """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
 
-    Connectors from number ``driven`` on start at a driving rod.
+    Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
+    (``sim.kernels.tangents``), the rest of its structure is that of ``sim.kernels.linear``.
     """
 
     mass: Array
     inertia: Array
     first: Index
     second: Index
-    block: Index
+    lower: Index
+    upper: Index
     driven: int
     a: Array
     b: Array
@@ -94,7 +104,8 @@ class Setting(NamedTuple):
 class Lanes(NamedTuple):
     """What differs between individuals.
 
-    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W].
+    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W], and
+    the stiffness [C, 9, W] that couples rotation with translation, or none.
     """
 
     stiffness: Array
@@ -104,6 +115,7 @@ class Lanes(NamedTuple):
     lift_x: Array
     drag_share: Array
     drag_x: Array
+    coupling: Array = NO_COUPLING
 
 
 class State(NamedTuple):
@@ -123,7 +135,7 @@ class Work(NamedTuple):
     xi: Array
     zero: Array
     r_xi: Array
-    rods_only: Array
+    known: Array
     U_xi: Array
     U_V: Array
     wrench: Array
@@ -132,10 +144,11 @@ class Work(NamedTuple):
     d: Array
     Q0: Array
     d0: Array
-    C: Array
-    hK: Array
+    against: Array
     blocks: Array
     normal_damping: Array
+    drag0: Array
+    V0: Array
     lost: Array
     stored: Array
     air_power: Array
@@ -189,11 +202,11 @@ def _combine(base: Array, U: Array, coefficient: Array, count: int, factor_: flo
             store(out, i, k, total)
 
 
-def new_work(wiring: Wiring, lanes: Lanes, step: float) -> Work:
-    """Scratch arrays for a group of lanes integrated with ``step``."""
+def new_work(wiring: Wiring, lanes: Lanes) -> Work:
+    """Scratch arrays for a group of lanes."""
     n, c = len(wiring.mass), len(wiring.first)
-    motion, stages = (n + 2, 6, LANES), (4, n + 2, 6, LANES)
-    hK = lanes.stiffness * (step * GAMMA)
+    motion, stages = (n + 2, 6, LANES), (STAGES, n + 2, 6, LANES)
+    blocks = n + 2 * len(wiring.below) + c - wiring.driven
     return Work(
         R=np.zeros((n + 2, 9, LANES)),
         p=np.zeros((n + 2, 3, LANES)),
@@ -201,7 +214,7 @@ def new_work(wiring: Wiring, lanes: Lanes, step: float) -> Work:
         xi=np.zeros(motion),
         zero=np.zeros(motion),
         r_xi=np.zeros(motion),
-        rods_only=np.zeros(motion),
+        known=np.zeros(motion),
         U_xi=np.zeros(stages),
         U_V=np.zeros(stages),
         wrench=np.zeros(motion),
@@ -210,10 +223,11 @@ def new_work(wiring: Wiring, lanes: Lanes, step: float) -> Work:
         d=np.zeros((c, 3, LANES)),
         Q0=np.zeros((c, 9, LANES)),
         d0=np.zeros((c, 3, LANES)),
-        C=lanes.damping + hK,
-        hK=hK,
-        blocks=np.zeros((n + len(wiring.below), 36, LANES)),
+        against=-lanes.damping,
+        blocks=np.zeros((blocks, 36, LANES)),
         normal_damping=np.zeros((n, LANES)),
+        drag0=np.zeros((n, LANES)),
+        V0=np.zeros(motion),
         lost=np.zeros(LANES),
         stored=np.zeros(LANES),
         air_power=np.zeros(LANES),
@@ -235,7 +249,7 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     work.air_force[:] = 0.0
     connect(
         wiring.first, wiring.second, wiring.a, wiring.b, lanes.stiffness, lanes.damping,
-        Q, d, work.V, w_, work.lost, work.stored,
+        lanes.coupling, Q, d, work.V, w_, work.lost, work.stored,
     )  # fmt: skip
     strip_forces(
         wiring.strip_start, wiring.weight, wiring.centroid, wiring.area, setting.density, setting.wind,
@@ -268,50 +282,74 @@ def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> 
 
 
 @kernel
-def linearise(wiring: Wiring, setting: Setting, work: Work) -> None:
-    """Assemble and factor the step's matrix at its start."""
+def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
+    """Assemble and factor the step's matrix at its start: S = M / (h gamma) - dW/dV - h gamma dW/dxi."""
+    hg = setting.step * GAMMA
     work.Q0[:] = work.Q
     work.d0[:] = work.d
-    start_blocks(wiring.mass, wiring.inertia, 1.0 / (setting.step * GAMMA), work.normal_damping, work.blocks)
-    add_connectors(wiring.first, wiring.second, wiring.block, wiring.a, wiring.b, work.C, work.Q0, work.d0, work.blocks)
+    work.drag0[:] = work.normal_damping
+    work.V0[:] = work.V
+    start_blocks(wiring.mass, wiring.inertia, work.drag0, work.R, work.V, setting.gravity, hg, work.blocks)
+    add_connectors(
+        wiring.first, wiring.second, wiring.lower, wiring.upper, wiring.a, wiring.b,
+        lanes.stiffness, lanes.damping, lanes.coupling, work.Q0, work.d0, work.V, hg, work.blocks,
+    )  # fmt: skip
     factor(wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
 @kernel
 def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage: int) -> None:
-    """Solve S U_V = M r_V - h gamma K r_xi - (D + h gamma K) U_rods for the stage; ``rods`` [2, 3] as in the drive.
+    """Solve the stage for U_V and U_xi; ``rods`` [2, 3] as in the drive.
 
-    r = f + sum of COUPLING U / h; then U_xi = h gamma (U_V + r_xi). The rods' U is known, their acceleration being
-    prescribed.
+    With r = f + sum of COUPLING U / h, the unknown Y = U_xi / (h gamma) meets S Y = M (r_V + r_xi / (h gamma)) -
+    dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi. The rods' Y is known, their acceleration being prescribed.
     """
     n, hg, k = len(wiring.mass), setting.step * GAMMA, wiring.driven
-    U_V, r_xi, wrench = work.U_V[stage], work.r_xi, work.wrench
+    r_xi, wrench, known = work.r_xi, work.wrench, work.known
     local_rate(work.xi, work.V, r_xi)
     _combine(r_xi, work.U_xi, COUPLING[stage], stage, 1.0 / setting.step, r_xi)
     _combine(work.zero, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, work.lead)
-    for rod in range(2):
-        value = hg * (load(work.lead, n + rod, 0) + rods[rod, 2])
-        store(U_V, n + rod, 0, value)
-        store(work.rods_only, n + rod, 0, value)
+    for rod in range(n, n + 2):
+        turn = hg * (load(work.lead, rod, 0) + rods[rod - n, 2])
+        store(known, rod, 0, turn + load(r_xi, rod, 0))
+        for j in range(1, 6):
+            store(known, rod, j, load(r_xi, rod, j))
+    for i in range(n):
+        for j in range(6):
+            store(work.lead, i, j, load(work.lead, i, j) + (1.0 / hg) * load(r_xi, i, j))
+    add_own_damping(wiring.mass, wiring.inertia, work.drag0, work.V0, r_xi, wrench)
     times_mass(wiring.mass, wiring.inertia, work.lead, wrench)
-    tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.hK, work.Q0, work.d0, r_xi, wrench)
-    tangent(
-        wiring.first[k:], wiring.second[k:], wiring.a[k:], wiring.b[k:], work.C[k:],
-        work.Q0[k:], work.d0[k:], work.rods_only, wrench,
-    )  # fmt: skip
+    tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)
+    for c in range(k, len(wiring.first)):
+        subtract_column(wiring.second[c], wiring.lower[c], work.blocks, known, wiring.first[c], wrench)
     solve(wiring.start, wiring.below, wiring.row, work.blocks, wrench)
-    U_V[:n] = wrench[:n]
+    known[:n] = wrench[:n]
     for i in range(n + 2):
         for j in range(6):
-            store3(work.U_xi, stage, i, j, hg * (load(U_V, i, j) + load(r_xi, i, j)))
+            y = load(known, i, j)
+            store3(work.U_xi, stage, i, j, hg * y)
+            store3(work.U_V, stage, i, j, y - load(r_xi, i, j))
+    rate_change(work.V0, known, -hg, work.U_V[stage])
+
+
+@kernel
+def _to_stage(work: Work, state: State, stage: int) -> None:
+    """Local coordinates, twist and pose of a stage."""
+    if stage < 5:
+        _combine(work.zero, work.U_xi, STAGE[stage], stage, 1.0, work.xi)
+        _combine(state.V, work.U_V, STAGE[stage], stage, 1.0, work.V)
+    else:
+        for i in range(work.xi.shape[0]):
+            for k in range(6):
+                store(work.xi, i, k, load(work.xi, i, k) + load3(work.U_xi, stage - 1, i, k))
+                store(work.V, i, k, load(work.V, i, k) + load3(work.U_V, stage - 1, i, k))
+    move(state.R, state.p, work.xi, work.R, work.p)
 
 
 @kernel
 def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
     """Take the step; a lane that turned too far or is no number any more is dead."""
-    _combine(work.zero, work.U_xi, UPDATE, 4, 1.0, work.xi)
-    _combine(state.V, work.U_V, UPDATE, 4, 1.0, work.V)
-    move(state.R, state.p, work.xi, work.R, work.p)
+    _to_stage(work, state, STAGES)
     state.R[:] = work.R
     state.p[:] = work.p
     state.V[:] = work.V
@@ -335,7 +373,7 @@ def advance(
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 
-    ``drive`` [n, 4, 2, 3]: angle, rate and acceleration of both rods at the four stages of every step. A lane whose
+    ``drive`` [n, STAGES, 2, 3]: angle, rate and acceleration of both rods at the stages of every step. A lane whose
     bodies turn more than MAX_ROTATION in a step, or become NaN, is marked dead in ``alive`` and runs on, ignored.
     """
     for t in range(len(drive)):
@@ -344,14 +382,12 @@ def advance(
         work.R[:] = state.R
         work.p[:] = state.p
         work.V[:] = state.V
-        for stage in range(4):
+        for stage in range(STAGES):
             if stage > 0:
-                _combine(work.zero, work.U_xi, STAGE[stage], stage, 1.0, work.xi)
-                _combine(state.V, work.U_V, STAGE[stage], stage, 1.0, work.V)
-                move(state.R, state.p, work.xi, work.R, work.p)
+                _to_stage(work, state, stage)
             forces(wiring, setting, lanes, work)
             if stage == 0:
                 note(wiring, setting, work, trace, t)
-                linearise(wiring, setting, work)
+                linearise(wiring, setting, lanes, work)
             solve_stage(wiring, setting, work, drive[t, stage], stage)
         finish_step(work, state, alive)

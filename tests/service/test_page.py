@@ -145,6 +145,29 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert seen.foreign == []
 
 
+def test_loads_are_drawn_when_somebody_looks_and_follow_the_choice(
+    seen: Seen, server: ServerProcess, dataset: dict[str, Any]
+) -> None:
+    asked: list[str] = []
+    seen.page.on("request", lambda request: asked.append(request.url) if "/loads?" in request.url else None)
+    seen.open(_finished(server, dataset["id"]))
+    seen.wait(DRAWN.format("wing", 2))
+    assert asked == [], "a simulation is paid for only when somebody looks"
+    seen.page.locator("#loads-section").scroll_into_view_if_needed()
+    for figure, traces in (("torque", 2), ("power", 4), ("air", 2), ("strips", 2), ("bending", 2), ("energy", 3)):
+        seen.wait(DRAWN.format(f"load-{figure}", traces - 1))
+    assert len(asked) == 1
+    best = seen.data("load-torque", 0, "y")
+    assert best[0] == pytest.approx(0, abs=1e-6)
+    assert "mean lift" in seen.page.inner_text("#loads-numbers")
+    seen.page.check("input[name=genome][value=nominal]", force=True)
+    seen.wait("document.getElementById('loads-note').textContent.includes('nominal')")
+    seen.wait(f"document.getElementById('load-torque').data[0].y[4] !== {json.dumps(best[4])}")
+    assert seen.data("load-torque", 0, "y")[4] == pytest.approx(-toy.NOMINAL["stiffness"])
+    assert seen.errors == []
+    assert seen.foreign == []
+
+
 def test_the_slider_moves_the_markers_and_the_toggle_the_simulation(
     seen: Seen, server: ServerProcess, dataset: dict[str, Any]
 ) -> None:

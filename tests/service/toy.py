@@ -21,6 +21,7 @@ from calibration.problem import Evaluation, Problem
 from calibration.result import Comparison, GeneResult, RecordingResult, Result
 from calibration.search import CalibrationSpec, Generation
 from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
+from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
 NOMINAL = {"stiffness": 1.0, "damping": 0.1}
@@ -164,6 +165,34 @@ class ToyEngine:
         simulated = np.nan_to_num(record.positions) + misfit(genome)
         phase = np.arange(len(record.times)) / len(record.times)
         return Comparison(recording, phase, record.markers, record.positions, simulated)
+
+    def loads(
+        self,
+        spec: CalibrationSpec,
+        dataset: Dataset,
+        genome: Mapping[str, float],
+        recording: Recording,
+    ) -> Outputs:
+        if genome["stiffness"] > 9:
+            raise ValueError("the simulation diverged at 0.1 s")
+        return _loads(genome["stiffness"] * recording.condition.flap_frequency / 3.0)
+
+
+def _loads(size: float, n: int = 16) -> Outputs:
+    """One beat of a wing of two bodies whose upstroke crosses the horizontal at a quarter of the drive's beat."""
+    phase = np.arange(n) / n
+    wave, six = np.cos(2 * np.pi * phase), np.zeros((n, 6))
+    six[:, 0], six[:, 5] = size * wave, 2 * size * wave
+    motor = Motor(0.5 * wave, 3.0 * wave, size * wave, 3.0 * size * wave**2)
+    connector = ConnectorLoad(
+        "front rod", "root", ("front rod", "1.1"), np.array([0.0, 0.03, 0.0]), six, six, wave**2, wave**2
+    )
+    force = np.stack([-wave - 0.1, 0 * wave, 3 * wave + 1.0], axis=1)
+    strips = (Strip("strip 1", (0.03, 0.2), force, -size * wave**2), Strip("strip 2", (0.2, 0.3), force, 0 * wave))
+    return Outputs(
+        phase, 0.25, (motor, motor), (connector,), (Section("root", 0.03, six), Section("strips 1-2", 0.2, six / 2)),
+        strips, np.zeros((n, 2, 6)), np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]), wave**2, wave**2, wave,
+    )  # fmt: skip
 
 
 def misfit(genome: Mapping[str, float]) -> float:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from records import FourierDrive, Hinge, Marker, Materials, Rod, Station, Wing
 from sim.division import Division
 from sim.kernels import LANES
-from sim.kernels.connectors import relative_pose, tangent
+from sim.kernels.connectors import connect, relative_pose, tangent
 from sim.kernels.integrate import Lanes
 from sim.simulate import at_rest
 from sim.structure import Structure, build
@@ -59,6 +59,17 @@ def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array
         tangent(w.first, w.second, w.a, w.b, group.stiffness, Q, d, x, out)
         K[:, column] = -out[:n, :, 0].ravel()
     return K
+
+
+def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) -> Array:
+    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], nothing moving."""
+    w = structure.wiring
+    Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
+    relative_pose(w.first, w.second, w.a, w.b, R, p, Q, d)
+    still, wrench = np.zeros((len(p), 6, LANES)), np.zeros((len(p), 6, LANES))
+    lost, stored, coupling = np.zeros(LANES), np.zeros(LANES), np.zeros((0, 9, LANES))
+    connect(w.first, w.second, w.a, w.b, springs, 0 * springs, coupling, Q, d, still, wrench, lost, stored)
+    return wrench
 
 
 def displacement(K: Array, load: Array, held: tuple[int, ...] = ()) -> Array:

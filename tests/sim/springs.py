@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,10 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pair:
-    """Poses (rotation vector, position) and twists of two bodies, arms of the connector, stiffness and damping."""
+    """Poses (rotation vector, position) and twists of two bodies, arms of the connector, stiffness and damping.
+
+    ``coupling`` [3, 3] couples rotation with translation.
+    """
 
     turn: Array
     place: Array
@@ -25,6 +28,7 @@ class Pair:
     b: Array
     K: Array
     D: Array
+    coupling: Array | None = None
 
     def moved(self, body: int, axis: int, by: float) -> Pair:
         """The pair with one body displaced along one of its own six axes (rotation x, y, z, then translation)."""
@@ -36,7 +40,7 @@ class Pair:
             turn[body] = (rotation * Rotation.from_rotvec(step)).as_rotvec()
         else:
             place[body] = place[body] + rotation.apply(step)
-        return Pair(turn, place, self.twist, self.a, self.b, self.K, self.D)
+        return replace(self, turn=turn, place=place)
 
 
 def lanes(x: Array) -> Array:
@@ -52,5 +56,6 @@ def load(pair: Pair) -> tuple[Array, float, float]:
     a, b = pair.a[None], pair.b[None]
     relative_pose(first, second, a, b, R, p, Q, d)
     wrench, lost, stored = np.zeros((2, 6, LANES)), np.zeros(LANES), np.zeros(LANES)
-    connect(first, second, a, b, lanes(pair.K[None]), lanes(pair.D[None]), Q, d, V, wrench, lost, stored)
+    coupling = np.zeros((0, 9, LANES)) if pair.coupling is None else lanes(pair.coupling.reshape(1, 9))
+    connect(first, second, a, b, lanes(pair.K[None]), lanes(pair.D[None]), coupling, Q, d, V, wrench, lost, stored)
     return wrench[..., 0], float(lost[0]), float(stored[0])

@@ -60,7 +60,7 @@ def test_frames_show_the_wing_at_their_times(model: FlexibleWing) -> None:
     """Noise-free: every frame lies on the periodic motion, one unknown trigger for all."""
     recording = filmed(model, CLEAN)
     condition = recording.condition
-    beat = model.beat([Genome.nominal(model.genes).values], blank_recording(model.wing, condition)).tracks[0]
+    beat = model.beat(Genome.nominal(model.genes).values, blank_recording(model.wing, condition)).tracks
     names = [m.name for m in model.wing.markers]
     motion = beat[:, [names.index(n) for n in recording.markers]]
     series = np.fft.rfft(motion, axis=0) / len(motion)

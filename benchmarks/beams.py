@@ -1,0 +1,325 @@
+"""What a division into rigid bodies costs: beams against their theory, and the robird wing against a finer cut.
+
+``OMP_NUM_THREADS=1 python -m benchmarks.beams [--json | --table] [--quick]`` (threads only get in each other's way).
+Frequencies come from the compiled connectors at rest and the bodies' masses; the elastica from the compiled spring
+forces in equilibrium; the wing from the simulator itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import eigh
+
+from benchmarks.beam_theory import Beam, Family, elastica, reference, torsion_constant
+from benchmarks.machine import commit, cpu
+from benchmarks.spring_chain import cut_beam, genome, spring_chain
+from records import Wing
+from sim.flexible_wing import FlexibleWing
+from sim.rig import blank_recording, robird_wing, vacuum
+from sim.simulate import Numerics
+from sim.structure import Structure
+from tests.sim.plates import stiffness_matrix
+
+Array = npt.NDArray[np.float64]
+
+# Shear and rotary inertia change the third frequency of the uniform rod by 3e-5 of itself.
+UNIFORM_ROD = Beam(4.0, (0.006, 0.006), (0.005, 0.005))
+TAPERED_ROD = Beam(4.0, (0.006, 0.004), (0.005, 0.003))
+UNIFORM_SHEET = Beam(1.0, (0.1, 0.1), (0.0025, 0.0025))
+TAPERED_SHEET = Beam(1.0, (0.1, 0.06), (0.0025, 0.0015))
+STOCKY = Beam(0.5, (0.1, 0.1), (0.05, 0.05))
+# name, beam, families, without shear and rotary inertia
+CASES: tuple[tuple[str, Beam, tuple[Family, ...], bool], ...] = (
+    ("uniform rod", UNIFORM_ROD, ("flapwise", "in-plane"), True),
+    ("tapered rod", TAPERED_ROD, ("flapwise", "in-plane"), True),
+    ("uniform sheet", UNIFORM_SHEET, ("torsion",), True),
+    ("tapered sheet", TAPERED_SHEET, ("torsion",), True),
+    ("stocky beam", STOCKY, ("flapwise", "in-plane"), False),
+)
+STRIPS = (2, 4, 8, 16, 32, 64)
+CHORDWISE = (1, 2, 4)
+MOST_BODIES = 128
+LOADS = (1.0, 2.0)
+ELASTIC = Beam(0.5, (0.01, 0.01), (0.002, 0.002))
+# bodies along the chord: strips of the wing, each twice those before it
+WING_STRIPS: dict[int, tuple[int, ...]] = {1: (4, 8, 16, 32, 64), 4: (6, 12, 24)}
+QUICK_WING: dict[int, tuple[int, ...]] = {1: (4, 8, 16)}
+WING_NUMERICS = Numerics(steps=480, max_beats=60, periodic=2e-6)
+# Which of a body's six coordinates (rotation x, y, z, then translation) move together in a flat wing.
+_OUT_OF_PLANE, _IN_PLANE = (0, 1, 5), (2, 3, 4)
+_KEPT = 24  # lowest modes looked at
+_ABSENT = 0.5  # relative error of a frequency that is no longer the same motion's
+
+
+@dataclass(frozen=True)
+class Row:
+    """Relative error of the first three frequencies of one family of modes of one division.
+
+    NaN where a division has so few bodies that what comes next is another motion, over half again as fast.
+    """
+
+    case: str
+    family: Family
+    chordwise: int
+    strips: int
+    errors: tuple[float, ...]
+
+
+def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Family, Array]:
+    """Frequencies (Hz, rising) of the bodies on their springs about rest by family; the first ``held`` bodies fixed.
+
+    A mode belongs to the family whose rigid motion of whole strips has most of its kinetic energy.
+    """
+    n = len(structure.bodies)
+    K = stiffness_matrix(structure, moduli).reshape(n, 6, n, 6)[held:, :, held:, :]
+    mass = np.array([b.mass for b in structure.bodies[held:]])
+    M = np.zeros_like(K)
+    for k, body in enumerate(structure.bodies[held:]):
+        M[k, :3, k, :3] = body.inertia
+        M[k, 3:, k, 3:] = body.mass * np.eye(3)
+    strip = np.repeat(np.arange(len(structure.division.bodies)), structure.division.bodies)[held:]
+    members = (strip == np.unique(strip)[:, None]).astype(float)
+    mean = members * mass / (members @ mass)[:, None]
+    width = np.array([b.centre[0] for b in structure.bodies[held:]])
+    polar = members @ (M[range(n - held), 1, range(n - held), 1] + mass * (width - (members.T @ (mean @ width))) ** 2)
+    found: dict[Family, list[float]] = {"flapwise": [], "in-plane": [], "torsion": []}
+    for group, bending, across in ((_OUT_OF_PLANE, 0, 5), (_IN_PLANE, 2, 3)):
+        ix = np.ix_(range(n - held), group, range(n - held), group)
+        size = (n - held) * len(group)
+        # largest eigenvalues of (M, K): the smallest of (K, M) would lose their digits to the largest
+        top = (max(0, size - _KEPT), size - 1)
+        mu, shape = eigh(M[ix].reshape(size, size), K[ix].reshape(size, size), subset_by_index=top)
+        for value, u in zip(mu[::-1], shape.T[::-1], strict=True):
+            motion = np.zeros((n - held, 6))
+            motion[:, group] = u.reshape(n - held, len(group))
+            sway = members @ mass @ (mean @ motion[:, across]) ** 2
+            tilt = M[range(n - held), bending, range(n - held), bending] @ motion[:, bending] ** 2
+            twist = polar @ (mean @ motion[:, 1]) ** 2 if across == 5 else 0.0
+            frequency = 1 / (2 * math.pi * math.sqrt(value)) if value > 0 else math.inf
+            if sway + tilt > 0.5 * value:
+                found["flapwise" if across == 5 else "in-plane"].append(frequency)
+            elif twist > 0.5 * value:
+                found["torsion"].append(frequency)
+    return {family: np.array(values) for family, values in found.items()}
+
+
+def frequency_errors(
+    name: str, beam: Beam, families: tuple[Family, ...], slender: bool, chordwise: int, strips: int
+) -> list[Row]:
+    """Error of one division.
+
+    One body along the chord hangs on the rods at the root. The two rods cannot hold more than two bodies, so where the
+    chord is cut the first strip is held instead, and the beam begins at that strip's middle.
+    """
+    structure = cut_beam(beam, f"{strips}x{chordwise}")
+    held = 0 if chordwise == 1 else chordwise
+    root = float(structure.bodies[0].centroid[1]) if held else 0.0
+    found, rows = modes(structure, genome(beam), held), []
+    for family in families:
+        truth = reference(beam, family, root, slender=slender, plate=chordwise > 1)
+        values = np.full(3, np.nan)
+        values[: min(3, len(found[family]))] = found[family][:3]
+        errors = values / truth - 1
+        rows.append(Row(name, family, chordwise, strips, tuple(float(e) if e < _ABSENT else math.nan for e in errors)))
+    return rows
+
+
+def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
+    """All cases and divisions, in the order of ``CASES``."""
+    rows = [
+        row
+        for name, beam, families, slender in CASES
+        for chordwise in CHORDWISE
+        for n in strips
+        if n * chordwise <= MOST_BODIES
+        for row in frequency_errors(name, beam, families, slender, chordwise, n)
+    ]
+    order = [(name, family) for name, _, families, _ in CASES for family in families]
+    return sorted(rows, key=lambda r: (order.index((r.case, r.family)), r.chordwise, r.strips))
+
+
+def torsion_carried(structure: Structure) -> float:
+    """Share of the section's torsion constant that the connectors of a uniform sheet bear under uniform twist.
+
+    Twist kappa turns neighbours along the span by kappa times their distance, and neighbours along the chord too: the
+    energy of both, per length, over G J kappa^2 / 2. Taken around one strip in the middle.
+    """
+    n, strip = structure.division.bodies[0], len(structure.division.bodies) // 2
+    station = structure.wing.stations[0]
+    width = structure.wing.span / len(structure.division.bodies)
+    body = range(strip * n, (strip + 1) * n)
+    along = sum(c.foam[1] * width for c in structure.connectors if c.first in body and c.second == c.first + n)
+    across = sum(
+        c.foam[0] * (station.chord / n) ** 2 / width
+        for c in structure.connectors
+        if n > 1 and c.first in body and c.second == c.first + 1
+    )
+    return float((along + across) / torsion_constant(station.chord, station.thickness))
+
+
+def torsion_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
+    """:func:`torsion_carried` of the uniform sheet, for divisions with neighbours on both sides."""
+    cuts = [(n, c) for c in CHORDWISE for n in strips if n > 2 and n * c <= MOST_BODIES]
+    return [
+        {"chordwise": c, "strips": n, "carried": torsion_carried(cut_beam(UNIFORM_SHEET, f"{n}x{c}"))} for n, c in cuts
+    ]
+
+
+def observed_order(coarse: float, fine: float, refinement: float = 2.0) -> float:
+    """p where the error goes with the p-th power of the strips' width; NaN where an error is missing."""
+    return math.log(abs(coarse / fine)) / math.log(refinement)
+
+
+def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
+    """Error of tip deflection and shortening, as part of the length, of the chain under large loads."""
+    rows = []
+    for load in LOADS:
+        truth = elastica(load)
+        for n in strips:
+            found = spring_chain(ELASTIC, n, load)
+            rows.append(
+                {"load": load, "strips": n, "deflection": found[0] - truth[0], "shortening": found[1] - truth[1]}
+            )
+    return rows
+
+
+def rods_to_the_tip(wing: Wing) -> Wing:
+    """The wing with its rods drawn out along their lines to the tip station."""
+    rods = []
+    for rod in wing.rods:
+        y = wing.stations[-1].y
+        stretch = (y - rod.y_root) / (rod.y_tip - rod.y_root)
+        rods.append(replace(rod, x_tip=rod.x_root + stretch * (rod.x_tip - rod.x_root), y_tip=y))
+    return replace(wing, rods=tuple(rods))
+
+
+WINGS = {"robird": robird_wing(), "rods to the tip": rods_to_the_tip(robird_wing())}
+
+
+def wing_tracks(wing: Wing, strips: int, chordwise: int, numerics: Numerics = WING_NUMERICS) -> Array:
+    """Periodic marker tracks [n, M, 3] (m) at 3 Hz in 10 mbar, nominal genes, 3 degrees of lag."""
+    model = FlexibleWing(wing, f"{strips}x{chordwise}", numerics=numerics)
+    recording = blank_recording(model.wing, vacuum(10.0, math.radians(3.0), 3.0))
+    beat = model.beat([g.nominal for g in model.genes], recording)
+    if beat.reason:
+        raise RuntimeError(f"{strips}x{chordwise}: {beat.reason}")
+    return np.asarray(beat.tracks)
+
+
+def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUMERICS) -> list[dict[str, Any]]:
+    """Mean and largest distance (m) over a beat of each division's markers from those of twice as many strips.
+
+    ``order`` compares a mean distance with that before it. A division is as far from the limit as the sum of all that
+    follow.
+    """
+    rows: list[dict[str, Any]] = []
+    for name, wing in WINGS.items():
+        for chordwise, cuts in strips.items():
+            tracks = [wing_tracks(wing, n, chordwise, numerics) for n in cuts]
+            before = math.nan
+            for n, coarse, fine in zip(cuts[:-1], tracks[:-1], tracks[1:], strict=True):
+                distance = np.linalg.norm(coarse - fine, axis=-1)
+                mean, largest = float(distance.mean()), float(distance.max())
+                rows.append(
+                    {
+                        "wing": name, "chordwise": chordwise, "strips": n, "mean_m": mean, "largest_m": largest,
+                        "order": observed_order(before, mean),
+                    }
+                )  # fmt: skip
+                before = mean
+    return rows
+
+
+def _cells(values: list[float], form: str) -> str:
+    return " | ".join("-" if not math.isfinite(v) else format(v, form) for v in values)
+
+
+def _markdown(head: list[str], rows: list[str]) -> str:
+    rule = "|" + "---|" * len(head)
+    return "\n".join([f"| {' | '.join(head)} |", rule, *(f"| {row} |" for row in rows)])
+
+
+def frequency_markdown(rows: list[Row]) -> str:
+    """A line per family, cut and mode: error in per cent against strips, and the order of the last refinement."""
+    strips, lines = sorted({r.strips for r in rows}), []
+    for key in dict.fromkeys((r.case, r.family, r.chordwise) for r in rows):
+        found = {r.strips: r.errors for r in rows if (r.case, r.family, r.chordwise) == key}
+        for mode in range(3):
+            errors = [found[n][mode] if n in found else math.nan for n in strips]
+            here = [e for e in errors if math.isfinite(e)]
+            order = observed_order(here[-2], here[-1]) if len(here) > 1 else math.nan
+            percent = _cells([100 * e for e in errors], "+.3f")
+            lines.append(f"{key[0]} | {key[1]} | {key[2]} | {mode + 1} | {percent} | {_cells([order], '.2f')}")
+    return _markdown(["beam", "motion", "along the chord", "mode", *(f"{n} strips" for n in strips), "order"], lines)
+
+
+def table(figures: dict[str, Any], rows: list[Row]) -> str:
+    """All tables, in markdown."""
+    mm = 1e3
+    bent = [
+        f"{r['load']:g} | {r['strips']} | {100 * r['deflection']:+.4f} | {100 * r['shortening']:+.4f}"
+        for r in figures["elastica"]
+    ]
+    carried = [f"{r['chordwise']} | {r['strips']} | {100 * r['carried']:.2f}" for r in figures["torsion"]]
+    wing = [
+        f"{r['wing']} | {r['strips']}x{r['chordwise']} | {2 * r['strips']}x{r['chordwise']} | "
+        f"{mm * r['mean_m']:.3f} | {mm * r['largest_m']:.3f} | {_cells([r['order']], '.2f')}"
+        for r in figures["wing"]
+    ]
+    parts = (
+        ("Error of the first three frequencies, %", frequency_markdown(rows)),
+        ("Torsion constant carried, %", _markdown(["along the chord", "strips", "carried"], carried)),
+        (
+            "Elastica: error of the tip, % of the length",
+            _markdown(["P L^2 / E I", "strips", "deflection", "shortening"], bent),
+        ),
+        (
+            "Robird wing: distance of the markers, mm",
+            _markdown(["wing", "division", "against", "mean", "largest", "order"], wing),
+        ),
+    )
+    return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts)
+
+
+def _without_nan(value: Any) -> Any:
+    """What JSON can say: None for what there is not."""
+    if isinstance(value, dict):
+        return {key: _without_nan(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.beams", description=__doc__)
+    shown = parser.add_mutually_exclusive_group()
+    shown.add_argument("--json", action="store_true", help="print only the JSON object")
+    shown.add_argument("--table", action="store_true", help="print only the tables, in markdown")
+    parser.add_argument("--quick", action="store_true", help="up to 16 strips")
+    arguments = parser.parse_args()
+    strips = tuple(n for n in STRIPS if n <= 16 or not arguments.quick)
+    rows = frequency_table(strips)
+    figures: dict[str, Any] = {
+        "frequencies": [asdict(r) for r in rows],
+        "torsion": torsion_table(strips),
+        "elastica": elastica_table(strips),
+        "wing": wing_table(QUICK_WING if arguments.quick else WING_STRIPS),
+        "cpu": cpu(),
+        "commit": commit(),
+    }
+    if not arguments.json:
+        print(table(figures, rows))
+    if not arguments.table:
+        print(json.dumps(_without_nan(figures)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The same wing in other engines: an independent right-hand side for scipy, and Exudyn."""

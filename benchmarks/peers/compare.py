@@ -1,0 +1,66 @@
+"""What a beat of the wing costs in each engine, at a stated error against that engine's own converged run.
+
+Times are process times of one thread; linear algebra libraries must be held to one thread before numpy is imported
+(``OPENBLAS_NUM_THREADS=1``), as ``python -m benchmarks.peers`` does: their idle threads would be counted too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any, Literal
+
+import numpy as np
+
+from benchmarks.peers import exudyn_engine, scipy_engine
+from benchmarks.peers.wing import PeerWing, peer_wing
+from sim.flexible_wing import FlexibleWing
+from sim.rig import robird_wing, tunnel, vacuum
+
+Medium = Literal["air", "vacuum"]
+
+CONDITIONS = {"vacuum": vacuum(10.0, 0.05, 3.0), "air": tunnel(0.05, 3.0, 6.0)}
+CASES = ("scipy", "exudyn", "exudyn_same_law")
+
+
+def nominal(division: str, medium: Medium) -> PeerWing:
+    """The Robird's wing with nominal genes at 3 Hz in the chamber at 10 mbar or in the tunnel at 6 m/s."""
+    if medium not in CONDITIONS:
+        raise ValueError(f"medium {medium!r} is unknown; give one of {', '.join(CONDITIONS)}")
+    model = FlexibleWing(robird_wing(), division)
+    genome = np.array([gene.nominal for gene in model.genes])
+    return peer_wing(model.structure, model.genes, genome, CONDITIONS[medium])
+
+
+def scipy_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
+    """scipy's LSODA, BDF or Radau, whichever is cheapest, on compiled equations with the Jacobian's sparsity."""
+    return case("scipy", division, medium, tolerance_mm, seconds)
+
+
+def exudyn_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
+    """Exudyn with its own spring law, compiled throughout; in air the strips' compiled loads are called from Python.
+
+    In the chamber Exudyn is spared the last 1 % of the air and with it the calls from Python.
+    """
+    return case("exudyn", division, medium, tolerance_mm, seconds)
+
+
+def exudyn_same_law_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
+    """Exudyn with our spring law, every connector called from Python: slow, for agreement and not for speed."""
+    return case("exudyn_same_law", division, medium, tolerance_mm, seconds)
+
+
+def case(engine: str, division: str, medium: Medium, tolerance_mm: float, seconds: float) -> dict[str, Any]:
+    """One line of the comparison: engine, bodies, medium, tolerance, and the fields of Cost."""
+    if engine not in CASES:
+        raise ValueError(f"engine {engine!r} is unknown; give one of {', '.join(CASES)}")
+    if not tolerance_mm > 0:
+        raise ValueError(f"tolerance is {tolerance_mm:g} mm; it must be above 0 mm")
+    wing = nominal(division, medium)
+    if engine == "scipy":
+        cost = scipy_engine.cheapest(wing, tolerance_mm, seconds=seconds)
+    else:
+        wing = wing._replace(air=0.0) if medium == "vacuum" else wing
+        law: exudyn_engine.Law = "energy" if engine == "exudyn_same_law" else "angles"
+        cost = exudyn_engine.cheapest(wing, tolerance_mm, law=law, seconds=seconds)
+    head = {"engine": engine, "bodies": len(wing.mass), "medium": medium, "tolerance_mm": tolerance_mm}
+    return head | asdict(cost)

@@ -1,0 +1,137 @@
+"""What the peers are given: masses, connectors, air coefficients and drive of one individual, as plain arrays.
+
+Data only. Every force is evaluated again by the peer that uses it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Condition, Gene
+from sim.atmosphere import density
+from sim.drive import flap_angle
+from sim.kernels.jit import kernel
+from sim.structure import Structure
+from sim.wing_genes import lanes
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+_SAMPLES, _HARMONICS = 512, 40
+
+
+class PeerWing(NamedTuple):
+    """One individual under one condition, SI units. N bodies; numbers N and N + 1 are the front and the rear rod.
+
+    Attributes:
+        mass: [N] kg.
+        inertia: [N, 3, 3] kg m^2 about the centre of mass, body axes.
+        rest: [N, 3] centres of mass at rest, m; all bodies are aligned with the world there.
+        first, second: [C] bodies that a connector joins.
+        a, b: [C, 3] its place on either, from the body's centre (a rod's: from the hinge), m.
+        stiffness, damping: [C, 6] about x, y, z (N m/rad), then along x, y, z (N/m), of the first body's axes.
+        strip: [S + 1] first body of each strip.
+        weight: [N] share of the strip's area; ``centroid`` [N, 2] of the planform, from the body's centre, m.
+        area: [S] m^2.
+        coefficients: [4] L_a, L_b, ID_a, ID_b (thesis Eqs. 10-11).
+        lift, drag: [N, 2] share of the strip's force (Eqs. 12-13), and where along the chord it acts, m.
+        air: density, kg/m^3; ``wind`` [3] m/s; ``gravity`` m/s^2.
+        hinge: [3] m, on the rods' axis along x.
+        harmonics: [H, 2] cosine and sine amplitude of the flap angle about ``mean``, rad.
+        omega: angular rate of the drive, rad/s; ``lag`` [2] of both rods, rad; ``ramp`` duration of the start, s.
+        markers: [M, 3] in the frame of body ``carrier`` [M], m.
+    """
+
+    mass: Array
+    inertia: Array
+    rest: Array
+    first: Index
+    second: Index
+    a: Array
+    b: Array
+    stiffness: Array
+    damping: Array
+    strip: Index
+    weight: Array
+    centroid: Array
+    area: Array
+    coefficients: Array
+    lift: Array
+    drag: Array
+    air: float
+    wind: Array
+    gravity: float
+    hinge: Array
+    mean: float
+    harmonics: Array
+    omega: float
+    lag: Array
+    ramp: float
+    markers: Array
+    carrier: Index
+
+
+def peer_wing(
+    structure: Structure, genes: tuple[Gene, ...], genome: Array, condition: Condition, ramp_beats: int = 1
+) -> PeerWing:
+    """Gather what ``genome`` [G] under ``condition`` is made of."""
+    group, w = lanes(structure, genes, genome[None]), structure.wiring
+    incidence, hinge = condition.angle_of_attack, structure.wing.hinge
+    mean, harmonics = _drive_series(structure)
+    return PeerWing(
+        mass=w.mass,
+        inertia=w.inertia.reshape(-1, 3, 3).copy(),
+        rest=np.array([body.centre for body in structure.bodies]),
+        first=w.first,
+        second=w.second,
+        a=w.a,
+        b=w.b,
+        stiffness=group.stiffness[..., 0].copy(),
+        damping=group.damping[..., 0].copy(),
+        strip=w.strip_start,
+        weight=w.weight,
+        centroid=w.centroid.copy(),
+        area=w.area,
+        coefficients=group.coefficients[:, 0].copy(),
+        lift=np.stack([group.lift_share[:, 0], group.lift_x[:, 0]], axis=-1),
+        drag=np.stack([group.drag_share[:, 0], group.drag_x[:, 0]], axis=-1),
+        air=float(density(condition.pressure, condition.temperature)),
+        wind=condition.airspeed * np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
+        gravity=float(condition.gravity),
+        hinge=np.array([0.0, hinge.y, hinge.z]),
+        mean=mean,
+        harmonics=harmonics,
+        omega=float(2 * np.pi * condition.flap_frequency),
+        lag=np.array([0.0, condition.phase_lag]),
+        ramp=float(ramp_beats / condition.flap_frequency),
+        markers=w.markers,
+        carrier=w.carrier,
+    )
+
+
+def _drive_series(structure: Structure) -> tuple[float, Array]:
+    """Mean and harmonics [H, 2] of the flap angle, so that compiled code can evaluate it at any time."""
+    psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    spectrum = np.fft.rfft(flap_angle(structure.wing.drive, psi)[:, 0]) / _SAMPLES
+    head = 2 * spectrum[1 : _HARMONICS + 1]
+    return float(spectrum[0].real), np.stack([head.real, -head.imag], axis=-1)
+
+
+@kernel
+def rod_motion(wing: PeerWing, t: float, rod: int) -> tuple[float, float]:
+    """Angle (rad) and rate (rad/s) of a rod at time ``t`` (s): the periodic drive, let in by a quintic ramp."""
+    psi = wing.omega * t - wing.lag[rod]
+    angle, slope = wing.mean, 0.0
+    c1, s1 = np.cos(psi), np.sin(psi)
+    c, s = c1, s1
+    for k in range(len(wing.harmonics)):
+        angle += wing.harmonics[k, 0] * c + wing.harmonics[k, 1] * s
+        slope += (k + 1) * (wing.harmonics[k, 1] * c - wing.harmonics[k, 0] * s)
+        c, s = c * c1 - s * s1, s * c1 + c * s1
+    x = min(max(t / wing.ramp, 0.0), 1.0)
+    share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    growth = 30.0 * (x * (1.0 - x)) ** 2 / wing.ramp
+    return share * angle, share * wing.omega * slope + growth * angle

@@ -1,0 +1,126 @@
+// What acts inside the wing and on it, over one beat: torques, powers, forces, bending moments, energies.
+
+import { get, part } from "./api.js";
+import { $, el, significant } from "./format.js";
+import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
+
+const ASKED = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
+
+const CUTS_SHOWN = 6;
+
+let wanted = null;
+let shown = "";
+let request = 0;
+let loads = null;
+let visible = false;
+
+// A simulation is paid for only when somebody looks.
+export function setUpLoads() {
+  new IntersectionObserver((entries) => {
+    visible = entries.at(-1).isIntersecting;
+    load();
+  }, { rootMargin: "200px" }).observe($("loads-section"));
+}
+
+// Show the loads of a run under a recording's condition; ``version`` changes when the genome may have changed.
+export function showLoads(run, recording, genome, version) {
+  wanted = { run, recording, genome, key: [run.id, recording, genome, version].join("/") };
+  load();
+}
+
+export function clearLoads() {
+  [wanted, loads, shown] = [null, null, ""];
+  request += 1;
+  $("loads-note").textContent = "";
+  $("loads").hidden = true;
+}
+
+export function redrawLoads() {
+  if (loads) draw();
+}
+
+async function load() {
+  if (!wanted || !visible || wanted.key === shown) return;
+  const mine = ++request;
+  const { run, recording, genome, key } = wanted;
+  shown = key;
+  if (!loads) $("loads-note").textContent = "Simulating…";
+  const query = new URLSearchParams([["recording", recording], ["genome", genome], ...ASKED.map((name) => ["outputs", name])]);
+  try {
+    const answer = await get(`runs/${part(run.id)}/loads?${query}`);
+    if (mine !== request) return;
+    loads = answer;
+  } catch (error) {
+    if (mine !== request) return;
+    shown = "";
+    loads = null;
+    $("loads").hidden = true;
+    $("loads-note").textContent = error.message;
+    return;
+  }
+  const off = Math.abs(loads.outputs.averages.closing_error_percent);
+  $("loads-note").textContent = `${recording}, ${genome} genome, one periodic beat; phase 0 is where the wing crosses the horizontal `
+    + `upwards. Energy balance closes to ${significant(off, 2)} % of what enters.`;
+  $("loads").hidden = false;
+  drawAverages(loads.outputs.averages);
+  draw();
+}
+
+function drawAverages(means) {
+  const cell = (label, value, unit) =>
+    el("div", {}, el("dt", {}, label), el("dd", {}, significant(value, 3), el("small", {}, ` ${unit}`)));
+  const { front, rear } = means.peak_motor_torque_n_m;
+  const peak = el("div", {}, el("dt", {}, "peak torque, front and rear motor, N m"),
+    el("dd", {}, `${significant(front, 2)}, ${significant(rear, 2)}`));
+  $("loads-numbers").replaceChildren(
+    cell("mean lift", means.lift_n, "N"), cell("mean thrust", means.thrust_n, "N"),
+    cell("supplied by both motors", means.supplied_w, "W"), cell("given to the air", means.to_air_w, "W"),
+    cell("lost in the wing's dampers", means.dissipated_w, "W"), peak,
+  );
+}
+
+async function draw() {
+  const out = loads.outputs;
+  const torque = out.motor_torque_n_m;
+  const power = out.power_w;
+  const [kinetic, elastic, gravitational] = ["kinetic", "elastic", "gravitational"].map((kind) => out.energy_j[kind]);
+  // As many cuts as can be told apart, the root among them.
+  const stride = Math.ceil(out.sections.length / CUTS_SHOWN);
+  const cuts = out.sections.filter((_, s) => s % stride === 0).map((section) => [
+    section.name === "root" ? "root" : `${significant(section.span_mm, 3)} mm`, section.moment_n_m.map((moment) => moment[0]),
+  ]);
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  const middle = out.strips.map((strip) => mean(strip.span_mm));
+  const byStrip = (key) => out.strips.map((strip) => mean(strip[key]));
+  await Promise.all([
+    lines("load-torque", out.phase, [["front", torque.front], ["rear", torque.rear]], { unit: "N m" }),
+    lines("load-power", out.phase, [
+      ["front motor", power.front_motor], ["rear motor", power.rear_motor], ["air", power.air], ["dampers", power.dampers],
+    ], { unit: "W" }),
+    lines("load-air", out.phase, [["lift", out.lift_n], ["thrust", out.thrust_n]], { unit: "N" }),
+    lines("load-strips", middle, [["lift", byStrip("lift_n")], ["thrust", byStrip("thrust_n")]],
+      { unit: "N", x: "mm along the span", dots: true }),
+    lines("load-bending", out.phase, cuts, { unit: "N m", shades: true }),
+    lines("load-energy", out.phase, [["kinetic", kinetic], ["elastic", elastic], ["gravitational", gravitational]], { unit: "J" }),
+  ]).catch((error) => { $("loads-note").textContent = error.message; });
+}
+
+async function lines(id, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false }) {
+  const Plotly = await plotly();
+  const look = theme();
+  const traces = series.map(([name, y], k) => {
+    const colour = shades ? look.accent : look.series[k];
+    return {
+      x, y, name, type: "scatter", mode: dots ? "lines+markers" : "lines", opacity: shades ? 1 - (0.75 * k) / series.length : 1,
+      line: { color: colour, width: 2, simplify: false }, marker: { color: colour, size: 6 }, hovertemplate: `%{y:.3g} ${unit}<extra>${name}</extra>`,
+    };
+  });
+  const phase = dots ? {} : { range: [0, 1], dtick: 0.25 };
+  const figure = layout(look, {
+    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", showlegend: true,
+    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
+    xaxis: axis(look, { title: { text: xTitle, standoff: 6 }, showgrid: false, ...phase }),
+    yaxis: axis(look, { title: { text: unit, standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
+  });
+  return Plotly.react($(id), traces, figure, CONFIG);
+}

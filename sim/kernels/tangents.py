@@ -1,0 +1,232 @@
+"""The linearised connectors: how the wrenches of springs and dampers change with the bodies' poses and twists.
+
+In the axes of frame A, a displacement of the bodies moves B by eta = (phi, delta) = J xi and changes the relative twist
+r = J V by B eta. With the wrench (t, f) on B, the wrenches on the bodies change by
+
+    second: -J_2^T (D J dV + K_2 eta),    K_2 = K + D B - [[t~, 0], [f~, 0]],
+    first:       E (D J dV + K_1 eta),    K_1 = K + D B + [[0, f~], [0, 0]],
+
+K being minus the derivative of the spring's wrench. The last terms turn the wrench with the body and move it with the
+spring's end: the geometric stiffness. Nothing is left out, so the matrix is not symmetric. E = [[I, e~], [0, I]] with
+e = a + d takes a wrench at o_B to the first body, F the same with e = Q b to the second.
+
+The step solves for the change of the local coordinates xi, of rate xi' = V + A xi, A = [[-omega~ / 2, 0], [-v~, 0]] in
+each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gamma. A connector has J A = B_k J.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
+from sim.kernels.jit import inlined, kernel
+from sim.kernels.matrices import (
+    Nine,
+    Three,
+    add_to_block,
+    axial,
+    co_stiffness,
+    co_stiffness_matrix,
+    columns_scaled,
+    cross,
+    gyroscopic,
+    load_inertia,
+    load_matrix,
+    load_vector,
+    outer,
+    plus,
+    product,
+    rows_scaled,
+    scaled,
+    skew,
+    skew_times,
+    times,
+    times_floats,
+    times_skew,
+    trace_minus,
+    transposed,
+    with_diagonal,
+)
+from sim.kernels.vector import load, load1
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Six = tuple[Nine, Nine, Nine, Nine]  # moment-rotation, moment-translation, force-rotation, force-translation
+
+
+@inlined
+def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
+    """Minus the derivative of the spring's wrench on B by eta."""
+    S = product(columns_scaled(Q, kt), transposed(Q))
+    P = scaled(0.5, plus(times_skew(S, d), scaled(-1.0, skew(times(S, d)))))
+    oo = plus(trace_minus(columns_scaled(Q, co_stiffness(ko))), scaled(-1.0, skew_times(d, P)))
+    return oo, transposed(P), P, scaled(0.5, with_diagonal(S, kt))
+
+
+@inlined
+def coupling_tangent(N: Nine, d: Three) -> Six:
+    """The part of the coupling stiffness, with N = Q G_c."""
+    L = trace_minus(N)
+    turned = plus(outer(d, axial(N)), times_skew(transposed(N), d))
+    return scaled(-1.0, turned), transposed(L), L, scaled(0.0, L)
+
+
+@inlined
+def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
+    """B: g and ``turning`` are B's velocity and angular velocity, ``omega`` A's angular velocity, all in A's axes."""
+    return (
+        scaled(-1.0, skew(turning)),
+        scaled(0.0, skew(g)),
+        scaled(-1.0, skew(g)),
+        scaled(-1.0, skew(omega)),
+    )
+
+
+@inlined
+def damper_tangent(B: Six, omega: Three, v: Three, arm: Three, do: Three, dt: Three) -> Six:
+    """D (B - B_k) for a body turning with ``omega`` and moving with v, ``arm`` from its centre to o_B, in A's axes."""
+    oo = plus(B[0], scaled(0.5, skew(omega)))
+    to = plus(B[2], plus(skew(v), scaled(-0.5, skew_times(arm, skew(omega)))))
+    return rows_scaled(do, oo), B[1], rows_scaled(dt, to), rows_scaled(dt, B[3])
+
+
+@inlined
+def sum_of(A: Six, B: Six) -> Six:
+    """A + B."""
+    return plus(A[0], B[0]), plus(A[1], B[1]), plus(A[2], B[2]), plus(A[3], B[3])
+
+
+@inlined
+def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
+    """D + ``length`` A."""
+    return (
+        with_diagonal(scaled(length, A[0]), do),
+        scaled(length, A[1]),
+        scaled(length, A[2]),
+        with_diagonal(scaled(length, A[3]), dt),
+    )
+
+
+@inlined
+def moved(e: Three, A: Six, g: Three) -> Six:
+    """E(e) A E(g)^T: both sides taken to other points."""
+    a, c = plus(A[0], skew_times(e, A[2])), plus(A[1], skew_times(e, A[3]))
+    return (
+        plus(a, scaled(-1.0, times_skew(c, g))),
+        c,
+        plus(A[2], scaled(-1.0, times_skew(A[3], g))),
+        A[3],
+    )
+
+
+@inlined
+def turned_left(sign: float, Q: Nine, A: Six) -> Six:
+    """``sign`` Q^T A."""
+    T = scaled(sign, transposed(Q))
+    return product(T, A[0]), product(T, A[1]), product(T, A[2]), product(T, A[3])
+
+
+@inlined
+def turned_right(sign: float, A: Six, Q: Nine) -> Six:
+    """``sign`` A Q."""
+    T = scaled(sign, Q)
+    return product(A[0], T), product(A[1], T), product(A[2], T), product(A[3], T)
+
+
+@kernel
+def start_blocks(
+    mass: Array, inertia: Array, damping: Array, R: Array, V: Array, gravity: float, length: float, blocks: Array
+) -> None:
+    """Set the blocks to the bodies' own part of S: inertia, gyroscopic terms, gravity, and the air's normal damping.
+
+    ``damping`` [N, W] acts along each body's normal.
+    """
+    blocks[:] = 0.0
+    for n in range(len(mass)):
+        m, own = mass[n], load_inertia(inertia, n)
+        up = (load(R, n, 6), load(R, n, 7), load(R, n, 8))
+        omega, v = load_vector(V, n, 0), load_vector(V, n, 3)
+        G, spin, slip = gyroscopic(own, omega), skew(omega), skew(v)
+        # (M / l - dW/dV) (I - l A): moments, then forces, of which -m v~ and m v~ cancel
+        oo = plus(scaled(1.0 / length, own), plus(G, scaled(0.5, times_skew(own, omega))))
+        oo = plus(oo, scaled(0.5 * length, product(G, spin)))
+        to = scaled(length * m, plus(skew_times(omega, slip), scaled(-0.5, product(slip, spin))))
+        to = plus(to, scaled(length * m * gravity, skew(up)))
+        tt = scaled(m, spin)
+        normal, weight = load1(damping, n), load1(damping, n) * 0.0 + m / length
+        tilt = length * normal
+        to = (to[0], to[1], to[2], to[3], to[4], to[5], to[6] - tilt * v[1], to[7] + tilt * v[0], to[8])
+        tt = with_diagonal(tt, (weight, weight, weight + normal))
+        add_to_block(blocks, n, (oo, scaled(0.0, to), to, tt))
+
+
+@kernel
+def add_own_damping(mass: Array, inertia: Array, damping: Array, V: Array, X: Array, wrench: Array) -> None:
+    """Add to the wrenches what the bodies' own -dW/dV of :func:`start_blocks` makes of motions X [N, 6, W]."""
+    for n in range(len(mass)):
+        m, omega, x, y = mass[n], load_vector(V, n, 0), load_vector(X, n, 0), load_vector(X, n, 3)
+        t = times(gyroscopic(load_inertia(inertia, n), omega), x)
+        f, g = cross(omega, y), cross(load_vector(V, n, 3), x)
+        f = (m * (f[0] - g[0]), m * (f[1] - g[1]), m * (f[2] - g[2]) + load1(damping, n) * y[2])
+        add_wrench(wrench, n, t, f)
+
+
+@kernel
+def add_connectors(
+    first: Index,
+    second: Index,
+    lower: Index,
+    upper: Index,
+    a: Array,
+    b: Array,
+    K: Array,
+    D: Array,
+    coupling: Array,
+    Q_: Array,
+    d_: Array,
+    V: Array,
+    length: float,
+    blocks: Array,
+) -> None:
+    """Add the connectors' part of S.
+
+    ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
+    driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.
+    """
+    for c in range(len(first)):
+        i, j = first[c], second[c]
+        Q, d = load_matrix(Q_, c), load_vector(d_, c, 0)
+        ko, kt, do, dt = load_vector(K, c, 0), load_vector(K, c, 3), load_vector(D, c, 0), load_vector(D, c, 3)
+        e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
+        arm = times_floats(Q, b[c, 0], b[c, 1], b[c, 2])
+        omega, velocity = load_vector(V, i, 0), load_vector(V, i, 3)
+        turning = times(Q, load_vector(V, j, 0))
+        rate, slide = relative_twist(Q, e, arm, omega, velocity, turning, load_vector(V, j, 3))
+        t, f, _ = spring_wrench(Q, d, ko, kt)
+        loss_t, loss_f = damper_wrench(rate, slide, do, dt)
+        K_ = spring_tangent(Q, d, ko, kt)
+        if len(coupling):
+            N = product(Q, co_stiffness_matrix(load_matrix(coupling, c)))
+            K_ = sum_of(K_, coupling_tangent(N, d))
+            pull_t, pull_f, _ = coupling_wrench(N, d)
+            t = (t[0] + pull_t[0], t[1] + pull_t[1], t[2] + pull_t[2])
+            f = (f[0] + pull_f[0], f[1] + pull_f[1], f[2] + pull_f[2])
+        t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
+        f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
+        sweep = cross(omega, e)
+        g = (slide[0] + velocity[0] + sweep[0], slide[1] + velocity[1] + sweep[1], slide[2] + velocity[2] + sweep[2])
+        B = twist_tangent(g, omega, turning)
+        by_first = sum_of(K_, damper_tangent(B, omega, velocity, e, do, dt))
+        by_second = sum_of(K_, damper_tangent(B, turning, times(Q, load_vector(V, j, 3)), arm, do, dt))
+        on_second = (scaled(-1.0, skew(t)), B[1], scaled(-1.0, skew(f)), B[1])
+        on_first = (B[1], skew(f), B[1], B[1])
+        Z = complete(sum_of(by_second, on_second), length, do, dt)
+        add_to_block(blocks, j, turned_left(1.0, Q, turned_right(1.0, moved(arm, Z, arm), Q)))
+        Z = complete(sum_of(by_first, on_second), length, do, dt)
+        add_to_block(blocks, lower[c], turned_left(-1.0, Q, moved(arm, Z, e)))
+        if upper[c] >= 0:
+            Z = complete(sum_of(by_first, on_first), length, do, dt)
+            add_to_block(blocks, i, moved(e, Z, e))
+            Z = complete(sum_of(by_second, on_first), length, do, dt)
+            add_to_block(blocks, upper[c], turned_right(-1.0, moved(e, Z, arm), Q))
