@@ -115,11 +115,11 @@ def timoshenko(beam: Beam, family: Family, root: float = 0.0, count: int = 3) ->
     return _lowest(K, M, count)
 
 
-def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: bool = False) -> Array:
+def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: float = 0.0) -> Array:
     """First torsional frequencies (Hz) of (G J theta')' = -rho I_p omega^2 theta (Saint-Venant).
 
-    With ``warping`` the clamped end also stays flat, as that of a plate: (E Gamma theta'')'' more, with
-    Gamma = c^3 h^3 / 144 for a thin strip (Reissner and Stein, NACA TN 2369, 1951).
+    With ``warping`` the clamped end also stays flat, as that of a plate: (E Gamma theta'')'' more, where Gamma is
+    ``warping`` times the c^3 h^3 / 144 of a thin strip (Reissner and Stein, NACA TN 2369, 1951).
     """
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
@@ -127,19 +127,19 @@ def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: bool = 
     slope, second = slope / free, second / free**2
     polar = c * h * (c**2 + h**2) / 12
     K = (slope * (weight * beam.shear * torsion_constant(c, h))) @ slope.T
-    if warping:
-        K = K + (second * (weight * beam.young * c**3 * h**3 / 144)) @ second.T
+    K = K + (second * (weight * warping * beam.young * c**3 * h**3 / 144)) @ second.T
     M = (value * (weight * beam.density * polar)) @ value.T
     return _lowest(K, M, count)
 
 
-def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = True, plate: bool = False) -> Array:
+def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = True, chordwise: int = 1) -> Array:
     """First three frequencies (Hz) of a family of modes, clamped at y = ``root``.
 
-    ``slender`` leaves out shear and rotary inertia; ``plate`` keeps the clamped end of a twisted beam flat.
+    ``slender`` leaves out shear and rotary inertia. A chord in ``chordwise`` pieces that bend each by itself has
+    1 - 1 / chordwise^2 of the plate's resistance to warping: the sum of w x^2 over the pieces instead of c^3 / 12.
     """
     if family == "torsion":
-        return torsional(beam, root, warping=plate)
+        return torsional(beam, root, warping=1 - 1 / chordwise**2)
     theory: Callable[[Beam, Family, float], Array] = euler_bernoulli if slender else timoshenko
     return theory(beam, family, root)
 

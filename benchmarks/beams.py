@@ -1,6 +1,6 @@
 """What a division into rigid bodies costs: beams against their theory, and the robird wing against a finer cut.
 
-``OMP_NUM_THREADS=1 python -m benchmarks.beams [--json | --table] [--quick]`` (threads only get in each other's way).
+``python -m benchmarks.beams [--json | --table] [--quick]``
 Frequencies come from the compiled connectors at rest and the bodies' masses; the elastica from the compiled spring
 forces in equilibrium; the wing from the simulator itself.
 """
@@ -10,8 +10,12 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 from dataclasses import asdict, dataclass, replace
 from typing import Any
+
+if __name__ == "__main__":  # before numpy reads it: on matrices this small, threads take ten times as long
+    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +26,10 @@ from benchmarks.machine import commit, cpu
 from benchmarks.spring_chain import cut_beam, genome, spring_chain
 from records import Wing
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing, vacuum
-from sim.simulate import Numerics
 from sim.structure import Structure
-from tests.sim.plates import stiffness_matrix
+from tests.sim.plates import displacement, stiffness_matrix
 
 Array = npt.NDArray[np.float64]
 
@@ -34,6 +38,7 @@ UNIFORM_ROD = Beam(4.0, (0.006, 0.006), (0.005, 0.005))
 TAPERED_ROD = Beam(4.0, (0.006, 0.004), (0.005, 0.003))
 UNIFORM_SHEET = Beam(1.0, (0.1, 0.1), (0.0025, 0.0025))
 TAPERED_SHEET = Beam(1.0, (0.1, 0.06), (0.0025, 0.0015))
+THICK_PLATE = Beam(1.0, (0.2, 0.2), (0.01, 0.01))
 STOCKY = Beam(0.5, (0.1, 0.1), (0.05, 0.05))
 # name, beam, families, without shear and rotary inertia
 CASES: tuple[tuple[str, Beam, tuple[Family, ...], bool], ...] = (
@@ -51,6 +56,8 @@ ELASTIC = Beam(0.5, (0.01, 0.01), (0.002, 0.002))
 # bodies along the chord: strips of the wing, each twice those before it
 WING_STRIPS: dict[int, tuple[int, ...]] = {1: (4, 8, 16, 32, 64), 4: (6, 12, 24)}
 QUICK_WING: dict[int, tuple[int, ...]] = {1: (4, 8, 16)}
+FINEST = "16x8"
+DIVISIONS = ("4", "11", "24", "64x1", "32x2", "32x3", "32x4", "20x6", "12x8")
 WING_NUMERICS = Numerics(steps=480, max_beats=60, periodic=2e-6)
 # Which of a body's six coordinates (rotation x, y, z, then translation) move together in a flat wing.
 _OUT_OF_PLANE, _IN_PLANE = (0, 1, 5), (2, 3, 4)
@@ -123,7 +130,7 @@ def frequency_errors(
     root = float(structure.bodies[0].centroid[1]) if held else 0.0
     found, rows = modes(structure, genome(beam), held), []
     for family in families:
-        truth = reference(beam, family, root, slender=slender, plate=chordwise > 1)
+        truth = reference(beam, family, root, slender=slender, chordwise=chordwise)
         values = np.full(3, np.nan)
         values[: min(3, len(found[family]))] = found[family][:3]
         errors = values / truth - 1
@@ -164,11 +171,24 @@ def torsion_carried(structure: Structure) -> float:
     return float((along + across) / torsion_constant(station.chord, station.thickness))
 
 
-def torsion_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
-    """:func:`torsion_carried` of the uniform sheet, for divisions with neighbours on both sides."""
-    cuts = [(n, c) for c in CHORDWISE for n in strips if n > 2 and n * c <= MOST_BODIES]
+def twist_rate(beam: Beam, division: str) -> float:
+    """Twist per length in the middle half under a couple at the tip, over Saint-Venant's T / G J (uniform beam)."""
+    structure = cut_beam(beam, division)
+    n, strips = structure.division.bodies[0], len(structure.division.bodies)
+    load = np.zeros((len(structure.bodies), 6))
+    load[-n:, 1] = 1 / n
+    turn = displacement(stiffness_matrix(structure, genome(beam)), load)[:, 1].reshape(strips, n).mean(axis=1)
+    a, b = strips // 4, strips - 1 - strips // 4
+    expected = (b - a) * beam.length / strips / (beam.shear * float(torsion_constant(beam.chord[0], beam.thickness[0])))
+    return float((turn[b] - turn[a]) / expected)
+
+
+def twist_table() -> list[dict[str, Any]]:
+    """:func:`twist_rate` of the uniform sheet and of a plate as thick as the wing; strips down to its thickness."""
     return [
-        {"chordwise": c, "strips": n, "carried": torsion_carried(cut_beam(UNIFORM_SHEET, f"{n}x{c}"))} for n, c in cuts
+        {"plate": name, "division": division, "twist": twist_rate(beam, division)}
+        for name, beam, strips in (("uniform sheet", UNIFORM_SHEET, (16, 32)), ("thick plate", THICK_PLATE, (16, 32)))
+        for division in (f"{n}x{c}" for c in CHORDWISE for n in strips)
     ]
 
 
@@ -203,13 +223,13 @@ def rods_to_the_tip(wing: Wing) -> Wing:
 WINGS = {"robird": robird_wing(), "rods to the tip": rods_to_the_tip(robird_wing())}
 
 
-def wing_tracks(wing: Wing, strips: int, chordwise: int, numerics: Numerics = WING_NUMERICS) -> Array:
+def wing_tracks(wing: Wing, division: str, numerics: Numerics = WING_NUMERICS) -> Array:
     """Periodic marker tracks [n, M, 3] (m) at 3 Hz in 10 mbar, nominal genes, 3 degrees of lag."""
-    model = FlexibleWing(wing, f"{strips}x{chordwise}", numerics=numerics)
+    model = FlexibleWing(wing, division, numerics=numerics)
     recording = blank_recording(model.wing, vacuum(10.0, math.radians(3.0), 3.0))
     beat = model.beat([g.nominal for g in model.genes], recording)
     if beat.reason:
-        raise RuntimeError(f"{strips}x{chordwise}: {beat.reason}")
+        raise RuntimeError(f"{division}: {beat.reason}")
     return np.asarray(beat.tracks)
 
 
@@ -222,7 +242,7 @@ def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUM
     rows: list[dict[str, Any]] = []
     for name, wing in WINGS.items():
         for chordwise, cuts in strips.items():
-            tracks = [wing_tracks(wing, n, chordwise, numerics) for n in cuts]
+            tracks = [wing_tracks(wing, f"{n}x{chordwise}", numerics) for n in cuts]
             before = math.nan
             for n, coarse, fine in zip(cuts[:-1], tracks[:-1], tracks[1:], strict=True):
                 distance = np.linalg.norm(coarse - fine, axis=-1)
@@ -234,6 +254,15 @@ def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUM
                     }
                 )  # fmt: skip
                 before = mean
+    return rows
+
+
+def chord_table(divisions: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Mean and largest distance (m) over a beat of the robird's markers from those of ``FINEST``."""
+    finest, rows = wing_tracks(WINGS["robird"], FINEST), []
+    for division in divisions:
+        distance = np.linalg.norm(wing_tracks(WINGS["robird"], division) - finest, axis=-1)
+        rows.append({"division": division, "mean_m": float(distance.mean()), "largest_m": float(distance.max())})
     return rows
 
 
@@ -267,15 +296,16 @@ def table(figures: dict[str, Any], rows: list[Row]) -> str:
         f"{r['load']:g} | {r['strips']} | {100 * r['deflection']:+.4f} | {100 * r['shortening']:+.4f}"
         for r in figures["elastica"]
     ]
-    carried = [f"{r['chordwise']} | {r['strips']} | {100 * r['carried']:.2f}" for r in figures["torsion"]]
+    twisted = [f"{r['plate']} | {r['division']} | {100 * (r['twist'] - 1):+.3f}" for r in figures["twist"]]
     wing = [
         f"{r['wing']} | {r['strips']}x{r['chordwise']} | {2 * r['strips']}x{r['chordwise']} | "
         f"{mm * r['mean_m']:.3f} | {mm * r['largest_m']:.3f} | {_cells([r['order']], '.2f')}"
         for r in figures["wing"]
     ]
+    chord = [f"{r['division']} | {mm * r['mean_m']:.2f} | {mm * r['largest_m']:.2f}" for r in figures["chord"]]
     parts = (
         ("Error of the first three frequencies, %", frequency_markdown(rows)),
-        ("Torsion constant carried, %", _markdown(["along the chord", "strips", "carried"], carried)),
+        ("Twist under a couple: error, %", _markdown(["plate", "division", "twist"], twisted)),
         (
             "Elastica: error of the tip, % of the length",
             _markdown(["P L^2 / E I", "strips", "deflection", "shortening"], bent),
@@ -284,6 +314,7 @@ def table(figures: dict[str, Any], rows: list[Row]) -> str:
             "Robird wing: distance of the markers, mm",
             _markdown(["wing", "division", "against", "mean", "largest", "order"], wing),
         ),
+        (f"Robird wing: distance of the markers from {FINEST}, mm", _markdown(["division", "mean", "largest"], chord)),
     )
     return "\n\n".join(f"## {title}\n\n{text}" for title, text in parts)
 
@@ -309,9 +340,10 @@ def main() -> None:
     rows = frequency_table(strips)
     figures: dict[str, Any] = {
         "frequencies": [asdict(r) for r in rows],
-        "torsion": torsion_table(strips),
+        "twist": twist_table(),
         "elastica": elastica_table(strips),
         "wing": wing_table(QUICK_WING if arguments.quick else WING_STRIPS),
+        "chord": chord_table(DIVISIONS[:3] if arguments.quick else DIVISIONS),
         "cpu": cpu(),
         "commit": commit(),
     }

@@ -13,7 +13,7 @@ from benchmarks.beam_theory import Beam
 from records import Materials, Rod, Station
 from sim.division import Division
 from sim.kernels import LANES
-from sim.simulate import at_rest
+from sim.scene import at_rest
 from sim.structure import Structure, build
 from tests.sim.plates import loaded, plate, spring_wrenches
 

@@ -16,6 +16,7 @@ from calibration.standing import Standing, standing
 from records import Dataset, Gene, Genome
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
+from sim.model import Solution
 
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
@@ -76,6 +77,7 @@ class Comparison:
     """Simulated and recorded tracks of one recording, [T, M, 3] in m; NaN where not recorded.
 
     ``phase`` is the phase of the beat in [0, 1), zero where the reference crosses the horizontal on the upstroke.
+    ``accuracy`` is the largest error (m) of a marker that was asked for, ``solution`` what it took.
     """
 
     recording: str
@@ -83,11 +85,13 @@ class Comparison:
     markers: tuple[str, ...]
     recorded: npt.NDArray[np.float64]
     simulated: npt.NDArray[np.float64]
+    accuracy: float
+    solution: Solution
 
 
 def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
     """Judge ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
-    model = model_for(dataset, spec.division, spec.bounds_factor)
+    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
     nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
     stages = plan(spec, dataset)
     both = evaluator.evaluate(
@@ -134,14 +138,16 @@ def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, gen
 
 def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str) -> Comparison:
     """Tracks of ``genome`` over the recording called ``recording``; ValueError when the simulation fails."""
-    model = model_for(dataset, spec.division, spec.bounds_factor)
+    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
     record = dataset.recording(recording)
     observed = model.observe([base_genome(model, genome).values], record)
     if observed.reasons[0] is not None:
         raise ValueError(f"the wing cannot be simulated under {recording!r}: {observed.reasons[0]}")
     turns = record.condition.flap_frequency * record.times - recorded_crossing(dataset.wing, record) / (2 * np.pi)
     tracks = observed.channels[0].reshape(record.positions.shape)
-    return Comparison(recording, turns % 1.0, record.markers, record.positions, tracks)
+    return Comparison(
+        recording, turns % 1.0, record.markers, record.positions, tracks, spec.accuracy, observed.solutions[0]
+    )
 
 
 def _genes(

@@ -14,6 +14,7 @@ from calibration.problem import Problem, base_genome
 from records import Dataset, Gene, Recording, Wing
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import ACCURACY, Numerics
 from sim.wing_genes import FACTOR, group
 
 Mode = Literal["staged", "joint"]
@@ -35,6 +36,7 @@ class CalibrationSpec:
         max_generations: per stage.
         seed: the same seed gives the same numbers, bit for bit.
         bounds_factor: the box is [estimate / factor, estimate * factor].
+        accuracy: largest error (m) of any simulated marker at any instant (:class:`sim.numerics.Numerics`).
         recordings: names to fit; empty means all that are not held out.
         genes: names to search; empty means all.
         fixed: values of genes that keep them instead of their estimates.
@@ -48,6 +50,7 @@ class CalibrationSpec:
     max_generations: int = 200
     seed: int = 1
     bounds_factor: float = 5.0
+    accuracy: float = ACCURACY
     recordings: tuple[str, ...] = ()
     genes: tuple[str, ...] = ()
     fixed: Mapping[str, float] = field(default_factory=dict)
@@ -86,16 +89,18 @@ class Stage:
     recordings: tuple[Recording, ...]
 
 
-def model_for(dataset: Dataset, division: str, bounds_factor: float = FACTOR) -> FlexibleWing:
-    """The model that a dataset asks for; ValueError when the wing or the division is not one."""
-    model = FlexibleWing(dataset.wing, division, bounds_factor)
+def model_for(
+    dataset: Dataset, division: str, bounds_factor: float = FACTOR, accuracy: float = ACCURACY
+) -> FlexibleWing:
+    """The model that a dataset asks for, solved to ``accuracy`` (m); ValueError when wing or division is not one."""
+    model = FlexibleWing(dataset.wing, division, bounds_factor, Numerics(accuracy=accuracy))
     _ = model.structure, model.genes
     return model
 
 
 def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
     """The stages of a calibration; ValueError when the spec does not fit the dataset."""
-    model = model_for(dataset, spec.division, spec.bounds_factor)
+    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
     known = [gene.name for gene in model.genes]
     _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
     base_genome(model, spec.fixed)
@@ -164,7 +169,7 @@ def calibrate(
     Resumed equals uninterrupted, bit for bit. ValueError when the spec does not fit the dataset.
     """
     stages = plan(spec, dataset)
-    model = model_for(dataset, spec.division, spec.bounds_factor)
+    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
     state = _State.start(spec, model) if checkpoint is None else _State.from_json(checkpoint)
     while state.stage < len(stages):
         stage = stages[state.stage]

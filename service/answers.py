@@ -144,6 +144,15 @@ class Result(TypedDict):
     genes: list[GeneInfo]
 
 
+class Numerics(TypedDict):
+    """How a simulation was solved; errors are the largest of any marker at any instant."""
+
+    accuracy_mm: float
+    estimated_error_mm: float | None
+    steps_per_beat: int
+    beats: int
+
+
 class Comparison(TypedDict):
     """Recorded and simulated tracks [frame][marker][x, y, z] in mm; None where not recorded."""
 
@@ -152,6 +161,7 @@ class Comparison(TypedDict):
     markers: list[str]
     recorded_mm: list[list[list[float | None]]]
     simulated_mm: list[list[list[float | None]]]
+    numerics: Numerics
 
 
 class Strip(TypedDict):

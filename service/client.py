@@ -115,7 +115,7 @@ class Client(Transport):
         """Submit a calibration.
 
         ``spec``: division, mode, population, stall, tolerance, max_generations, seed, bounds_factor,
-        recordings, genes, name. What is left out takes the server's default (the thesis's settings).
+        accuracy_mm, recordings, genes, name. What is left out takes the server's default (the thesis's settings).
         """
         body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
@@ -226,10 +226,12 @@ class Client(Transport):
         *,
         division: str = "11",
         genome: Mapping[str, float] | None = None,
+        accuracy_mm: float | None = None,
         outputs: bool | Sequence[str] = False,
     ) -> a.Simulation:
         """Simulate one recording; genes not named in ``genome`` keep their nominal value.
 
+        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; without it the server's, 0.1.
         ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
         power, energy, averages.
         """
@@ -239,7 +241,7 @@ class Client(Transport):
             "division": division,
             "genome": dict(genome or {}),
             "outputs": outputs if isinstance(outputs, bool) else list(outputs),
-        }
+        } | given(accuracy_mm=accuracy_mm)
         return cast(a.Simulation, self._json("POST", "/v1/simulations", json=body, key=str(uuid.uuid4())))
 
     def loads_under(
@@ -250,6 +252,7 @@ class Client(Transport):
         condition: Mapping[str, float] | None = None,
         division: str = "11",
         genome: Mapping[str, float] | None = None,
+        accuracy_mm: float | None = None,
         outputs: Sequence[str] | None = None,
     ) -> a.Loads:
         """Simulate a genome for its loads, where ``condition`` may change the recording's.
@@ -263,7 +266,7 @@ class Client(Transport):
             "division": division,
             "genome": dict(genome or {}),
             "outputs": True if outputs is None else list(outputs),
-        }
+        } | given(accuracy_mm=accuracy_mm)
         return cast(a.Loads, self._json("POST", "/v1/loads", json=body, key=str(uuid.uuid4())))
 
 

@@ -11,7 +11,7 @@ from calibration.problem import base_genome
 from calibration.result import Comparison, GeneResult, Result
 from calibration.search import CalibrationSpec, Generation
 from records import Dataset, Recording, load_archive
-from sim.model import Model
+from sim.flexible_wing import FlexibleWing
 from sim.outputs import Outputs, simulate_outputs
 
 
@@ -125,9 +125,9 @@ class WingEngine:
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
     ) -> Outputs:
         """Simulate one recording's condition for what acts inside the wing and on it."""
-        model = search.model_for(dataset, spec.division, spec.bounds_factor)
+        model = _model(spec, dataset)
         return simulate_outputs(model, base_genome(model, genome).values, recording)
 
 
-def _model(spec: CalibrationSpec, dataset: Dataset) -> Model:
-    return search.model_for(dataset, spec.division, spec.bounds_factor)
+def _model(spec: CalibrationSpec, dataset: Dataset) -> FlexibleWing:
+    return search.model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)

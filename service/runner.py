@@ -21,6 +21,7 @@ from service.database import Database, DatabaseClosedError
 from service.datasets import Datasets
 from service.engine import Engine
 from service.problems import conflict
+from service.remedies import with_remedy
 from service.tables import CheckpointRow, GenerationRow, RunRow
 from workers import jobs
 from workers.jobs import Instruction
@@ -193,7 +194,8 @@ class Runner:
 
 def message(error: Exception) -> str:
     """``error`` for the user: what the domain says as it stands, a surprise with its kind; no stack trace."""
-    text = str(error) if isinstance(error, ValueError) and str(error) else f"{type(error).__name__}: {error}"
+    told = isinstance(error, ValueError) and str(error)
+    text = with_remedy(str(error)) if told else f"{type(error).__name__}: {error}"
     return text[:LONGEST_ERROR]
 
 

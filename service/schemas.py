@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
+from pydantic_core import PydanticCustomError
 
 from service.load_schemas import ConditionIn, OutputsOut, Wanted
 from workers.jobs import State
@@ -12,11 +13,38 @@ from workers.jobs import State
 LARGEST_SEED = 2**53 - 1
 DIVISION = r"^[1-9][0-9]?(x[1-9][0-9]?|(,[1-9][0-9]?){0,63})$"
 LONGEST_DIVISION = 200
+FINEST_MM, COARSEST_MM = 0.02, 1.0
 
 Item = TypeVar("Item")
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Whole = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _attainable(accuracy_mm: float) -> float:
+    if accuracy_mm < FINEST_MM:
+        raise PydanticCustomError(
+            "too_fine",
+            "must be at least {least} mm: below, corners in the law of the air make the estimated error unreliable",
+            {"least": FINEST_MM},
+        )
+    if accuracy_mm > COARSEST_MM:
+        raise PydanticCustomError(
+            "too_coarse",
+            "must be at most {most} mm: beyond, the error of the solution would be as large as what is fitted",
+            {"most": COARSEST_MM},
+        )
+    return accuracy_mm
+
+
+Accuracy = Annotated[
+    Number,
+    AfterValidator(_attainable),
+    Field(
+        json_schema_extra={"minimum": FINEST_MM, "maximum": COARSEST_MM},
+        description="largest error of any simulated marker at any instant; the steps of a beat follow from it",
+    ),
+]
 
 _RECORDING: dict[str, Any] = {
     "name": "vacuum-3hz-0deg",
@@ -51,6 +79,7 @@ _SPEC: dict[str, Any] = {
     "max_generations": 200,
     "seed": 1,
     "bounds_factor": 5.0,
+    "accuracy_mm": 0.1,
     "recordings": [],
     "genes": [],
 }
@@ -176,6 +205,7 @@ class SpecOut(BaseModel):
     max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
     seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1
     bounds_factor: Annotated[Number, Field(ge=1.01, le=100)] = 5.0
+    accuracy_mm: Accuracy = 0.1
     recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
     genes: Annotated[list[Name], Field(max_length=1000, description="empty: all")] = []
 
@@ -287,6 +317,18 @@ class ResultOut(BaseModel):
 Point = Annotated[list[float | None], Field(min_length=3, max_length=3)]
 
 
+class NumericsOut(BaseModel):
+    """How a simulation was solved: the largest error of a marker that was asked for and the estimated one.
+
+    ``beats`` were simulated on the way to the periodic one, with at most ``steps_per_beat`` each.
+    """
+
+    accuracy_mm: float
+    estimated_error_mm: float | None
+    steps_per_beat: int
+    beats: int
+
+
 class ComparisonOut(BaseModel):
     """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded."""
 
@@ -295,6 +337,7 @@ class ComparisonOut(BaseModel):
     markers: list[str]
     recorded_mm: list[list[Point]]
     simulated_mm: list[list[Point]]
+    numerics: NumericsOut
 
 
 class SimulationIn(BaseModel):
@@ -319,6 +362,7 @@ class SimulationIn(BaseModel):
     recording: Name
     division: Annotated[str, Field(pattern=DIVISION, max_length=LONGEST_DIVISION)] = "11"
     genome: Annotated[dict[str, Number], Field(max_length=1000)] = {}
+    accuracy_mm: Accuracy = 0.1
     outputs: Wanted = False
 
 

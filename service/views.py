@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from calibration.result import Comparison, GeneResult, Result
+from calibration.search import CalibrationSpec
 from records import Dataset, Recording
-from service import schemas
+from service import schemas, store
 from service.tables import DatasetRow, GenerationRow, RunRow
 from workers.jobs import Wish
 
@@ -55,7 +57,12 @@ def run(row: RunRow) -> schemas.RunOut:
     """A run."""
     columns = _columns(row)
     wish = None if row.wish == Wish.NONE else row.wish
-    return schemas.RunOut.model_validate(columns | {"wish": wish})
+    return schemas.RunOut.model_validate(columns | {"wish": wish, "spec": spec(store.spec(row))})
+
+
+def spec(given: CalibrationSpec) -> schemas.SpecOut:
+    """How a run calibrates."""
+    return schemas.SpecOut.model_validate(asdict(given) | {"accuracy_mm": _tidy_mm(given.accuracy)})
 
 
 def history_item(row: GenerationRow) -> schemas.HistoryItem:
@@ -117,6 +124,12 @@ def comparison(tracks: Comparison) -> dict[str, Any]:
         "markers": list(tracks.markers),
         "recorded_mm": _track(tracks.recorded),
         "simulated_mm": _track(tracks.simulated),
+        "numerics": {
+            "accuracy_mm": _tidy_mm(tracks.accuracy),
+            "estimated_error_mm": mm(tracks.solution.error),
+            "steps_per_beat": tracks.solution.steps,
+            "beats": tracks.solution.beats,
+        },
     }
 
 
@@ -135,6 +148,11 @@ def mm(value: float | None) -> float | None:
 def finite(value: float) -> float | None:
     """``value``, or None where JSON has no number for it."""
     return float(value) if math.isfinite(value) else None
+
+
+def _tidy_mm(stated: float) -> float:
+    """A distance (m) that somebody stated, in mm as they wrote it: 0.07, not 0.07000000000000001."""
+    return round(stated * MM, 9)
 
 
 def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from records import Gene, Recording, Wing
 from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from sim.division import Division
-from sim.model import Observation, genome_batch
-from sim.simulate import Beat, Numerics, periodic_beats
+from sim.model import Observation, Solution, genome_batch
+from sim.numerics import Numerics
+from sim.simulate import Beat, periodic_beats
 from sim.structure import Structure, build
 from sim.wing_genes import FACTOR, wing_genes
 
@@ -80,7 +81,8 @@ class FlexibleWing:
             for beat, phase in zip(beats, own, strict=True)
         )
         channels = np.stack([_laid_over(s, since + p, recording.values) for s, p in zip(series, own, strict=True)])
-        return Observation(channels, reasons)
+        solutions = tuple(Solution(len(beat.tracks), beat.beats, beat.error) for beat in beats)
+        return Observation(channels, reasons, solutions)
 
 
 def _laid_over(series: npt.NDArray[np.complex128], psi: Array, recorded: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +14,25 @@ from records import Gene, Recording
 Array = npt.NDArray[np.float64]
 
 
+class Solution(NamedTuple):
+    """How one individual was solved: steps of a beat, beats simulated, estimated largest error of a marker in m."""
+
+    steps: int
+    beats: int
+    error: float
+
+
 @dataclass(frozen=True)
 class Observation:
     """What a batch of B individuals would have been recorded as.
 
     ``channels`` has shape [B, T, C] in the layout of the recording; a failed individual's row is NaN and its entry in
-    ``reasons`` says why (None for a good one).
+    ``reasons`` says why (None for a good one). ``solutions`` say how, where a model tells.
     """
 
     channels: Array
     reasons: tuple[str | None, ...]
+    solutions: tuple[Solution, ...] = ()
 
 
 class Model(Protocol):

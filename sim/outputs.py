@@ -21,7 +21,7 @@ from sim.kernels.air import strip_forces
 from sim.kernels.bodies import kinetic_and_height
 from sim.kernels.connectors import connect, relative_pose
 from sim.kernels.integrate import Lanes, State
-from sim.simulate import setting
+from sim.scene import setting
 from sim.structure import Structure
 from sim.wing_genes import lanes
 

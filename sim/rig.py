@@ -32,7 +32,7 @@ from records import (
 )
 from records.dataset import Rig
 from sim.flexible_wing import FlexibleWing
-from sim.simulate import Numerics
+from sim.numerics import Numerics
 
 Array = npt.NDArray[np.float64]
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from records import Rod, Wing
 from sim.division import Division
+from sim.elimination import eliminate
 from sim.kernels.integrate import Wiring
 from sim.planform import Body, Panel, Planform, bodies, marker_carriers
 from sim.sections import Rectangle, round_area, round_second_moment
@@ -39,11 +40,6 @@ class Connector:
     parts: Array
     rods: Array
     modulus: tuple[int, ...]
-
-    @property
-    def rod(self) -> Array:
-        """Rods in the middle of the distance, [6]."""
-        return np.asarray(self.rods[np.searchsorted(np.cumsum(self.parts), 0.5)])
 
 
 def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array) -> Array:
@@ -222,8 +218,8 @@ def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[
         rod = next(r for r in wing.rods if r.name == name)
         if not (rod.y_root <= y + _DRIVEN_GAP and rod.y_tip >= y):
             raise ValueError(
-                f"driven rod {name!r} lies from y = {rod.y_root:g} m to {rod.y_tip:g} m; to drive the wing it must start "
-                f"at most {_DRIVEN_GAP:g} m outboard of the root at {y:g} m and end beyond it: extend the rod"
+                f"driven rod {name!r} lies from y = {rod.y_root:g} m to {rod.y_tip:g} m; to drive the wing it must "
+                f"start at most {_DRIVEN_GAP:g} m outboard of the root at {y:g} m and end beyond it: extend the rod"
             )
         entries.append((rod, _piece(planform, rod, min(y1, rod.y_tip), count)))
     found = []
@@ -248,11 +244,11 @@ def _wiring(
     base = [c.point - (parts[c.first].centre if c.first >= 0 else hinge) for c in connectors]
     b = np.array([c.point - parts[c.second].centre for c in connectors])
     pairs = {(int(j), int(i)) for i, j in zip(first, second, strict=True) if i < n}
-    pattern = _symbolic(n, pairs)
-    count = len(pattern.below)
-    inner = [n + pattern.number[(int(j), int(i))] for i, j in zip(first, second, strict=True) if i < n]
-    lower = [*inner, *range(n + 2 * count, n + 2 * count + len(first) - len(inner))]
-    upper = [k + count for k in inner] + [-1] * (len(first) - len(inner))
+    work = eliminate(n, pairs)
+    joined = [(int(i), int(j)) for i, j in zip(first, second, strict=True) if i < n]
+    if len(set(joined)) < len(joined):
+        raise AssertionError("two connectors between the same bodies: their blocks would overwrite each other")
+    outer, last = len(first) - len(joined), n + 2 * len(work.below)
     starts = np.concatenate([[0], np.cumsum(division.bodies)]).astype(np.int64)
     area = np.array([part.area for part in parts])
     strip_area = np.add.reduceat(area, starts[:-1])
@@ -263,62 +259,22 @@ def _wiring(
         inertia=np.array([part.inertia.ravel() for part in parts]),
         first=first,
         second=second,
-        lower=np.array(lower, np.int64),
-        upper=np.array(upper, np.int64),
+        lower=np.array([*(work.position[j, i] for i, j in joined), *range(last, last + outer)], np.int64),
+        upper=np.array([*(work.position[i, j] for i, j in joined), *[-1] * outer], np.int64),
         driven=int(np.argmax(first >= n)),
         a=np.array(base),
         b=b,
-        start=pattern.start,
-        below=pattern.below + n,
-        row=pattern.row,
-        products=pattern.products,
-        product_start=pattern.product_start,
+        order=work.order,
+        start=work.start,
+        below=work.below,
+        row=work.row,
+        products=work.products,
+        product_start=work.product_start,
+        fill=work.fill,
         strip_start=starts,
         weight=area / np.repeat(strip_area, division.bodies),
         centroid=np.array([(part.centroid - part.centre)[:2] for part in parts]),
         area=strip_area,
         markers=np.array([np.array(m.position) - parts[k].centre for m, k in zip(markers, carriers, strict=True)]),
         carrier=carriers,
-    )
-
-
-@dataclass(frozen=True)
-class _Pattern:
-    number: dict[tuple[int, int], int]
-    start: npt.NDArray[np.int64]
-    below: npt.NDArray[np.int64]
-    row: npt.NDArray[np.int64]
-    products: npt.NDArray[np.int64]
-    product_start: npt.NDArray[np.int64]
-
-
-def _symbolic(n: int, pairs: set[tuple[int, int]]) -> _Pattern:
-    """Symbolic factorisation of a matrix of symmetric pattern, given its lower block positions (row, column).
-
-    Fill-in, and the products (target, left, right) to subtract; blocks are numbered as in ``sim.kernels.linear``.
-    """
-    filled = set(pairs)
-    for column in range(n):
-        rows = sorted(r for r, c in filled if c == column)
-        filled |= {(r, q) for q in rows for r in rows if r > q}
-    number = {position: k for k, position in enumerate(sorted(filled, key=lambda rc: (rc[1], rc[0])))}
-    start, below, row, products, product_start = [0], [], [], [], [0]
-    for column in range(n):
-        rows = sorted(r for r, c in filled if c == column)
-        below += [number[(r, column)] for r in rows]
-        row += rows
-        start.append(len(below))
-        for q in rows:
-            for r in rows:
-                above = 0 if r > q else len(number)
-                target = q if r == q else n + above + number[(max(r, q), min(r, q))]
-                products.append((target, n + number[(r, column)], n + len(number) + number[(q, column)]))
-        product_start.append(len(products))
-    return _Pattern(
-        number,
-        np.array(start, np.int64),
-        np.array(below, np.int64),
-        np.array(row, np.int64),
-        np.array(products, np.int64).reshape(-1, 3),
-        np.array(product_start, np.int64),
     )

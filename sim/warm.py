@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import Numerics
 from sim.rig import WIND_TUNNEL, blank_recording, robird_wing
-from sim.simulate import Numerics
 
 
 def main() -> None:

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from records import Gene
 from sim.kernels import LANES
 from sim.kernels.integrate import Lanes
-from sim.structure import SHEAR, Structure
+from sim.kernels.memory import aligned
+from sim.structure import Structure, spring_constants
 
 Array = npt.NDArray[np.float64]
 Group = Literal["structure", "aerodynamics"]
@@ -84,25 +85,24 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
     def value(name: str) -> Array:
         return padded[:, column[name]]
 
-    foam = np.array([c.foam for c in structure.connectors])[:, :, None]
-    rod = np.array([c.rod for c in structure.connectors])[:, :, None]
-    shear = np.array([[m == SHEAR for m in c.modulus] for c in structure.connectors])[:, :, None]
     # rods: E_r I_r in bending (rotations), G_r A_r across (translations), thesis Eqs. 15-16
-    rod_modulus = np.concatenate([np.tile(value("E_r"), (3, 1)), np.tile(value("G_r"), (3, 1))])
-    stiffness = foam * np.where(shear, value("G_f"), value("E_f")) + rod * rod_modulus
-    damping = foam * np.where(shear, value("D_G"), value("D_E"))
+    foam, rod, lost = (
+        np.array([value(along), value(across)]) for along, across in (("E_f", "G_f"), ("E_r", "G_r"), ("D_E", "D_G"))
+    )
+    stiffness = spring_constants(structure.connectors, foam, rod)
+    damping = np.array([c.foam[:, None] * lost[list(c.modulus)] for c in structure.connectors])
     shares, places = {}, {}
     for prefix in ("L", "ID"):
         weights = np.array([value(f"{prefix}_{k}") for k in range(1, QUARTERS + 1)])
         shares[prefix], places[prefix] = _distribute(structure, weights / weights.sum(axis=0))
     return Lanes(
-        stiffness=np.ascontiguousarray(stiffness),
-        damping=np.ascontiguousarray(damping),
-        coefficients=np.ascontiguousarray([value(name) for name in ("L_a", "L_b", "ID_a", "ID_b")]),
-        lift_share=shares["L"],
-        lift_x=places["L"],
-        drag_share=shares["ID"],
-        drag_x=places["ID"],
+        stiffness=aligned(stiffness),
+        damping=aligned(damping),
+        coefficients=aligned([value(name) for name in ("L_a", "L_b", "ID_a", "ID_b")]),
+        lift_share=aligned(shares["L"]),
+        lift_x=aligned(places["L"]),
+        drag_share=aligned(shares["ID"]),
+        drag_x=aligned(places["ID"]),
     )
 
 

@@ -62,6 +62,9 @@ def submit(
     max_generations: Annotated[int | None, typer.Option(help="At most so many per stage.")] = None,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same numbers.")] = None,
     bounds_factor: Annotated[float | None, typer.Option(help="Search estimate / factor to estimate * factor.")] = None,
+    accuracy_mm: Annotated[
+        float | None, typer.Option(help="Largest error of a simulated marker, 0.02 to 1; 0.1 if left out.")
+    ] = None,
     recording: Annotated[list[str] | None, typer.Option(help="Fit only this recording; repeatable.")] = None,
     gene: Annotated[list[str] | None, typer.Option(help="Search only this gene; repeatable.")] = None,
     name: Annotated[str | None, typer.Option(help="A name to find the run by.")] = None,
@@ -84,6 +87,7 @@ def submit(
             max_generations=max_generations,
             seed=seed,
             bounds_factor=bounds_factor,
+            accuracy_mm=accuracy_mm,
             recordings=recording or None,
             genes=gene or None,
             name=name,

@@ -13,7 +13,7 @@ import typer
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.loads import check_suffix, summary, write_loads, write_plot
-from service.commands.output import AsJson, Url, mm, note, print_json, progress, say, table
+from service.commands.output import AsJson, Url, mm, note, number, print_json, progress, say, table
 
 Track = list[float | None]
 
@@ -24,6 +24,9 @@ def simulate(
     division: Annotated[str, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = "11",
     genome: Annotated[
         list[str] | None, typer.Option(help="FILE.json or name=value; repeatable. Others stay nominal.")
+    ] = None,
+    accuracy_mm: Annotated[
+        float | None, typer.Option(help="Largest error of a simulated marker, 0.02 to 1; 0.1 if left out.")
     ] = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks as CSV.")] = None,
     loads: Annotated[
@@ -66,10 +69,11 @@ def simulate(
         report(None)
         recording = recording or client.dataset(dataset)["recordings"][0]["name"]
         answer: a.Simulation | a.Loads
+        asked: dict[str, Any] = {"division": division, "genome": values, "accuracy_mm": accuracy_mm}
         if condition:
-            answer = client.loads_under(dataset, recording, condition=condition, division=division, genome=values)
+            answer = client.loads_under(dataset, recording, condition=condition, **asked)
         else:
-            answer = client.simulate(dataset, recording, division=division, genome=values, outputs=wanted)
+            answer = client.simulate(dataset, recording, outputs=wanted, **asked)
     if output:
         write_tracks(cast(a.Simulation, answer), output)
         note(f"tracks written to {output}")
@@ -90,6 +94,13 @@ def simulate(
     if not condition:
         distance = cast(a.Simulation, answer)["mean_distance_mm"]
         say(f"recording {recording}: mean distance {mm(distance)} mm per marker")
+        say(solved(cast(a.Simulation, answer)["numerics"]))
+
+
+def solved(numerics: a.Numerics) -> str:
+    """How a simulation was solved, in a line."""
+    error = number(numerics["estimated_error_mm"], 2)
+    return f"solved with {numerics['steps_per_beat']} steps a beat, estimated error {error} mm"
 
 
 def read_condition(words: list[str]) -> dict[str, float]:

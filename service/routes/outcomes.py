@@ -14,6 +14,7 @@ from service import http, load_views, store, views
 from service.events import stream
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
+from service.remedies import with_remedy
 from service.routes.runs import gene_names, load
 from service.schemas import (
     ComparisonOut,
@@ -199,8 +200,8 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
 
 
 def _asked(service: Service, dataset: Dataset, body: SimulationIn) -> tuple[CalibrationSpec, dict[str, float]]:
-    """Division and full genome of a simulation; a 422 where they cannot be."""
-    spec = CalibrationSpec(division=body.division, bounds_factor=WIDEST_BOUNDS)
+    """Division, accuracy and full genome of a simulation; a 422 where they cannot be."""
+    spec = CalibrationSpec(division=body.division, bounds_factor=WIDEST_BOUNDS, accuracy=body.accuracy_mm / views.MM)
     known = gene_names(service, spec, dataset)
     unknown = [name for name in body.genome if name not in known]
     if unknown:
@@ -245,4 +246,4 @@ def _check_recording(dataset: Dataset, name: str, where: str) -> None:
 
 
 def _failed(error: ValueError) -> ProblemError:
-    return conflict(f"the simulation failed: {error}")
+    return conflict(f"the simulation failed: {with_remedy(str(error))}")

@@ -29,14 +29,16 @@ router = APIRouter(prefix="/v1/runs", tags=["runs"])
 )
 def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: http.RepeatKey = None) -> Response:
     """Submit a calibration; it is stored when this answers, and computed when its turn comes."""
-    again = http.repeat(request, idempotency_key, body.model_dump_json())
+    # Without defaults, so that an option that a later version adds does not make an earlier request another one.
+    again = http.repeat(request, idempotency_key, body.model_dump_json(exclude_defaults=True))
     with service.database.read() as session:
         earlier = store.earlier_answer(session, again)
     if earlier:
         return http.sent(earlier)
     dataset = load(service, body.dataset_id)
     spec = CalibrationSpec(
-        **body.model_dump(exclude={"dataset_id", "name", "recordings", "genes"}),
+        **body.model_dump(exclude={"dataset_id", "name", "accuracy_mm", "recordings", "genes"}),
+        accuracy=body.accuracy_mm / views.MM,
         recordings=tuple(body.recordings),
         genes=tuple(body.genes),
     )

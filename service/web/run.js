@@ -129,7 +129,7 @@ function drawHead() {
   document.title = `${runName(run)} · wingfit`;
   $("run-name").replaceChildren(runName(run), " ", badge(run));
   $("run-about").textContent = `${dataset.name} · ${run.spec.division} bodies, ${run.spec.mode} · population ${run.spec.population}, `
-    + `seed ${run.spec.seed} · ${when(run.created_at)}`;
+    + `seed ${run.spec.seed} · solved to ${run.spec.accuracy_mm} mm · ${when(run.created_at)}`;
   $("run-error").hidden = !run.error;
   $("run-error").textContent = run.error ?? "";
   setBar($("run-bar"), run);

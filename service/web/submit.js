@@ -3,7 +3,7 @@
 import { ApiError, call, part, postJson } from "./api.js";
 import { $, copy, curl, el, size, toast } from "./format.js";
 
-const NUMBERS = ["population", "seed"];
+const NUMBERS = ["population", "seed", "accuracy_mm"];
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");

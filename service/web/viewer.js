@@ -1,7 +1,7 @@
 // The part of the page that shows the wing: recording, genome, phase, play.
 
 import { get, part } from "./api.js";
-import { $, mm } from "./format.js";
+import { $, mm, significant } from "./format.js";
 import { clearLoads, setUpLoads, showLoads } from "./loads.js";
 import { byPhase, drawBeat, drawWing, meanDistance } from "./wing.js";
 
@@ -79,7 +79,8 @@ async function load({ quiet = false } = {}) {
   const slider = $("phase");
   slider.max = tracks.phase.length - 1;
   const which = genome() === "best" ? (run.state === "SUCCEEDED" ? "best genome" : "best genome so far") : "nominal genome";
-  $("wing-note").textContent = `Mean distance ${mm(meanDistance(tracks))} mm per marker on ${tracks.recording} with the ${which}.`;
+  $("wing-note").textContent = `Mean distance ${mm(meanDistance(tracks))} mm per marker on ${tracks.recording} with the ${which}. `
+    + `Solved with ${tracks.numerics.steps_per_beat} steps a beat, estimated error ${significant(tracks.numerics.estimated_error_mm, 2)} mm.`;
   draw();
   showLoads(run, tracks.recording, genome(), genome() === "best" ? run.generations : 0);
 }

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import kernel
-from sim.kernels.matrices import cross, load_vector
-from sim.kernels.vector import load, load0, store, store0
+from sim.kernels.jit import inlined, kernel
+from sim.kernels.matrices import Three, cross
+from sim.kernels.vector import Vector, load, load0, store, store0
 
 Array = npt.NDArray[np.float64]
 
@@ -45,36 +45,24 @@ def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
             store(p, n, i, load(p0, n, i) + r0 * dx + r1 * dy + r2 * dz)
 
 
-@kernel
-def local_rate(xi: Array, V: Array, rate: Array) -> None:
+@inlined
+def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
     """Rate of the local coordinates: theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp v.
 
     theta is O(step); the series are cut where the rest is of fourth order in it.
     """
-    for n in range(len(V)):
-        x, y, z = load(xi, n, 0), load(xi, n, 1), load(xi, n, 2)
-        a, b, c = load(V, n, 0), load(V, n, 1), load(V, n, 2)
-        u, v, q = y * c - z * b, z * a - x * c, x * b - y * a
-        store(rate, n, 0, a + 0.5 * u + (y * q - z * v) * (1.0 / 12.0))
-        store(rate, n, 1, b + 0.5 * v + (z * u - x * q) * (1.0 / 12.0))
-        store(rate, n, 2, c + 0.5 * q + (x * v - y * u) * (1.0 / 12.0))
-        a, b, c = load(V, n, 3), load(V, n, 4), load(V, n, 5)
-        u, v, q = y * c - z * b, z * a - x * c, x * b - y * a
-        g, h, k = y * q - z * v, z * u - x * q, x * v - y * u
-        store(rate, n, 3, a + u + 0.5 * g + (y * k - z * h) * (1.0 / 6.0))
-        store(rate, n, 4, b + v + 0.5 * h + (z * g - x * k) * (1.0 / 6.0))
-        store(rate, n, 5, c + q + 0.5 * k + (x * h - y * g) * (1.0 / 6.0))
-
-
-@kernel
-def rate_change(V: Array, xi: Array, factor: float, out: Array) -> None:
-    """Add ``factor`` A xi to ``out``: the change of :func:`local_rate` by xi about xi = 0, (xi x omega / 2, xi x v)."""
-    for n in range(len(V)):
-        x = load_vector(xi, n, 0)
-        a, b = cross(x, load_vector(V, n, 0)), cross(x, load_vector(V, n, 3))
-        for k in range(3):
-            store(out, n, k, load(out, n, k) + 0.5 * factor * a[k])
-            store(out, n, 3 + k, load(out, n, 3 + k) + factor * b[k])
+    a, b = cross(theta, omega), cross(theta, v)
+    c, d = cross(theta, a), cross(theta, b)
+    e = cross(theta, d)
+    sixth, twelfth = 1.0 / 6.0, 1.0 / 12.0
+    return (
+        omega[0] + 0.5 * a[0] + c[0] * twelfth,
+        omega[1] + 0.5 * a[1] + c[1] * twelfth,
+        omega[2] + 0.5 * a[2] + c[2] * twelfth,
+        v[0] + b[0] + 0.5 * d[0] + e[0] * sixth,
+        v[1] + b[1] + 0.5 * d[1] + e[1] * sixth,
+        v[2] + b[2] + 0.5 * d[2] + e[2] * sixth,
+    )
 
 
 @kernel

@@ -17,12 +17,14 @@ import numpy.typing as npt
 
 from sim.kernels import LANES
 from sim.kernels.air import strip_forces
-from sim.kernels.bodies import inertial, kinetic_and_height, local_rate, move, rate_change, times_mass, track
+from sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from sim.kernels.connectors import connect, relative_pose, tangent
 from sim.kernels.jit import kernel
 from sim.kernels.linear import factor, solve, subtract_column
-from sim.kernels.tangents import add_connectors, add_own_damping, start_blocks
-from sim.kernels.vector import load, load0, load3, store, store1, store3
+from sim.kernels.memory import aligned, zeros
+from sim.kernels.stages import combine, coupled_rates, keep_stage
+from sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
+from sim.kernels.vector import load, load0, load3, store, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -67,7 +69,7 @@ class Wiring(NamedTuple):
     """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
 
     Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
-    (``sim.kernels.tangents``), the rest of its structure is that of ``sim.kernels.linear``.
+    (``sim.kernels.tangents``); order to fill are that of ``sim.elimination``.
     """
 
     mass: Array
@@ -79,11 +81,13 @@ class Wiring(NamedTuple):
     driven: int
     a: Array
     b: Array
+    order: Index
     start: Index
     below: Index
     row: Index
     products: Index
     product_start: Index
+    fill: Index
     strip_start: Index
     weight: Array
     centroid: Array
@@ -133,7 +137,6 @@ class Work(NamedTuple):
     p: Array
     V: Array
     xi: Array
-    zero: Array
     r_xi: Array
     known: Array
     U_xi: Array
@@ -191,47 +194,35 @@ def set_rods(rods: Array, state: State) -> None:
         store(state.V, n + k, 0, rods[k, 1])
 
 
-@kernel
-def _combine(base: Array, U: Array, coefficient: Array, count: int, factor_: float, out: Array) -> None:
-    """out = base + factor * sum over the first ``count`` stages of coefficient * U."""
-    for i in range(base.shape[0]):
-        for k in range(base.shape[1]):
-            total = load(base, i, k)
-            for s in range(count):
-                total += (factor_ * coefficient[s]) * load3(U, s, i, k)
-            store(out, i, k, total)
-
-
 def new_work(wiring: Wiring, lanes: Lanes) -> Work:
     """Scratch arrays for a group of lanes."""
     n, c = len(wiring.mass), len(wiring.first)
     motion, stages = (n + 2, 6, LANES), (STAGES, n + 2, 6, LANES)
     blocks = n + 2 * len(wiring.below) + c - wiring.driven
     return Work(
-        R=np.zeros((n + 2, 9, LANES)),
-        p=np.zeros((n + 2, 3, LANES)),
-        V=np.zeros(motion),
-        xi=np.zeros(motion),
-        zero=np.zeros(motion),
-        r_xi=np.zeros(motion),
-        known=np.zeros(motion),
-        U_xi=np.zeros(stages),
-        U_V=np.zeros(stages),
-        wrench=np.zeros(motion),
-        lead=np.zeros(motion),
-        Q=np.zeros((c, 9, LANES)),
-        d=np.zeros((c, 3, LANES)),
-        Q0=np.zeros((c, 9, LANES)),
-        d0=np.zeros((c, 3, LANES)),
-        against=-lanes.damping,
-        blocks=np.zeros((blocks, 36, LANES)),
-        normal_damping=np.zeros((n, LANES)),
-        drag0=np.zeros((n, LANES)),
-        V0=np.zeros(motion),
-        lost=np.zeros(LANES),
-        stored=np.zeros(LANES),
-        air_power=np.zeros(LANES),
-        air_force=np.zeros((3, LANES)),
+        R=zeros((n + 2, 9, LANES)),
+        p=zeros((n + 2, 3, LANES)),
+        V=zeros(motion),
+        xi=zeros(motion),
+        r_xi=zeros(motion),
+        known=zeros(motion),
+        U_xi=zeros(stages),
+        U_V=zeros(stages),
+        wrench=zeros(motion),
+        lead=zeros(motion),
+        Q=zeros((c, 9, LANES)),
+        d=zeros((c, 3, LANES)),
+        Q0=zeros((c, 9, LANES)),
+        d0=zeros((c, 3, LANES)),
+        against=aligned(-lanes.damping),
+        blocks=zeros((blocks, 36, LANES)),
+        normal_damping=zeros((n, LANES)),
+        drag0=zeros((n, LANES)),
+        V0=zeros(motion),
+        lost=zeros((LANES,)),
+        stored=zeros((LANES,)),
+        air_power=zeros((LANES,)),
+        air_force=zeros((3, LANES)),
     )
 
 
@@ -289,12 +280,12 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
     work.d0[:] = work.d
     work.drag0[:] = work.normal_damping
     work.V0[:] = work.V
-    start_blocks(wiring.mass, wiring.inertia, work.drag0, work.R, work.V, setting.gravity, hg, work.blocks)
+    start_blocks(wiring.mass, wiring.inertia, work.drag0, work.R, work.V, setting.gravity, hg, wiring.fill, work.blocks)
     add_connectors(
         wiring.first, wiring.second, wiring.lower, wiring.upper, wiring.a, wiring.b,
         lanes.stiffness, lanes.damping, lanes.coupling, work.Q0, work.d0, work.V, hg, work.blocks,
     )  # fmt: skip
-    factor(wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
+    factor(wiring.order, wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
 @kernel
@@ -306,38 +297,27 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
     """
     n, hg, k = len(wiring.mass), setting.step * GAMMA, wiring.driven
     r_xi, wrench, known = work.r_xi, work.wrench, work.known
-    local_rate(work.xi, work.V, r_xi)
-    _combine(r_xi, work.U_xi, COUPLING[stage], stage, 1.0 / setting.step, r_xi)
-    _combine(work.zero, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, work.lead)
+    coupled_rates(work.xi, work.V, work.U_xi, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, r_xi, work.lead)
     for rod in range(n, n + 2):
         turn = hg * (load(work.lead, rod, 0) + rods[rod - n, 2])
         store(known, rod, 0, turn + load(r_xi, rod, 0))
         for j in range(1, 6):
             store(known, rod, j, load(r_xi, rod, j))
-    for i in range(n):
-        for j in range(6):
-            store(work.lead, i, j, load(work.lead, i, j) + (1.0 / hg) * load(r_xi, i, j))
-    add_own_damping(wiring.mass, wiring.inertia, work.drag0, work.V0, r_xi, wrench)
-    times_mass(wiring.mass, wiring.inertia, work.lead, wrench)
+    add_own_terms(wiring.mass, wiring.inertia, work.drag0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)
     for c in range(k, len(wiring.first)):
         subtract_column(wiring.second[c], wiring.lower[c], work.blocks, known, wiring.first[c], wrench)
-    solve(wiring.start, wiring.below, wiring.row, work.blocks, wrench)
+    solve(wiring.order, wiring.start, wiring.below, wiring.row, work.blocks, wrench)
     known[:n] = wrench[:n]
-    for i in range(n + 2):
-        for j in range(6):
-            y = load(known, i, j)
-            store3(work.U_xi, stage, i, j, hg * y)
-            store3(work.U_V, stage, i, j, y - load(r_xi, i, j))
-    rate_change(work.V0, known, -hg, work.U_V[stage])
+    keep_stage(known, r_xi, work.V0, hg, work.U_xi[stage], work.U_V[stage])
 
 
 @kernel
 def _to_stage(work: Work, state: State, stage: int) -> None:
     """Local coordinates, twist and pose of a stage."""
     if stage < 5:
-        _combine(work.zero, work.U_xi, STAGE[stage], stage, 1.0, work.xi)
-        _combine(state.V, work.U_V, STAGE[stage], stage, 1.0, work.V)
+        combine(0.0, state.V, work.U_xi, STAGE[stage], stage, work.xi)
+        combine(1.0, state.V, work.U_V, STAGE[stage], stage, work.V)
     else:
         for i in range(work.xi.shape[0]):
             for k in range(6):

@@ -1,20 +1,87 @@
-"""How kernels are compiled: cached on disk, fused multiply-add allowed, no other liberty with the arithmetic."""
+"""How kernels are compiled: cached on disk, fused multiply-add allowed, no other liberty with the arithmetic.
+
+Numba's cache looks at the file of the cached function alone, but a kernel contains what it calls from other files:
+after an edit there, the old physics would run on. So what is compiled goes to a folder named after the content of all
+kernels, and another content finds that folder empty.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import hashlib
+import inspect
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
 from typing import TypeVar, cast
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., object])
 
+_KEPT = 8  # contents of the kernels whose compiled code is kept
+
 
 def kernel(function: F) -> F:
-    """Compile a function over groups of lanes, cached on disk."""
-    return cast(F, numba.njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function))
+    """Compile a function over groups of lanes, cached on disk by the content of all kernels.
+
+    OSError where no folder for the cache can be written; RuntimeError where numba puts it elsewhere.
+    """
+    folder = _cache_folder(Path(inspect.getfile(function)).resolve().parent)
+    with _cached_in(folder):
+        compiled = numba.njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
+    if not Path(compiled.stats.cache_path).is_relative_to(folder):
+        raise RuntimeError(
+            f"numba {numba.__version__} caches {function.__qualname__!r} in {compiled.stats.cache_path} instead of "
+            f"{folder}: code compiled from older kernels could run; use a numba that heeds numba.config.CACHE_DIR"
+        )
+    return cast(F, compiled)
 
 
 def inlined(function: F) -> F:
     """Compile a small function into each kernel that calls it."""
     return cast(F, numba.njit(forceinline=True, fastmath={"contract"}, error_model="numpy")(function))
+
+
+@cache
+def _cache_folder(source: Path) -> Path:
+    """Where the kernels of the folder ``source`` are cached: named after its content and that of this one."""
+    digest = hashlib.sha256()
+    for file in sorted({*source.glob("*.py"), *Path(__file__).resolve().parent.glob("*.py")}):
+        digest.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    places = (
+        Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else source / "__pycache__",
+        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wingfit",
+    )
+    for place in places:
+        folder = place / f"kernels-{digest.hexdigest()[:16]}"
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            folder.touch()
+            if os.access(folder, os.W_OK):
+                _forget_old(place)
+                return folder
+    raise OSError(
+        f"compiled kernels cannot be kept in {' or '.join(map(str, places))}: "
+        "set NUMBA_CACHE_DIR to a folder that can be written"
+    )
+
+
+def _forget_old(place: Path) -> None:
+    """Remove all but the last used folders; a process that still needs one makes it again."""
+    folders = sorted(place.glob("kernels-*"), key=lambda folder: folder.stat().st_mtime)
+    for folder in folders[:-_KEPT]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _cached_in(folder: Path) -> Iterator[None]:
+    """Numba's setting NUMBA_CACHE_DIR, which it reads where a function is decorated."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = before

@@ -2,9 +2,9 @@
 
 The exact linearisation of the wing is not symmetric: dampers turn with the bodies, wrenches have moments. Pivots are
 whole 6 x 6 blocks, inverted without exchanges: inertia over the step and dissipation make them dominate. ``blocks``
-[NB, 36, W] holds the N diagonal blocks, then the L below the diagonal (``row`` > column, including fill), then as many
-above it, in the same order, and last the columns of the driving rods, which are known and never factored. The symbolic
-factorisation (``sim.structure``) lists, in order, which products to subtract.
+[NB, 36, W] holds the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as
+many above it, in the same order, and last the columns of the driving rods, which are known and never factored.
+``sim.elimination`` lists, in the bodies' order of elimination, the blocks and which products to subtract.
 """
 
 from __future__ import annotations
@@ -90,17 +90,18 @@ def _subtract_product(A: Array, B: Array, C: Array) -> None:
 
 
 @kernel
-def factor(start: Index, below: Index, products: Index, product_start: Index, blocks: Array) -> None:
+def factor(order: Index, start: Index, below: Index, products: Index, product_start: Index, blocks: Array) -> None:
     """Block LU in place: inverses on the diagonal, L = A D^-1 below it, U above.
 
-    ``below[start[n]:start[n + 1]]`` are the blocks under diagonal block n; the products to subtract after column n are
-    rows ``product_start[n]:product_start[n + 1]`` of ``products`` (target, left, right).
+    ``below[start[k]:start[k + 1]]`` are the blocks under the diagonal block of body order[k]; the products to subtract
+    after it are rows ``product_start[k]:product_start[k + 1]`` of ``products`` (target, left, right).
     """
-    for n in range(len(start) - 1):
+    for k in range(len(order)):
+        n = order[k]
         _invert(blocks[n])
-        for s in range(start[n], start[n + 1]):
+        for s in range(start[k], start[k + 1]):
             _times_inverse(blocks[below[s]], blocks[n])
-        for s in range(product_start[n], product_start[n + 1]):
+        for s in range(product_start[k], product_start[k + 1]):
             _subtract_product(blocks[products[s, 1]], blocks[products[s, 2]], blocks[products[s, 0]])
 
 
@@ -126,12 +127,12 @@ def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
 
 
 @kernel
-def solve(start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
+def solve(order: Index, start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
     """Solve L U x = x in place for x [N, 6, W]; ``row`` gives the body row of each block in ``below``."""
-    for n in range(len(start) - 1):
-        for s in range(start[n], start[n + 1]):
-            subtract_column(row[s], below[s], blocks, x, n, x)
-    for n in range(len(start) - 2, -1, -1):
-        for s in range(start[n], start[n + 1]):
-            subtract_column(n, below[s] + len(below), blocks, x, row[s], x)
-        _times_block(n, blocks, n, x)
+    for k in range(len(order)):
+        for s in range(start[k], start[k + 1]):
+            subtract_column(row[s], below[s], blocks, x, order[k], x)
+    for k in range(len(order) - 1, -1, -1):
+        for s in range(start[k], start[k + 1]):
+            subtract_column(order[k], below[s] + len(below), blocks, x, row[s], x)
+        _times_block(order[k], blocks, order[k], x)

@@ -222,3 +222,26 @@ def add_to_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> Non
     _add_quarter(blocks, m, 3, A[1])
     _add_quarter(blocks, m, 18, A[2])
     _add_quarter(blocks, m, 21, A[3])
+
+
+@inlined
+def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
+    """Put A into the quarter of block m that starts at element ``at``."""
+    store(blocks, m, at, A[0])
+    store(blocks, m, at + 1, A[1])
+    store(blocks, m, at + 2, A[2])
+    store(blocks, m, at + 6, A[3])
+    store(blocks, m, at + 7, A[4])
+    store(blocks, m, at + 8, A[5])
+    store(blocks, m, at + 12, A[6])
+    store(blocks, m, at + 13, A[7])
+    store(blocks, m, at + 14, A[8])
+
+
+@inlined
+def set_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> None:
+    """Put the 6 x 6 matrix of four into block m of ``blocks`` [NB, 36, W]."""
+    _set_quarter(blocks, m, 0, A[0])
+    _set_quarter(blocks, m, 3, A[1])
+    _set_quarter(blocks, m, 18, A[2])
+    _set_quarter(blocks, m, 21, A[3])

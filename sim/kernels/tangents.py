@@ -39,6 +39,7 @@ from sim.kernels.matrices import (
     product,
     rows_scaled,
     scaled,
+    set_block,
     skew,
     skew_times,
     times,
@@ -48,7 +49,7 @@ from sim.kernels.matrices import (
     transposed,
     with_diagonal,
 )
-from sim.kernels.vector import load, load1
+from sim.kernels.vector import load, load1, store
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -136,13 +137,23 @@ def turned_right(sign: float, A: Six, Q: Nine) -> Six:
 
 @kernel
 def start_blocks(
-    mass: Array, inertia: Array, damping: Array, R: Array, V: Array, gravity: float, length: float, blocks: Array
+    mass: Array,
+    inertia: Array,
+    damping: Array,
+    R: Array,
+    V: Array,
+    gravity: float,
+    length: float,
+    fill: Index,
+    blocks: Array,
 ) -> None:
-    """Set the blocks to the bodies' own part of S: inertia, gyroscopic terms, gravity, and the air's normal damping.
+    """Set the diagonal to the bodies' own part of S: inertia, gyroscopic terms, gravity, the air's normal damping.
 
-    ``damping`` [N, W] acts along each body's normal.
+    ``damping`` [N, W] acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
     """
-    blocks[:] = 0.0
+    for k in fill:
+        for i in range(36):
+            store(blocks, k, i, 0.0)
     for n in range(len(mass)):
         m, own = mass[n], load_inertia(inertia, n)
         up = (load(R, n, 6), load(R, n, 7), load(R, n, 8))
@@ -158,18 +169,30 @@ def start_blocks(
         tilt = length * normal
         to = (to[0], to[1], to[2], to[3], to[4], to[5], to[6] - tilt * v[1], to[7] + tilt * v[0], to[8])
         tt = with_diagonal(tt, (weight, weight, weight + normal))
-        add_to_block(blocks, n, (oo, scaled(0.0, to), to, tt))
+        set_block(blocks, n, (oo, scaled(0.0, to), to, tt))
 
 
 @kernel
-def add_own_damping(mass: Array, inertia: Array, damping: Array, V: Array, X: Array, wrench: Array) -> None:
-    """Add to the wrenches what the bodies' own -dW/dV of :func:`start_blocks` makes of motions X [N, 6, W]."""
+def add_own_terms(
+    mass: Array, inertia: Array, damping: Array, V: Array, factor: float, lead: Array, X: Array, wrench: Array
+) -> None:
+    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, W being the bodies' own as in :func:`start_blocks`."""
     for n in range(len(mass)):
-        m, omega, x, y = mass[n], load_vector(V, n, 0), load_vector(X, n, 0), load_vector(X, n, 3)
-        t = times(gyroscopic(load_inertia(inertia, n), omega), x)
+        m, own, omega = mass[n], load_inertia(inertia, n), load_vector(V, n, 0)
+        x, y, u, w = load_vector(X, n, 0), load_vector(X, n, 3), load_vector(lead, n, 0), load_vector(lead, n, 3)
+        spin = times(own, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]))
+        t = times(gyroscopic(own, omega), x)
         f, g = cross(omega, y), cross(load_vector(V, n, 3), x)
-        f = (m * (f[0] - g[0]), m * (f[1] - g[1]), m * (f[2] - g[2]) + load1(damping, n) * y[2])
-        add_wrench(wrench, n, t, f)
+        add_wrench(
+            wrench,
+            n,
+            (t[0] + spin[0], t[1] + spin[1], t[2] + spin[2]),
+            (
+                m * (f[0] - g[0] + w[0] + factor * y[0]),
+                m * (f[1] - g[1] + w[1] + factor * y[1]),
+                m * (f[2] - g[2] + w[2] + factor * y[2]) + load1(damping, n) * y[2],
+            ),
+        )
 
 
 @kernel
@@ -189,7 +212,7 @@ def add_connectors(
     length: float,
     blocks: Array,
 ) -> None:
-    """Add the connectors' part of S.
+    """Add the connectors' part of S to the diagonal and set it beside.
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
     driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.
@@ -224,9 +247,9 @@ def add_connectors(
         Z = complete(sum_of(by_second, on_second), length, do, dt)
         add_to_block(blocks, j, turned_left(1.0, Q, turned_right(1.0, moved(arm, Z, arm), Q)))
         Z = complete(sum_of(by_first, on_second), length, do, dt)
-        add_to_block(blocks, lower[c], turned_left(-1.0, Q, moved(arm, Z, e)))
+        set_block(blocks, lower[c], turned_left(-1.0, Q, moved(arm, Z, e)))
         if upper[c] >= 0:
             Z = complete(sum_of(by_first, on_first), length, do, dt)
             add_to_block(blocks, i, moved(e, Z, e))
             Z = complete(sum_of(by_second, on_first), length, do, dt)
-            add_to_block(blocks, upper[c], turned_right(-1.0, moved(e, Z, arm), Q))
+            set_block(blocks, upper[c], turned_right(-1.0, moved(e, Z, arm), Q))

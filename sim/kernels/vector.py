@@ -96,11 +96,16 @@ def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: AR
 
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, indices: Any) -> Any:
-    """Pointer to the lanes of a C-contiguous array at all but the last index."""
+    """Pointer to the lanes of a C-contiguous array at all but the last index.
+
+    The last of the indices steps over one group of lanes, which the compiler may know: with a constant index it is
+    part of the instruction.
+    """
     proxy = context.make_array(kind)(context, builder, array)
-    strides = cgutils.unpack_tuple(builder, proxy.strides)
+    strides = cgutils.unpack_tuple(builder, proxy.strides)[: len(indices)]
+    strides[-1:] = [ir.Constant(ir.IntType(64), 8 * LANES)] * bool(indices)
     offset = ir.Constant(ir.IntType(64), 0)
-    for index, stride in zip(indices, strides, strict=False):
+    for index, stride in zip(indices, strides, strict=True):
         offset = builder.add(offset, builder.mul(index, stride))
     start = builder.bitcast(proxy.data, ir.IntType(8).as_pointer())
     return builder.bitcast(builder.gep(start, [offset]), _LLVM.as_pointer())

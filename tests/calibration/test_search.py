@@ -17,6 +17,7 @@ from calibration.result import compare, summarise
 from calibration.search import CalibrationSpec, calibrate, model_for, plan
 from calibration.standing import _linearised, standing
 from records import Condition, Dataset, Gene, Genome, Recording
+from sim.flexible_wing import FlexibleWing
 from sim.rig import Tracking, _noise
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
 
@@ -48,6 +49,26 @@ def test_stages_follow_the_thesis(small: tuple[Dataset, Genome]) -> None:
     (joint,) = plan(CalibrationSpec(division="4", mode="joint"), dataset)
     assert joint.free == (*STRUCTURAL, *AERODYNAMIC)
     assert len(joint.recordings) == 2
+
+
+def test_everything_is_simulated_as_accurately_as_the_specification_says(small: tuple[Dataset, Genome]) -> None:
+    """The search, the judgement and its standard errors, the tracks; also when it goes on from a checkpoint."""
+    dataset, truth = small
+    seen: list[float] = []
+
+    class Noting(Here):
+        def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+            assert isinstance(problem.model, FlexibleWing)
+            seen.append(problem.model.numerics.accuracy)
+            return super().evaluate(problem, values, residuals=residuals)
+
+    spec = replace(SPEC, accuracy=3e-4, max_generations=1, population=4, genes=("E_r", "L_a"))
+    first, *_ = calibrate(spec, dataset, Noting())
+    assert list(calibrate(spec, dataset, Noting(), first.checkpoint))
+    summarise(spec, dataset, Noting(), truth.as_dict())
+    assert len(seen) > 4
+    assert set(seen) == {3e-4}
+    assert CalibrationSpec().accuracy == model_for(dataset, "4").numerics.accuracy == 1e-4
 
 
 def test_fitness_is_equation_14(small: tuple[Dataset, Genome]) -> None:
@@ -202,6 +223,10 @@ def test_comparison_lies_on_the_recording(small: tuple[Dataset, Genome]) -> None
     assert np.all((laid.phase >= 0) & (laid.phase < 1))
     assert np.nanmean(np.linalg.norm(laid.recorded - laid.simulated, axis=2)) < 1.2e-3
     reference = [record.markers.index(m) for m in dataset.wing.reference_markers if m in record.markers]
+    assert laid.accuracy == CalibrationSpec().accuracy
+    assert 0 < laid.solution.error <= laid.accuracy
+    assert laid.solution.steps >= 64
+    assert laid.solution.beats > 1
     near = (laid.phase < 0.05) | (laid.phase > 0.95)
     assert np.abs(laid.simulated[near][:, reference, 2].mean(axis=1)).max() < 0.06, "phase 0 is the horizontal"
 
@@ -214,6 +239,7 @@ def refused(spec: CalibrationSpec, dataset: Dataset, match: str) -> None:
 def test_specs_that_do_not_fit_are_refused_with_what_would(small: tuple[Dataset, Genome], marker_only: Dataset) -> None:
     dataset, _ = small
     refused(replace(SPEC, division="7"), dataset, "preset")
+    refused(replace(SPEC, accuracy=0.0), dataset, "accuracy is 0.0 m; it must be a positive number")
     refused(replace(SPEC, recordings=("nope",)), dataset, "no recording 'nope'")
     refused(replace(SPEC, recordings=(dataset.held_out[0],)), dataset, "held out")
     refused(replace(SPEC, genes=("E_x",)), dataset, "unknown gene 'E_x'")

@@ -86,14 +86,18 @@ def test_every_command_has_an_example_and_options_with_help(name: str) -> None:
 
 
 def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
-    code, out, err = wingfit("runs", "submit", dataset_id, "--max-generations", "3", "--watch", "--name", "mine")
+    words = ["runs", "submit", dataset_id, "--max-generations", "3", "--accuracy-mm", "0.05"]
+    code, out, err = wingfit(*words, "--watch", "--name", "mine")
     assert code == 0
     assert "SUCCEEDED" in out
     assert "calibrating  100 %" in err
     run_id = out.split()[1]
     assert run_id in wingfit("runs", "list")[1]
-    assert json.loads(wingfit("runs", "show", run_id, "--json")[1])["spec"]["max_generations"] == 3
-    assert "mine" in wingfit("runs", "show", run_id)[1]
+    spec = json.loads(wingfit("runs", "show", run_id, "--json")[1])["spec"]
+    assert (spec["max_generations"], spec["accuracy_mm"]) == (3, 0.05)
+    shown = wingfit("runs", "show", run_id)[1]
+    assert "mine" in shown
+    assert "accuracy_mm 0.05" in shown
     code, out, _ = wingfit("runs", "result", run_id)
     assert "all held out" in out
     assert "stiffness" in out
@@ -105,6 +109,8 @@ def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: 
     code, out, _ = wingfit(*words, "-o", str(tracks))
     assert code == 0
     assert "recording slow: mean distance" in out
+    assert "solved with 144 steps a beat, estimated error 0.02 mm" in out
+    assert "estimated error 0.1 mm" in wingfit(*words, "--accuracy-mm", "0.5")[1]
     rows = list(csv.DictReader(tracks.open()))
     assert len(rows) == 4 * 2
     assert rows[3]["recorded_x_mm"] == ""
@@ -126,6 +132,14 @@ def test_reading_commands_speak_json(wingfit: Wingfit, dataset_id: str) -> None:
         code, out, _ = wingfit(*words, "--json")
         assert code == 0
         assert json.loads(out)
+
+
+def test_an_accuracy_out_of_reach_is_told_with_its_limit(wingfit: Wingfit, dataset_id: str) -> None:
+    for words in (("runs", "submit", dataset_id), ("simulate", "--dataset", dataset_id)):
+        code, out, err = wingfit(*words, "--accuracy-mm", "0.001")
+        assert (code, out) == (1, "")
+        assert "at least 0.02 mm" in err
+        assert "0.001" in err
 
 
 def test_steering(wingfit: Wingfit, dataset_id: str) -> None:

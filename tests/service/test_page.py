@@ -140,6 +140,8 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert seen.page.locator("#misfit .badge.held").count() == 1
     assert seen.page.locator("#genes tbody tr").count() == len(toy.TARGET)
     assert "yes" in seen.page.inner_text("#genes tbody tr:first-child")
+    assert "solved to 0.1 mm" in seen.page.inner_text("#run-about")
+    assert "144 steps a beat, estimated error 0.02 mm" in seen.page.inner_text("#wing-note")
     assert seen.page.locator(".cards li.current").count() == 1
     assert seen.errors == []
     assert seen.foreign == []
@@ -217,10 +219,16 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     seen.wait("document.getElementById('submit-errors').textContent.includes('seed')")
     assert seen.page.get_attribute("[name=seed]", "aria-invalid") == "true"
     seen.page.fill("[name=seed]", "4")
+    seen.page.fill("[name=accuracy_mm]", "0.01")
+    seen.page.click("#submit-form [type=submit]")
+    seen.wait("document.getElementById('submit-errors').textContent.includes('at least 0.02 mm')")
+    assert seen.page.get_attribute("[name=accuracy_mm]", "aria-invalid") == "true"
+    seen.page.fill("[name=accuracy_mm]", "0.05")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
     run_id = seen.page.evaluate("location.hash").removeprefix("#run=")
-    assert server.api.run(run_id)["spec"]["seed"] == 4
+    spec = server.api.run(run_id)["spec"]
+    assert (spec["seed"], spec["accuracy_mm"]) == (4, 0.05)
     seen.page.wait_for_selector("#copy-curl")
     seen.page.click("#copy-curl")
     seen.wait("!document.getElementById('toast').hidden")

@@ -24,6 +24,8 @@ from tests.service.conftest import Api
         ({"seed": 2**53}, "body.seed"),
         ({"bounds_factor": 1.0}, "body.bounds_factor"),
         ({"bounds_factor": 101}, "body.bounds_factor"),
+        ({"accuracy_mm": 0.01}, "body.accuracy_mm"),
+        ({"accuracy_mm": None}, "body.accuracy_mm"),
         ({"tolerance": -0.1}, "body.tolerance"),
         ({"tolerance": 1.1}, "body.tolerance"),
         ({"division": "eleven"}, "body.division"),

@@ -21,6 +21,7 @@ from calibration.problem import Evaluation, Problem
 from calibration.result import Comparison, GeneResult, RecordingResult, Result
 from calibration.search import CalibrationSpec, Generation
 from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
+from sim.model import Solution
 from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
@@ -164,7 +165,8 @@ class ToyEngine:
         record = dataset.recording(recording)
         simulated = np.nan_to_num(record.positions) + misfit(genome)
         phase = np.arange(len(record.times)) / len(record.times)
-        return Comparison(recording, phase, record.markers, record.positions, simulated)
+        solution = Solution(144, 7, 0.2 * spec.accuracy)
+        return Comparison(recording, phase, record.markers, record.positions, simulated, spec.accuracy, solution)
 
     def loads(
         self,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from records import FourierDrive, Hinge, Marker, Materials, Rod, Station, Wing
 from sim.kernels import LANES
 from sim.kernels.integrate import STAGES, Lanes, Setting, State, Trace, advance, new_work
-from sim.simulate import new_trace
+from sim.scene import new_trace
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]

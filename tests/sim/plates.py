@@ -13,7 +13,7 @@ from sim.division import Division
 from sim.kernels import LANES
 from sim.kernels.connectors import connect, relative_pose, tangent
 from sim.kernels.integrate import Lanes
-from sim.simulate import at_rest
+from sim.scene import at_rest
 from sim.structure import Structure, build
 from sim.wing_genes import lanes, wing_genes
 

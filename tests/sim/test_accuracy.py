@@ -10,8 +10,9 @@ import pytest
 
 from records import Condition
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import LADDER, Numerics
 from sim.rig import blank_recording, robird_wing, tunnel, vacuum
-from sim.simulate import LADDER, Beat, Numerics
+from sim.simulate import Beat
 
 Array = npt.NDArray[np.float64]
 FINE = Numerics(steps=864, periodic=1e-6, max_beats=60)

@@ -25,6 +25,7 @@ from benchmarks.beams import (
     CASES,
     ELASTIC,
     STOCKY,
+    THICK_PLATE,
     UNIFORM_ROD,
     UNIFORM_SHEET,
     WINGS,
@@ -32,6 +33,7 @@ from benchmarks.beams import (
     frequency_markdown,
     observed_order,
     torsion_carried,
+    twist_rate,
     wing_tracks,
 )
 from benchmarks.spring_chain import cut_beam, spring_chain
@@ -102,7 +104,7 @@ def test_ritz_gives_both_torsions_of_the_uniform_beam() -> None:
     np.testing.assert_allclose(torsional(beam), closed, rtol=1e-9)
     # short, so that the determinant keeps its digits
     L, warping = 0.2, beam.young * (c * h) ** 3 / 144
-    for frequency in torsional(replace(beam, length=L), warping=True):
+    for frequency in torsional(replace(beam, length=L), warping=1.0):
         sides = []
         for omega in 2 * np.pi * frequency * np.array([1 - 1e-6, 1 + 1e-6]):
             rate = np.diag([1.0, 1.0, 1.0], 1)
@@ -155,15 +157,43 @@ def test_frequencies_converge_at_second_order(name: str, family: Family, chordwi
     assert orders == pytest.approx([2.0] * 3, abs=0.3)
 
 
+@pytest.mark.parametrize("chord", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("division", ["4x1", "4x3", "6x4", "32x4", "8x16"])
+def test_all_connectors_together_carry_the_torsion_constant(chord: float, division: str) -> None:
+    """Of narrow and of wide plates, of strips wider and narrower than the plate is thick."""
+    beam = Beam(0.5, (chord, chord), (0.02, 0.02))
+    assert torsion_carried(cut_beam(beam, division)) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize(("chordwise", "off"), [(2, 0.9e-3), (4, 1.8e-3)])
+def test_twist_of_a_thick_plate_does_not_depend_on_the_strips(chordwise: int, off: float) -> None:
+    """A twentieth as thick as deep, strips down to three times its thickness: within 0.2 % of Saint-Venant's."""
+    coarse, fine = (twist_rate(THICK_PLATE, f"{strips}x{chordwise}") for strips in (16, 32))
+    assert 1 < fine < 1 + off
+    assert fine == pytest.approx(coarse, abs=1e-4)
+
+
+@pytest.mark.parametrize(("chordwise", "limit"), [(2, (1e-3, 1.5e-3, 3e-3)), (4, (1.5e-3, 7e-3, 1.5e-2))])
+def test_torsion_of_a_sheet_cut_both_ways_converges(chordwise: int, limit: tuple[float, ...]) -> None:
+    """A sheet three times as long as deep, strips narrower than the 24 mm over which its clamped end warps.
+
+    Order between one and two (docs/beams.md). Four pieces also let the chord bend, which the theory does not.
+    """
+    beam = replace(UNIFORM_SHEET, length=0.3, thickness=(0.001, 0.001))
+    cuts = (128 // chordwise // 4, 128 // chordwise // 2, 128 // chordwise)
+    errors = np.array([frequency_errors("", beam, ("torsion",), True, chordwise, n)[0].errors for n in cuts])
+    assert np.all(np.abs(errors[2]) < limit)
+    steps = np.abs(np.diff(errors, axis=0))
+    assert np.all(np.log2(steps[0] / steps[1]) > 1.2)
+
+
 @pytest.mark.parametrize("chordwise", [2, 4])
-@pytest.mark.parametrize("strips", [16, 32])
-def test_torsion_of_a_sheet_cut_both_ways_follows_what_its_connectors_carry(chordwise: int, strips: int) -> None:
-    """The pieces' own torsion constants lose at their edges what the whole section has: docs/beams.md."""
-    carried = torsion_carried(cut_beam(UNIFORM_SHEET, f"{strips}x{chordwise}"))
-    assert 0.95 < carried < 1.001
-    first = errors_of("uniform sheet", "torsion", chordwise, strips)[0]
-    assert first == pytest.approx(np.sqrt(carried) - 1, abs=8e-3)
-    assert torsion_carried(cut_beam(UNIFORM_SHEET, f"{strips}x1")) == pytest.approx(1, abs=1e-4)
+@pytest.mark.parametrize("name", ["uniform sheet", "tapered sheet"])
+def test_torsion_of_a_slender_sheet_cut_both_ways(name: str, chordwise: int) -> None:
+    """First two frequencies at 32 strips; they stay so close at 64."""
+    assert np.all(np.abs(errors_of(name, "torsion", chordwise, 32)[:2]) < 1.6e-3)
+    if chordwise == 2:
+        assert np.all(np.abs(errors_of(name, "torsion", chordwise, 64)[:2]) < 3e-4)
 
 
 @pytest.mark.parametrize(("chordwise", "worst"), [(2, 0.115), (4, 0.145)])
@@ -184,12 +214,25 @@ def test_large_deflection_is_the_elasticas(load: float, deflection: float, short
     assert observed_order(coarse[1], fine[1]) == pytest.approx(2, abs=0.2)
 
 
-def test_the_wing_converges_at_second_order_where_rods_do_not_end_between_seams() -> None:
-    """Periodic motion of the markers in vacuum: each halving of the strips moves them a quarter as far."""
-    tracks = [wing_tracks(WINGS["rods to the tip"], strips, 1) for strips in (4, 8, 16, 32)]
+@pytest.mark.parametrize("name", WINGS)
+def test_the_wing_converges_at_second_order(name: str) -> None:
+    """Periodic motion of the markers in vacuum: each halving of the strips moves them about a quarter as far.
+
+    The share of the error that comes from where a rod ends in its strip differs from cut to cut, so for the wing with
+    its own rods the mean over two halvings counts.
+    """
+    tracks = [wing_tracks(WINGS[name], f"{strips}x1") for strips in (4, 8, 16, 32)]
     steps = [float(np.linalg.norm(b - a, axis=-1).mean()) for a, b in pairwise(tracks)]
-    assert observed_order(steps[1], steps[2]) == pytest.approx(2, abs=0.3)
+    assert observed_order(steps[0], steps[2], 4.0) == pytest.approx(2, abs=0.3)
     assert steps[2] < 2e-4
+
+
+def test_more_bodies_along_the_chord_move_the_wing_less_and_less() -> None:
+    """The robird's front rod changes pieces of the chord twice: broken there, divisions would differ by centimetres."""
+    two, four, eight = (wing_tracks(WINGS["robird"], division) for division in ("16x2", "16x4", "16x8"))
+    steps = [float(np.linalg.norm(b - a, axis=-1).mean()) for a, b in ((two, four), (four, eight))]
+    assert steps[0] < 1.5e-3
+    assert steps[1] < 1.5e-3
 
 
 def test_tables_leave_out_motions_that_a_division_does_not_have() -> None:

@@ -9,8 +9,8 @@ import pytest
 from records import FourierDrive, Recording
 from sim.alignment import recorded_crossing, upstroke_crossing
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import Numerics
 from sim.rig import Tracking, blank_recording, record, robird_wing, true_genome, tunnel, vacuum
-from sim.simulate import Numerics
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
 
 QUICK = Numerics(steps=80, periodic=1e-4)
@@ -154,7 +154,7 @@ def test_lift_points_up_when_the_stream_comes_from_below(model: FlexibleWing) ->
 
 
 def test_rear_rod_lags(model: FlexibleWing) -> None:
-    from sim.simulate import drive_table
+    from sim.scene import drive_table
 
     table = drive_table(model.structure, tunnel(0.1, 3.0, 6.0), QUICK, 80, 5)
     front, rear = table[:, 0, 0, 0], table[:, 0, 1, 0]

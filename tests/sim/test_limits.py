@@ -12,8 +12,9 @@ from scipy.interpolate import CubicSpline
 from records import Condition, FourBarDrive, Genome
 from sim.division import Division
 from sim.kernels.integrate import Setting
+from sim.numerics import Numerics
 from sim.rig import robird_wing, tunnel, vacuum
-from sim.simulate import Numerics, at_rest, drive_table, setting
+from sim.scene import at_rest, drive_table, setting
 from sim.structure import Structure, build
 from sim.wing_genes import wing_genes
 from tests.sim.marching import CHORD, DENSITY, LENGTH, ORDER, THICKNESS, march, plank, vacuum_here
@@ -70,13 +71,14 @@ def test_four_bar_rocker_closes_the_loop() -> None:
 
 @pytest.mark.parametrize(
     ("condition", "genome", "order"),
-    [(vacuum(10.0, 0.05, 3.0), {}, 1.0), (tunnel(0.05, 3.0, 6.0), {}, 1.0), (vacuum(1.0, 0.05, 3.0), LIGHT, 2.7)],
+    [(vacuum(10.0, 0.05, 3.0), {}, 2.5), (tunnel(0.05, 3.0, 6.0), {}, 2.5), (vacuum(1.0, 0.05, 3.0), LIGHT, 2.0)],
     ids=["vacuum", "tunnel", "light damping"],
 )
 def test_energy_ledger_closes(condition: Condition, genome: dict[str, float], order: float) -> None:
     """Over two beats from rest: change of stored energy = work of motors + air - losses, to the integrator's error.
 
-    What strong dampers take from stiff modes converges more slowly than what light ones do.
+    Without damping modes ring that no step resolves; what the integrator takes from them is in no port, and is of
+    second order.
     """
     condition = replace(condition, gravity=0.0)
     structure = build(robird_wing(), Division.parse("11"))
@@ -90,8 +92,8 @@ def test_energy_ledger_closes(condition: Condition, genome: dict[str, float], or
         work = CubicSpline(times, power).antiderivative()(times)
         closing.append(np.abs(stored - stored[0] - work.sum(axis=1)).max() / np.abs(work[-1]).max())
         assert np.all(power[:, 0] <= 0), "dampers may only take energy"
-    assert closing[0] < 1e-3
-    assert closing[1] < 5e-5
+    assert closing[0] < 5e-4
+    assert closing[1] < 2e-5
     assert np.log(closing[0] / closing[1]) / np.log(4) > order
 
 

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 from records import Condition, FourierDrive
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.integrate import State
+from sim.numerics import Numerics
 from sim.outputs import Outputs, body_names, from_motion, simulate_outputs
 from sim.rig import Tracking, blank_recording, record, robird_wing, true_genome, tunnel, vacuum
-from sim.simulate import Beat, Numerics
+from sim.simulate import Beat
 from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]

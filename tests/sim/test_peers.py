@@ -30,8 +30,9 @@ from sim.drive import flap_angle
 from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
 from sim.kernels.integrate import forces, new_work
+from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing
-from sim.simulate import Numerics, setting
+from sim.scene import setting
 from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.integrate import State
+from sim.numerics import Numerics
 from sim.periodic import Secants
 from sim.rig import blank_recording, robird_wing, vacuum
-from sim.simulate import Numerics
 
 Array = npt.NDArray[np.float64]
 

@@ -12,6 +12,7 @@ import pytest
 import sim.rig
 from records import Dataset, Genome, Recording, load_dataset
 from sim.flexible_wing import FlexibleWing
+from sim.numerics import Numerics
 from sim.rig import (
     FRAMES_PER_BEAT,
     VACUUM,
@@ -27,7 +28,6 @@ from sim.rig import (
     vacuum,
     write_campaign,
 )
-from sim.simulate import Numerics
 
 Array = npt.NDArray[np.float64]
 

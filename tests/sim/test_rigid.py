@@ -15,8 +15,9 @@ from sim.division import Division
 from sim.drive import flap_angle
 from sim.kernels import LANES
 from sim.kernels.integrate import Lanes, State
+from sim.numerics import Numerics
 from sim.rig import vacuum
-from sim.simulate import Numerics, at_rest, drive_table
+from sim.scene import at_rest, drive_table
 from sim.structure import Structure, build
 from tests.sim.marching import ORDER, STIFF_ORDER, march, order, plank, turned, vacuum_here, with_connectors
 from tests.sim.plates import loaded

@@ -11,12 +11,13 @@ import pytest
 from records import Genome
 from sim.division import Division
 from sim.kernels import LANES
-from sim.kernels.bodies import local_rate, move, rate_change
+from sim.kernels.bodies import move
 from sim.kernels.integrate import GAMMA, Lanes, Setting, State, Wiring, Work, forces, linearise, new_work
 from sim.kernels.linear import solve
+from sim.kernels.stages import coupled_rates, keep_stage
 from sim.kernels.tangents import add_connectors, start_blocks
 from sim.rig import robird_wing
-from sim.simulate import at_rest
+from sim.scene import at_rest
 from sim.structure import Structure, build
 from sim.wing_genes import lanes, wing_genes
 
@@ -53,7 +54,8 @@ def rates(case: Case, xi: Array, V: Array) -> tuple[Array, Array]:
     work, rate = case.work, np.zeros_like(xi)
     move(case.state.R, case.state.p, xi, work.R, work.p)
     work.V[:] = case.state.V + V
-    local_rate(xi, work.V, rate)
+    nothing = np.zeros((1, *xi.shape))
+    coupled_rates(xi, work.V, nothing, nothing, np.zeros(1), 0, 1.0, rate, np.zeros_like(xi))
     forces(case.wiring, HERE, case.lanes, work)
     return rate, work.wrench.copy()
 
@@ -82,7 +84,7 @@ def assembled(case: Case, lane: int) -> Array:
     """The matrix of the kernels, not factored, with the columns of the driving rods."""
     w, work, n = case.wiring, case.work, len(case.wiring.mass)
     rates(case, np.zeros_like(case.state.V), np.zeros_like(case.state.V))
-    start_blocks(w.mass, w.inertia, np.zeros((n, LANES)), work.R, work.V, HERE.gravity, LENGTH, work.blocks)
+    start_blocks(w.mass, w.inertia, np.zeros((n, LANES)), work.R, work.V, HERE.gravity, LENGTH, w.fill, work.blocks)
     add_connectors(
         w.first, w.second, w.lower, w.upper, w.a, w.b, case.lanes.stiffness, case.lanes.damping, case.lanes.coupling,
         work.Q, work.d, work.V, LENGTH, work.blocks,
@@ -90,9 +92,10 @@ def assembled(case: Case, lane: int) -> Array:
     found, blocks = np.zeros((n + 2, 6, n + 2, 6)), work.blocks[..., lane].reshape(-1, 6, 6)
     for k in range(n):
         found[k, :, k] = blocks[k]
+        column = w.order[k]
         for s in range(w.start[k], w.start[k + 1]):
-            found[w.row[s], :, k] = blocks[w.below[s]]
-            found[k, :, w.row[s]] = blocks[w.below[s] + len(w.below)]
+            found[w.row[s], :, column] = blocks[w.below[s]]
+            found[column, :, w.row[s]] = blocks[w.below[s] + len(w.below)]
     for c in range(w.driven, len(w.first)):
         found[w.second[c], :, w.first[c]] = blocks[w.lower[c]]
     return found.reshape(6 * n + 12, 6 * n + 12)
@@ -113,6 +116,7 @@ def test_matrix_is_the_exact_derivative(division: str, coupled: bool) -> None:
 @pytest.mark.parametrize("division", ["4", "11", "24", "2x5"])
 def test_solving_undoes_the_product_with_the_matrix(division: str) -> None:
     case, rng = bent(division), np.random.default_rng(2)
+    case.work.blocks[:] = np.nan  # nothing may be left over from the step before
     n = len(case.wiring.mass)
     x = rng.normal(size=(n + 2, 6, LANES))
     x[n:] = 0.0
@@ -120,7 +124,8 @@ def test_solving_undoes_the_product_with_the_matrix(division: str) -> None:
     product = np.stack([(S @ x[..., k].ravel()).reshape(n + 2, 6) for k, S in enumerate(matrices)], axis=-1)
     case.work.normal_damping[:] = 0.0
     linearise(case.wiring, HERE, case.lanes, case.work)
-    solve(case.wiring.start, case.wiring.below, case.wiring.row, case.work.blocks, product)
+    w = case.wiring
+    solve(w.order, w.start, w.below, w.row, case.work.blocks, product)
     np.testing.assert_allclose(product[:n], x[:n], rtol=1e-7, atol=1e-8)
 
 
@@ -132,13 +137,13 @@ def test_damping_of_the_air_is_in_the_matrix() -> None:
     rates(case, np.zeros_like(case.state.V), np.zeros_like(case.state.V))
     found = []
     for d in (damping, 0 * damping):
-        start_blocks(w.mass, w.inertia, d, work.R, work.V, HERE.gravity, LENGTH, work.blocks)
+        start_blocks(w.mass, w.inertia, d, work.R, work.V, HERE.gravity, LENGTH, w.fill, work.blocks)
         found.append(work.blocks[:n].copy().reshape(n, 6, 6, LANES))
     unit = np.zeros((n, 6, LANES))
     for column in range(6):
         unit[:] = 0.0
         unit[:, column] = 1.0
-        out = unit.copy()
-        rate_change(np.ascontiguousarray(case.state.V[:n]), unit, -LENGTH, out)
+        out, nothing = np.zeros_like(unit), np.zeros_like(unit)
+        keep_stage(unit, nothing, np.ascontiguousarray(case.state.V[:n]), LENGTH, nothing.copy(), out)
         np.testing.assert_allclose((found[0] - found[1])[:, 5, column], damping * out[:, 5], atol=1e-9)
     np.testing.assert_array_equal((found[0] - found[1])[:, :5], 0.0)

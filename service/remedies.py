@@ -1,0 +1,26 @@
+"""What a user can do about a simulation that failed; the simulator's own words say why it did."""
+
+from __future__ import annotations
+
+FLUTTER = (
+    "a wing that flutters has no periodic motion: give it more stiffness or damping, a slower stream, or a lower flap "
+    "frequency"
+)
+
+# What a reason says, and the remedy that goes with it.
+REMEDIES = (
+    ("not accurate enough", "state a larger accuracy_mm (at most 1), or a lower flap frequency"),
+    ("not periodic", FLUTTER),
+    ("diverged", FLUTTER),
+    (
+        "never cross the hinge height",
+        "the wing droops or bends too far to be laid over the recording: give it more stiffness, or other reference "
+        "markers",
+    ),
+)
+
+
+def with_remedy(reason: str) -> str:
+    """``reason`` followed by what to do about it, where that is known."""
+    remedy = next((remedy for words, remedy in REMEDIES if words in reason), None)
+    return f"{reason}. Remedy: {remedy}" if remedy else reason

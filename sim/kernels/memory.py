@@ -1,0 +1,28 @@
+"""Arrays whose groups of lanes each fill one cache line: a group that straddles two costs twice as much to load."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels import LANES
+
+Array = npt.NDArray[np.float64]
+
+_LINE = 8 * LANES
+
+
+def zeros(shape: tuple[int, ...]) -> Array:
+    """Zeros [..., LANES] that start on a cache line."""
+    count = int(np.prod(shape))
+    whole = np.zeros(count + LANES)
+    start = -whole.ctypes.data % _LINE // 8
+    return whole[start : start + count].reshape(shape)
+
+
+def aligned(array: npt.ArrayLike) -> Array:
+    """A copy of an array [..., LANES] that starts on a cache line."""
+    values = np.asarray(array, float)
+    out = zeros(values.shape)
+    out[...] = values
+    return out

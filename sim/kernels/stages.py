@@ -1,0 +1,55 @@
+"""Sums over the stages of a step, a body at a time in registers."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.bodies import body_rate
+from sim.kernels.jit import kernel
+from sim.kernels.matrices import cross, load_vector
+from sim.kernels.vector import load, load3, store
+
+Array = npt.NDArray[np.float64]
+
+
+@kernel
+def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
+    """out = ``part`` times ``base`` plus the sum over the first ``count`` stages of coefficient * U."""
+    for i in range(out.shape[0]):
+        for k in range(6):
+            total = part * load(base, i, k)
+            for s in range(count):
+                total += coefficient[s] * load3(U, s, i, k)
+            store(out, i, k, total)
+
+
+@kernel
+def coupled_rates(
+    xi: Array, V: Array, U_xi: Array, U_V: Array, coefficient: Array, count: int, scale: float, rate: Array, lead: Array
+) -> None:
+    """Rate of the local coordinates plus ``scale`` times the stages' coupling, and that of the twists in ``lead``."""
+    for i in range(xi.shape[0]):
+        first = body_rate(load_vector(xi, i, 0), load_vector(V, i, 0), load_vector(V, i, 3))
+        for k in range(6):
+            total, other = first[k], first[k] - first[k]
+            for s in range(count):
+                c = scale * coefficient[s]
+                total += c * load3(U_xi, s, i, k)
+                other += c * load3(U_V, s, i, k)
+            store(rate, i, k, total)
+            store(lead, i, k, other)
+
+
+@kernel
+def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V: Array) -> None:
+    """U_xi = l Y and U_V = (I - l A) Y - r_xi of a stage, l being ``length`` and A y = (y x omega / 2, y x v)."""
+    for i in range(Y.shape[0]):
+        turn = load_vector(Y, i, 0)
+        a, b = cross(turn, load_vector(V, i, 0)), cross(turn, load_vector(V, i, 3))
+        for k in range(3):
+            y, z = load(Y, i, k), load(Y, i, 3 + k)
+            store(U_xi, i, k, length * y)
+            store(U_xi, i, 3 + k, length * z)
+            store(U_V, i, k, y - load(rate, i, k) - (0.5 * length) * a[k])
+            store(U_V, i, 3 + k, z - load(rate, i, 3 + k) - length * b[k])

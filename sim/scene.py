@@ -1,0 +1,79 @@
+"""What the kernels are given for a condition: the drive, the start, the setting, and room for what a beat leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Condition
+from sim.atmosphere import density
+from sim.drive import flap_angle
+from sim.kernels import LANES
+from sim.kernels.integrate import NODES, PORTS, SLOPES, Setting, State, Trace
+from sim.kernels.memory import zeros
+from sim.numerics import Numerics
+from sim.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+
+def drive_table(structure: Structure, condition: Condition, numerics: Numerics, n: int, beat: int) -> Array:
+    """[n, STAGES, 2, 3]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
+
+    The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
+    """
+    omega = 2 * np.pi * condition.flap_frequency
+    beats = beat + (np.arange(n)[:, None, None] + NODES[None, :, None]) / n
+    phase = 2 * np.pi * (beats - beat) - np.array([0.0, condition.phase_lag])
+    angle = flap_angle(structure.wing.drive, phase) * np.array([1.0, omega, omega**2, omega**3])
+    if beat < numerics.ramp_beats:
+        angle = _ramped(angle, beats / numerics.ramp_beats, condition.flap_frequency / numerics.ramp_beats)
+    slope = SLOPES[:, None] / (n * condition.flap_frequency)
+    return np.stack([angle[..., 0], angle[..., 1], angle[..., 2] + slope * angle[..., 3]], axis=-1)
+
+
+def _ramped(angle: Array, x: Array, rate: float) -> Array:
+    """Start from rest: 0 at x = 0, 1 from x = 1 on, without rate and acceleration at both; x grows at ``rate``."""
+    x = np.minimum(x, 1.0)
+    e = x**3 * (10 - 15 * x + 6 * x**2)
+    e1 = rate * 30 * x**2 * (1 - x) ** 2
+    e2 = rate**2 * 60 * x * (1 - x) * (1 - 2 * x)
+    e3 = rate**3 * 60 * (1 - 6 * x + 6 * x**2) * (x < 1)
+    a, a1, a2, a3 = np.moveaxis(angle, -1, 0)
+    return np.stack(
+        [e * a, e * a1 + e1 * a, e * a2 + 2 * e1 * a1 + e2 * a, e * a3 + 3 * (e1 * a2 + e2 * a1) + e3 * a], axis=-1
+    )
+
+
+def at_rest(structure: Structure) -> State:
+    """All bodies at their rest pose, not moving, the rods horizontal."""
+    n = len(structure.bodies)
+    state = State(zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
+    state.R[:, [0, 4, 8]] = 1.0
+    hinge = structure.wing.hinge
+    state.p[:n] = np.array([body.centre for body in structure.bodies])[:, :, None]
+    state.p[n:] = np.array([0.0, hinge.y, hinge.z])[:, None]
+    return state
+
+
+def setting(condition: Condition, steps: int) -> Setting:
+    """The kernel's view of a condition, with ``steps`` a beat."""
+    a = condition.angle_of_attack
+    wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
+    step = 1.0 / (condition.flap_frequency * steps)
+    return Setting(density(condition.pressure, condition.temperature), wind, condition.gravity, step)
+
+
+def new_trace(structure: Structure, steps: int, *, with_motion: bool = False) -> Trace:
+    """Empty arrays for one beat; those of the motion have no room unless asked for."""
+    kept, bodies = steps if with_motion else 0, len(structure.bodies) + 2
+    return Trace(
+        tracks=zeros((steps, len(structure.wing.markers), 3, LANES)),
+        rods=zeros((steps, 2, 6, LANES)),
+        air=zeros((steps, 3, LANES)),
+        power=zeros((steps, PORTS, LANES)),
+        energy=zeros((steps, 3, LANES)),
+        R=zeros((kept, bodies, 9, LANES)),
+        p=zeros((kept, bodies, 3, LANES)),
+        V=zeros((kept, bodies, 6, LANES)),
+    )

@@ -1,0 +1,128 @@
+"""Running a group of individuals side by side, beat after beat, until each is periodic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Condition, Gene
+from sim.kernels import LANES
+from sim.kernels.integrate import State, Trace, advance, new_work
+from sim.kernels.memory import aligned
+from sim.numerics import Numerics
+from sim.periodic import Secants
+from sim.scene import at_rest, drive_table, new_trace, setting
+from sim.structure import Structure
+from sim.wing_genes import lanes
+
+Array = npt.NDArray[np.float64]
+
+DIVERGED = "a body turned more than 1 rad within one step"
+
+
+@dataclass
+class Course:
+    """One individual on its way: up the ladder of steps, beat after beat.
+
+    Attributes:
+        genome: its genes.
+        state: from where its next beat starts; None at rest.
+        secants: what its beats have told about its map.
+        tracks: of the rung before, [n, M, 3].
+        changes: of the tracks from rung to rung, m.
+        beats: simulated in all.
+        failures: rungs on which it failed.
+        trace: of its periodic beat on the present rung.
+        reason: why it failed on the present rung.
+        distance: to the periodic motion, m.
+        error: estimated, m.
+        done: accurate, or given up.
+    """
+
+    genome: Array
+    state: State | None = None
+    secants: Secants | None = None
+    tracks: Array | None = None
+    changes: list[float] = field(default_factory=list)
+    beats: int = 0
+    failures: int = 0
+    trace: Trace | None = None
+    reason: str | None = None
+    distance: float = np.nan
+    error: float = np.nan
+    done: bool = False
+
+
+def settle(
+    structure: Structure,
+    genes: tuple[Gene, ...],
+    group: list[Course],
+    condition: Condition,
+    numerics: Numerics,
+    steps: int,
+    with_motion: bool,
+) -> None:
+    """Run up to LANES individuals with ``steps`` a beat until each is periodic, whatever its neighbours do."""
+    lanes_, here = lanes(structure, genes, np.array([c.genome for c in group])), setting(condition, steps)
+    work, trace = new_work(structure.wiring, lanes_), new_trace(structure, steps, with_motion=with_motion)
+    first = 0 if group[0].state is None else numerics.ramp_beats
+    state = at_rest(structure) if first == 0 else _stacked([c.state for c in group if c.state is not None])
+    tables = [drive_table(structure, condition, numerics, steps, beat) for beat in range(numerics.ramp_beats + 1)]
+    alive, open_ = np.ones(LANES, bool), list(range(len(group)))
+    for course in group:
+        course.reason, course.trace = None, None
+        if course.secants is not None:
+            course.secants.restart()
+    for beat in range(first, numerics.max_beats):
+        start = State(*(array.copy() for array in state))
+        table = tables[min(beat, numerics.ramp_beats)]
+        advance(structure.wiring, here, lanes_, table, work, state, trace, alive)
+        for lane in open_:
+            course = group[lane]
+            course.beats += 1
+            if not alive[lane]:
+                alive[lane] = _recover(course, lane, state)
+                course.reason = None if alive[lane] else f"diverged in beat {beat + 1}: {DIVERGED}"
+            elif beat >= numerics.ramp_beats:
+                course.distance = _follow(course, lane, start, state, condition, numerics)
+                if course.distance <= numerics.settled:
+                    course.trace = Trace(*(array[..., lane].copy() for array in trace))
+        open_ = [lane for lane in open_ if group[lane].reason is None and group[lane].trace is None]
+        if not open_:
+            return
+    for lane in open_:
+        group[lane].reason = (
+            f"not periodic after {numerics.max_beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
+            "periodic motion; it may flutter"
+        )
+
+
+def _follow(course: Course, lane: int, start: State, end: State, condition: Condition, numerics: Numerics) -> float:
+    """Learn from a beat and put the lane of ``end`` where the next one starts; distance (m) to the periodic motion."""
+    before, after = (State(*(array[..., lane].copy() for array in s)) for s in (start, end))
+    if course.secants is None:
+        course.secants = Secants(before, 2 * np.pi * condition.flap_frequency, numerics.window)
+    course.state, distance = course.secants.add(before, after)
+    _put(end, lane, course.state)
+    return distance
+
+
+def _recover(course: Course, lane: int, state: State) -> bool:
+    """Go back to before the leap that made an individual diverge; False when there was none."""
+    if course.secants is None or not course.secants.leapt:
+        return False
+    _put(state, lane, course.secants.step_back())
+    return True
+
+
+def _put(into: State, lane: int, state: State) -> None:
+    for array, value in zip(into, state, strict=True):
+        array[..., lane] = value
+
+
+def _stacked(states: list[State]) -> State:
+    """States of single individuals side by side in lanes; spare lanes repeat the last."""
+    filled = [states[min(k, len(states) - 1)] for k in range(LANES)]
+    return State(*(aligned(np.stack(parts, axis=-1)) for parts in zip(*filled, strict=True)))
