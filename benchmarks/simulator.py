@@ -3,7 +3,7 @@
 Costs are processor times of one thread, of one beat and one individual in a full group of lanes, with the fewest steps
 whose markers are nowhere more than 0.1 mm from the converged periodic motion. The other engines are run by
 ``python -m benchmarks.peers`` in processes of their own and measured in the same way, each against its own converged
-run. ``--quick`` leaves out the other engines, the search and the two largest wings. The whole takes about 15 minutes
+run. ``--quick`` leaves out the other engines, the search and the two largest wings. The whole takes about ten minutes
 on two cores.
 """
 

@@ -10,7 +10,7 @@ FLUTTER = (
 # What a reason says, and the remedy that goes with it.
 REMEDIES = (
     ("not accurate enough", "state a larger accuracy_mm (at most 1), or a lower flap frequency"),
-    ("not periodic", FLUTTER),
+    ("not periodic", f"{FLUTTER}; one that only settles slowly needs a larger accuracy_mm (at most 1)"),
     ("diverged", FLUTTER),
     (
         "never cross the hinge height",

@@ -61,13 +61,14 @@ class Numerics:
 
 
 def estimated_error(changes: list[float]) -> float:
-    """Error of the latest motion from what each refinement changed, as a geometric series.
+    """Error (m) of the latest motion from what each refinement changed (m), as a geometric series.
 
-    Its ratio is that of the method's order until it can be seen; then it is what is seen, within two orders of that.
+    One change tells no order: second order is assumed. With more it is what is seen, up to one order above the method's.
     Below KINKS a change may come from the corners in the law of the air, which fall with the second order only.
     """
-    ratio = _GROWTH**_ORDER
+    least = _GROWTH**2
+    ratio = least
     if len(changes) > 1:
         seen = changes[-2] / max(changes[-1], np.finfo(float).tiny)
-        ratio = float(np.clip(seen, _GROWTH ** (_ORDER - 2), _GROWTH ** (_ORDER + 1)))
-    return max(changes[-1] / (ratio - 1.0), min(changes[-1], KINKS) / (_GROWTH**2 - 1.0))
+        ratio = float(np.clip(seen, least, _GROWTH ** (_ORDER + 1)))
+    return max(changes[-1] / (ratio - 1.0), min(changes[-1], KINKS) / (least - 1.0))

@@ -17,7 +17,7 @@ from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-_TRIES = 3  # rungs on which an individual may fail before it is given up
+_TRIES = 4  # rungs on which an individual may fail before it is given up
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ V3 = tuple[float, float, float]
 
 SIZE = 13  # numbers per body
 P, Q, V, W = 0, 3, 7, 10  # where position, quaternion, velocity, angular velocity start
-_TURN = math.sin(math.radians(5.0))
+_TURN = math.sin(math.radians(15.0))
 _STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 

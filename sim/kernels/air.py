@@ -3,7 +3,7 @@
 A strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
 shared among them. Beyond what is printed: alpha lies in [-pi/2, pi/2], drag grows with |alpha| (as printed it would
 push the wing at negative angles), and in reversed flow the lift keeps the sign of the normal flow; the change of sign
-is smoothed within 5 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law itself is
+is smoothed within 15 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law itself is
 good to about 15 degrees and is used as printed beyond.
 """
 
@@ -20,7 +20,7 @@ from sim.kernels.vector import Vector, greatest, least, load, load0, load1, magn
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-REVERSAL = math.sin(math.radians(5.0))
+REVERSAL = math.sin(math.radians(15.0))
 STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 

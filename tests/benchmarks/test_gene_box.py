@@ -67,7 +67,8 @@ def test_summary_counts_what_ended_and_how() -> None:
     assert found["checked"] == 2
     assert found["checked_within_accuracy_percent"] == 50.0
     assert found["checked_largest_error_mm"] == pytest.approx(0.2)
-    assert [case["division"] for case in found["checked_beyond_accuracy_cases"]] == ["24"]
+    assert [case["error_mm"] for case in found["checked_beyond_accuracy_cases"]] == pytest.approx([0.2])
+    assert [case["division"] for case in found["given_up_cases"]] == ["11", "24"]
     assert found["ms_per_genome"] == pytest.approx(250.0)
 
 

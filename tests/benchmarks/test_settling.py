@@ -39,6 +39,12 @@ def test_periodic_tracks_at_other_instants(known: int, wanted: int) -> None:
     np.testing.assert_allclose(at_steps(harmonics(known), wanted), harmonics(wanted), atol=1e-13)
 
 
+def test_instants_that_are_known_keep_their_tracks() -> None:
+    """Of any tracks, with the highest frequency that their instants can carry."""
+    tracks = np.random.default_rng(2).normal(size=(64, 2, 3))
+    np.testing.assert_allclose(at_steps(tracks, 48)[::3], tracks[::4], atol=1e-13)
+
+
 def test_largest_distance_is_that_of_the_worst_marker_and_instant() -> None:
     tracks = harmonics(50)
     tracks[17, 1] += (0.0, 3e-3, -4e-3)

@@ -72,8 +72,8 @@ def test_what_is_not_said_is_what_the_library_does() -> None:
 
 def test_a_run_shows_and_uses_its_accuracy(api: Api) -> None:
     dataset = api.upload()["id"]
-    usual, fine = api.submit(dataset), api.submit(dataset, accuracy_mm=0.07)
-    for run, stated in ((usual, 0.1), (fine, 0.07)):
+    usual, fine = api.submit(dataset), api.submit(dataset, accuracy_mm=0.123)
+    for run, stated in ((usual, 0.1), (fine, 0.123)):
         assert run["spec"]["accuracy_mm"] == stated, "as it was written, without the digits of a division"
         assert api.finish(run["id"])["spec"]["accuracy_mm"] == stated
         tracks = ComparisonOut.model_validate(api.get(f"/v1/runs/{run['id']}/comparison"))
@@ -187,6 +187,15 @@ def test_the_real_engine_solves_as_well_as_asked(dataset: Dataset) -> None:
     assert shown.estimated_error_mm == pytest.approx(1e3 * found[1].solution.error)
 
 
+def test_the_real_loads_are_given_the_accuracy_too(dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is what they fall back on where their own, which is finer, cannot be had."""
+    given: list[float] = []
+    monkeypatch.setattr("service.engine.simulate_outputs", lambda model, *_: given.append(model.numerics.accuracy))
+    engine, spec = WingEngine(), CalibrationSpec(division="4", accuracy=3e-4)
+    engine.loads(spec, dataset, engine.genome(spec, dataset, {}), dataset.recordings[0])
+    assert given == [3e-4]
+
+
 def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> None:
     """The simulator's own words; a change of them must be followed in `service/remedies.py`."""
     wing, still = dataset.wing, dataset.recordings[0]
@@ -196,11 +205,12 @@ def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> No
     said = with_remedy(model.beat(nominal, still).reason or "")
     assert "asked for 1e-09 mm. Remedy: state a larger accuracy_mm" in said
     slow = replace(model, numerics=Numerics(accuracy=1e-4, periodic=1e-15, max_beats=3))
-    assert with_remedy(slow.beat(nominal, still).reason or "").endswith(FLUTTER)
+    settling = slow.beat(nominal, still).reason or ""
+    assert with_remedy(settling).endswith("needs a larger accuracy_mm (at most 1)")
     bent = {"L_a": 400.0, "E_f": 1e5, "E_r": 2e9}
     wild = np.array([bent.get(gene.name, gene.nominal) for gene in model.genes])
     windy = blank_recording(wing, tunnel(0.05, 3.0, 6.0))
-    assert with_remedy(FlexibleWing(wing, "4").beat(wild, windy).reason or "").endswith(FLUTTER)
+    assert FLUTTER in with_remedy(FlexibleWing(wing, "4").beat(wild, windy).reason or "")
     assert isinstance(wing.drive, FourBarDrive)
     aloft = replace(wing, drive=replace(wing.drive, offset=wing.drive.offset + 1.0))
     reason = FlexibleWing(aloft, "4").observe(nominal[None], still).reasons[0] or ""

@@ -101,7 +101,7 @@ def strip_loads(case: Blown, s: int, w: int) -> tuple[Array, Array]:
     chord, normal, flow = strip_air(case, s, w)
     along, across = flow @ chord, flow @ normal
     speed = np.hypot(along, across)
-    x = np.clip(along / (np.sin(np.radians(5.0)) * speed), -1, 1)
+    x = np.clip(along / (np.sin(np.radians(15.0)) * speed), -1, 1)
     forward = x * (3 - x**2) / 2  # -1 where the flow comes from behind
     alpha = np.arctan2(across, along * forward)
     L_a, L_b, ID_a, ID_b = case.coefficients[:, w]
@@ -173,7 +173,7 @@ def flat(wind: Array) -> Blown:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("degrees", [-80.0, -40.0, -3.0, 0.0, 5.0, 15.0, 79.0])
+@pytest.mark.parametrize("degrees", [-74.0, -40.0, -3.0, 0.0, 5.0, 15.0, 74.0])
 def test_affine_law_to_the_letter(degrees: float) -> None:
     """F = 1/2 rho v^2 S C, lift square to the flow and drag along it, for flow at alpha from below a level chord."""
     alpha, v = np.radians(degrees), 7.0
