@@ -215,11 +215,20 @@ class Averages(TypedDict):
     dissipated_by_connector_w: dict[str, float]
 
 
+class Solved(TypedDict):
+    """How a beat was solved."""
+
+    steps_per_beat: int
+    beats: int
+    estimated_error_mm: float | None
+
+
 class Outputs(TypedDict, total=False):
     """Loads, powers and energies over one beat in order of ``phase``; only what was asked for is there."""
 
     phase: list[float]
     drive_phase: list[float]
+    solved: Solved
     motor_angle_deg: dict[str, list[float]]
     motor_rate_rad_s: dict[str, list[float]]
     motor_torque_n_m: dict[str, list[float]]

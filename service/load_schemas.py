@@ -124,11 +124,20 @@ class AveragesOut(BaseModel):
     dissipated_by_connector_w: dict[str, float]
 
 
+class SolvedOut(BaseModel):
+    """How the beat was solved: loads are solved better than tracks where they can be."""
+
+    steps_per_beat: int
+    beats: int
+    estimated_error_mm: float | None
+
+
 class OutputsOut(BaseModel):
     """One periodic beat in order of ``phase``; only what was asked for is there."""
 
     phase: Series
     drive_phase: Series
+    solved: SolvedOut | None = None
     motor_angle_deg: MotorsOut | None = None
     motor_rate_rad_s: MotorsOut | None = None
     motor_torque_n_m: MotorsOut | None = None

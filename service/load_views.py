@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from records import Condition
 from service.load_schemas import OUTPUT_NAMES, ConditionIn, OutputName
-from service.views import MM, PASCAL_PER_MBAR, ZERO_CELSIUS
+from service.views import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, mm
 from sim.outputs import ConnectorLoad, Outputs, Section, Strip
 
 Array = npt.NDArray[np.float64]
@@ -54,6 +54,9 @@ def outputs(found: Outputs, names: Iterable[OutputName]) -> Json:
         "phase": np.round(phase[order], 9).tolist(),
         "drive_phase": np.round(found.phase[order], 9).tolist(),
     }
+    if found.solution is not None:
+        steps, beats, error = found.solution
+        answer["solved"] = {"steps_per_beat": steps, "beats": beats, "estimated_error_mm": mm(error)}
     for name in names:
         answer |= _VIEWS[name](found, lambda series: _plain(series[order]))
     return answer

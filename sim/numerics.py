@@ -63,7 +63,7 @@ class Numerics:
 def estimated_error(changes: list[float]) -> float:
     """Error (m) of the latest motion from what each refinement changed (m), as a geometric series.
 
-    One change tells no order: second order is assumed. With more it is what is seen, up to one order above the method's.
+    One change tells no order: the second is assumed. With more it is what is seen, up to one above the method's.
     Below KINKS a change may come from the corners in the law of the air, which fall with the second order only.
     """
     least = _GROWTH**2

@@ -21,6 +21,7 @@ from sim.kernels.air import strip_forces
 from sim.kernels.bodies import kinetic_and_height
 from sim.kernels.connectors import connect, relative_pose
 from sim.kernels.integrate import Lanes, State
+from sim.model import Solution
 from sim.scene import setting
 from sim.structure import Structure
 from sim.wing_genes import lanes
@@ -104,6 +105,7 @@ class Outputs:
         lift_axis, thrust_axis: unit vectors in the world. In wind: perpendicular to the stream (in the plane of flow
             and vertical), and against it; without wind: up, and forward (-x). The side force is along y, outboard.
         kinetic, elastic, gravitational: [n] energies, J; gravitational is zero at z = 0.
+        solution: how the beat was solved; None for a motion that came from elsewhere.
     """
 
     phase: Array
@@ -118,6 +120,7 @@ class Outputs:
     kinetic: Array
     elastic: Array
     gravitational: Array
+    solution: Solution | None = None
 
     @property
     def air(self) -> Array:
@@ -175,9 +178,10 @@ def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Re
     if beat.reason is not None or beat.motion is None:
         raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
     group = lanes(model.structure, model.genes, np.atleast_2d(np.asarray(genome, float)))
-    return from_motion(
+    found = from_motion(
         model.structure, group, recording.condition, beat.motion, _crossing(model, recording, beat.tracks)
     )
+    return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
 
 
 def _fine(model: FlexibleWing) -> FlexibleWing:

@@ -3,8 +3,8 @@
 A strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
 shared among them. Beyond what is printed: alpha lies in [-pi/2, pi/2], drag grows with |alpha| (as printed it would
 push the wing at negative angles), and in reversed flow the lift keeps the sign of the normal flow; the change of sign
-is smoothed within 15 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law itself is
-good to about 15 degrees and is used as printed beyond.
+is smoothed within 15 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law is good
+to about 15 degrees and is used as printed beyond.
 """
 
 from __future__ import annotations

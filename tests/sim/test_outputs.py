@@ -222,6 +222,8 @@ def test_phase_zero_is_that_of_the_recording() -> None:
     model = model_of("4", Numerics(steps=160))
     recording = record(model, true_genome(model, 3), TUNNEL, Tracking(), np.random.default_rng(1))
     outputs = simulate_outputs(model, nominal(model), recording)
+    assert outputs.solution is not None
+    assert outputs.solution.steps == len(outputs.phase)
     tracks = model.beat(nominal(model), recording).tracks
     before = int(outputs.crossing * len(tracks))
     names = [m.name for m in model.wing.markers]
