@@ -42,9 +42,9 @@ class Gene:
     def check(self, value: float) -> None:
         """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
         if not (math.isfinite(value) and self.lower <= value <= self.upper):
+            unit = "" if self.unit == "1" else f" {self.unit}"
             raise ValueError(
-                f"gene '{self.name}' is {value:g} {self.unit}; "
-                f"it must lie in [{self.lower:g}, {self.upper:g}] {self.unit}"
+                f"gene '{self.name}' is {value:g}{unit}; it must lie in [{self.lower:g}, {self.upper:g}]{unit}"
             )
 
     def to_unit(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:

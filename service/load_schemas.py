@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError, WrapValidator
+from pydantic_core import PydanticCustomError
+from pydantic_core.core_schema import ValidatorFunctionWrapHandler
 
 OutputName = Literal["motors", "air", "strips", "sections", "connectors", "power", "energy", "averages"]
 OUTPUT_NAMES: tuple[OutputName, ...] = (
@@ -18,12 +20,24 @@ OUTPUT_NAMES: tuple[OutputName, ...] = (
     "averages",
 )
 OutputNames = Annotated[list[OutputName], Field(max_length=len(OUTPUT_NAMES))]
+
+
+def _one_complaint(value: Any, either: ValidatorFunctionWrapHandler) -> Any:
+    try:
+        return either(value)
+    except ValidationError:  # two of them, one for each type that it might have been
+        message = "must be true, false, or a list of at most {most} of {names}"
+        limits = {"most": len(OUTPUT_NAMES), "names": ", ".join(OUTPUT_NAMES)}
+        raise PydanticCustomError("outputs", message, limits) from None
+
+
 Wanted = Annotated[
     StrictBool | OutputNames,
+    WrapValidator(_one_complaint),
     Field(description=f"true for all, or some of {', '.join(OUTPUT_NAMES)}"),
 ]
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Series = list[float]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Vectors = list[Vector]

@@ -137,8 +137,8 @@ def _averages(found: Outputs, put: Put) -> Json:  # noqa: ARG001  (numbers, not 
     front, rear = found.motors
     return {
         "averages": {
-            "lift_n": float(air @ found.lift_axis),
-            "thrust_n": float(air @ found.thrust_axis),
+            "lift_n": float(air @ found.lift_axis) + 0.0,
+            "thrust_n": float(air @ found.thrust_axis) + 0.0,
             "side_n": float(air @ SIDE),
             "motor_power_w": {"front": balance.front_motor, "rear": balance.rear_motor},
             "peak_motor_torque_n_m": {
@@ -147,7 +147,7 @@ def _averages(found: Outputs, put: Put) -> Json:  # noqa: ARG001  (numbers, not 
             },
             "supplied_w": balance.supplied,
             "dissipated_w": balance.dissipated,
-            "to_air_w": balance.to_air,
+            "to_air_w": balance.to_air + 0.0,  # no negative zero in a vacuum
             "closing_error_w": balance.closing,
             "closing_error_percent": 100.0 * balance.relative_closing,
             "dissipated_by_connector_w": {load.name: float(load.dissipated.mean()) for load in found.connectors},

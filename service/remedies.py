@@ -11,6 +11,7 @@ FLUTTER = (
 REMEDIES = (
     ("not accurate enough", "state a larger accuracy_mm (at most 1), or a lower flap frequency"),
     ("not periodic", f"{FLUTTER}; one that only settles slowly needs a larger accuracy_mm (at most 1)"),
+    ("flutters", FLUTTER),
     ("diverged", FLUTTER),
     (
         "never cross the hinge height",

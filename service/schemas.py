@@ -2,23 +2,40 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 from pydantic_core import PydanticCustomError
 
-from service.load_schemas import ConditionIn, OutputsOut, Wanted
+from service.load_schemas import ConditionIn, Number, OutputsOut, Wanted
 from workers.jobs import State
 
 LARGEST_SEED = 2**53 - 1
 DIVISION = r"^[1-9][0-9]?(x[1-9][0-9]?|(,[1-9][0-9]?){0,63})$"
 LONGEST_DIVISION = 200
+DIVISION_FORMS = "preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2"
 FINEST_MM, COARSEST_MM = 0.02, 1.0
 
 Item = TypeVar("Item")
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Whole = Annotated[int, Field(strict=True)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _readable(division: str) -> str:
+    if len(division) > LONGEST_DIVISION or not re.fullmatch(DIVISION, division):
+        raise PydanticCustomError("division", "must be a {forms}", {"forms": DIVISION_FORMS})
+    return division
+
+
+Division = Annotated[
+    str,
+    AfterValidator(_readable),
+    Field(
+        json_schema_extra={"pattern": DIVISION, "maxLength": LONGEST_DIVISION},
+        description=DIVISION_FORMS,
+    ),
+]
 
 
 def _attainable(accuracy_mm: float) -> float:
@@ -190,14 +207,7 @@ class DatasetOut(BaseModel):
 class SpecOut(BaseModel):
     """How a run calibrates; see `calibration.search.CalibrationSpec`."""
 
-    division: Annotated[
-        str,
-        Field(
-            pattern=DIVISION,
-            max_length=LONGEST_DIVISION,
-            description="preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2",
-        ),
-    ] = "11"
+    division: Division = "11"
     mode: Literal["staged", "joint"] = "staged"
     population: Annotated[Whole, Field(ge=4, le=1000)] = 50
     stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
@@ -360,7 +370,7 @@ class SimulationIn(BaseModel):
 
     dataset_id: Name
     recording: Name
-    division: Annotated[str, Field(pattern=DIVISION, max_length=LONGEST_DIVISION)] = "11"
+    division: Division = "11"
     genome: Annotated[dict[str, Number], Field(max_length=1000)] = {}
     accuracy_mm: Accuracy = 0.1
     outputs: Wanted = False

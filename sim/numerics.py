@@ -46,13 +46,20 @@ class Numerics:
             )
         if not (np.isfinite(self.accuracy) and self.accuracy > 0):
             raise ValueError(f"accuracy is {self.accuracy!r} m; it must be a positive number such as 1e-4 (0.1 mm)")
+        if self.periodic is not None and not self.periodic > 0:
+            raise ValueError(
+                f"periodic is {self.periodic!r} m; it must be positive, such as 2.5e-5 (0.025 mm), or None"
+            )
+        if self.window < 0:
+            raise ValueError(f"window is {self.window} beats; it must be at least 0, which learns nothing from them")
 
     def ladder(self, condition: Condition) -> tuple[int, ...]:
         """Steps of a beat to try under a condition, coarsest first."""
         if self.steps is not None:
             return (self.steps,)
         least = STEPS_PER_HZ * condition.flap_frequency
-        return tuple(n for n in LADDER if n >= least) or (LADDER[-1],)
+        # an error is what two rungs differ by
+        return tuple(n for n in LADDER if n >= least or n in LADDER[-2:])
 
     @property
     def settled(self) -> float:

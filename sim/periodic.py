@@ -19,9 +19,13 @@ from sim.kernels.integrate import State
 Array = npt.NDArray[np.float64]
 
 _LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
-WORSE = 2.0  # a leap after which a beat changes this many times as much as before is taken back
-LONGEST = 20.0  # admits modes that keep up to 0.95 of their amplitude over a beat
+# A leap after which a beat changes this many times as much as before is taken back. Not less: a mode n times as fast as
+# the beat changes by up to n times as much where it is caught moving as where it is caught bent.
+WORSE = 10.0
+LONGEST = 20.0  # admits leaps along modes that keep up to 0.95 of their amplitude over a beat
 _RANK = 1e-8  # of the largest singular value: less is the integrator's noise
+
+_TOLD = 1e-2  # of the largest direction: less is too much mixed to tell a multiplier
 
 
 @dataclass
@@ -44,7 +48,8 @@ class Secants:
     def add(self, start: State, end: State) -> tuple[State, float]:
         """Learn from one beat; the state from which to start the next, and how far (m) that is from this start.
 
-        That distance is what is left between this beat and the periodic one, as far as the beats can tell.
+        That distance is what is left between this beat and the periodic one, as far as the beats can tell: until two of
+        them can be compared, and for ever where none is kept, what the beat changes.
         """
         x, arrived = self._coordinates(start), self._coordinates(end)
         change = arrived - x
@@ -58,7 +63,8 @@ class Secants:
             self.columns = [*self.columns, (moved, left)][-self.kept :] if self.kept else []
         self.starts, self.ends = [x], [arrived]
         correction = self._correction(change)
-        self.leapt = bool(correction.any())
+        # a longer one means that there is no useful linear map yet: told as a distance, but not gone
+        self.leapt = bool(0.0 < np.linalg.norm(correction) <= LONGEST * size)
         target = arrived + correction
         return (self._state(target, end) if self.leapt else end), float(np.abs(target - x).max())
 
@@ -70,20 +76,37 @@ class Secants:
         self.columns, self.starts, self.ends, self.best, self.leapt = [], [], [], None, False
         return State(*(array.copy() for array in state))
 
+    @property
+    def growth(self) -> float:
+        """Factor by which a disturbance grows in a beat: the largest multiplier of the map, as far as beats can tell.
+
+        From the map restricted to the changes seen, in an orthonormal basis of those that stand out; 0 before any.
+        """
+        if not self.columns:
+            return 0.0
+        moved, left = (np.array(part).T for part in zip(*self.columns, strict=True))
+        before = moved - left
+        size = np.linalg.norm(before, axis=0)
+        if not (np.all(np.isfinite(moved)) and np.all(size > 0)):
+            return 0.0
+        basis, spread, mixed = np.linalg.svd(before / size, full_matrices=False)
+        told = spread > _TOLD * spread[0]
+        reduced = basis[:, told].T @ (moved / size) @ mixed[told].T / spread[told]
+        return float(np.abs(np.linalg.eigvals(reduced)).max())
+
     def restart(self) -> None:
         """The map has changed a little (another step): keep what is known of its slope, compare no beat across."""
         self.starts, self.ends, self.best, self.leapt = [], [], None, False
 
     def _correction(self, change: Array) -> Array:
+        """From the end of the beat to the fixed point, zero where nothing is known."""
         if not self.columns or not np.all(np.isfinite(change)):
             return np.zeros_like(change)
         moved, left = (np.array(part).T for part in zip(*self.columns, strict=True))
         size = np.linalg.norm(left, axis=0)
         size[size == 0.0] = 1.0
         weights, *_ = np.linalg.lstsq(left / size, -change, rcond=_RANK)
-        correction = (moved / size) @ weights
-        # a longer one means that there is no useful linear map yet
-        return correction if np.linalg.norm(correction) <= LONGEST * np.linalg.norm(change) else np.zeros_like(change)
+        return np.asarray((moved / size) @ weights)
 
     def _coordinates(self, state: State) -> Array:
         n = len(state.V) - 2

@@ -19,6 +19,8 @@ from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 
+GROWING = 16  # beats after which the fastest growing part of what is left stands out
+ROUND_OFF = 1e-12  # m: what is left of a transient that has died, and neither grows nor falls
 DIVERGED = "a body turned more than 1 rad within one step"
 
 
@@ -37,6 +39,7 @@ class Course:
         trace: of its periodic beat on the present rung.
         reason: why it failed on the present rung.
         distance: to the periodic motion, m.
+        growth: of a disturbance of the periodic motion in a beat.
         error: estimated, m.
         done: accurate, or given up.
     """
@@ -51,6 +54,7 @@ class Course:
     trace: Trace | None = None
     reason: str | None = None
     distance: float = np.nan
+    growth: float = 0.0
     error: float = np.nan
     done: bool = False
 
@@ -84,7 +88,8 @@ def settle(
             course.beats += 1
             if not alive[lane]:
                 alive[lane] = _recover(course, lane, state)
-                course.reason = None if alive[lane] else f"diverged in beat {beat + 1}: {DIVERGED}"
+                if not alive[lane]:
+                    course.reason, course.state, course.secants = f"diverged in beat {beat + 1}: {DIVERGED}", None, None
             elif beat >= numerics.ramp_beats:
                 course.distance = _follow(course, lane, start, state, condition, numerics)
                 if course.distance <= numerics.settled:
@@ -94,17 +99,40 @@ def settle(
             return
     for lane in open_:
         group[lane].reason = (
-            f"not periodic after {numerics.max_beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
+            f"not periodic after {group[lane].beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
             "periodic motion; it may flutter"
         )
 
 
+def measure_growth(
+    structure: Structure, genes: tuple[Gene, ...], group: list[Course], condition: Condition, steps: int
+) -> None:
+    """Let up to LANES settled individuals go on for GROWING beats, and see whether what is left of transients grows.
+
+    What the secants tell of it is mixed with the beats on which the motion was still far from periodic.
+    """
+    numerics = Numerics(steps=steps)
+    lanes_, here = lanes(structure, genes, np.array([c.genome for c in group])), setting(condition, steps)
+    work, trace = new_work(structure.wiring, lanes_), new_trace(structure, steps)
+    state, alive = _stacked([c.state for c in group if c.state is not None]), np.ones(LANES, bool)
+    table = drive_table(structure, condition, numerics, steps, numerics.ramp_beats)
+    watched = [Secants(_lane(state, k), 2 * np.pi * condition.flap_frequency, 0) for k in range(len(group))]
+    left = np.zeros((GROWING, len(group)))
+    for beat in range(GROWING):
+        start = State(*(array.copy() for array in state))
+        advance(structure.wiring, here, lanes_, table, work, state, trace, alive)
+        left[beat] = [w.add(_lane(start, k), _lane(state, k))[1] for k, w in enumerate(watched)]
+    for k, course in enumerate(group):
+        course.growth = _mean_growth(left[:, k]) if alive[k] else np.inf
+
+
 def _follow(course: Course, lane: int, start: State, end: State, condition: Condition, numerics: Numerics) -> float:
     """Learn from a beat and put the lane of ``end`` where the next one starts; distance (m) to the periodic motion."""
-    before, after = (State(*(array[..., lane].copy() for array in s)) for s in (start, end))
+    before, after = _lane(start, lane), _lane(end, lane)
     if course.secants is None:
         course.secants = Secants(before, 2 * np.pi * condition.flap_frequency, numerics.window)
     course.state, distance = course.secants.add(before, after)
+    course.growth = course.secants.growth
     _put(end, lane, course.state)
     return distance
 
@@ -117,9 +145,19 @@ def _recover(course: Course, lane: int, state: State) -> bool:
     return True
 
 
+def _lane(state: State, lane: int) -> State:
+    return State(*(array[..., lane].copy() for array in state))
+
+
 def _put(into: State, lane: int, state: State) -> None:
     for array, value in zip(into, state, strict=True):
         array[..., lane] = value
+
+
+def _mean_growth(left: Array) -> float:
+    """Factor per beat of the latter half of a series, by least squares in its logarithm: two modes may beat."""
+    tail = np.log(np.maximum(left[len(left) // 2 :], ROUND_OFF))
+    return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
 
 
 def _stacked(states: list[State]) -> State:

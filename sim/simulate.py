@@ -12,11 +12,12 @@ from sim.kernels import LANES
 from sim.kernels.integrate import State, Trace
 from sim.numerics import LADDER, Numerics, estimated_error
 from sim.scene import new_trace
-from sim.settle import Course, settle
+from sim.settle import Course, measure_growth, settle
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
+FLUTTER = 1.02  # growth of a disturbance in a beat beyond which a periodic motion is none that a wing keeps
 _TRIES = 4  # rungs on which an individual may fail before it is given up
 
 
@@ -33,6 +34,7 @@ class Beat:
         beats: simulated in all.
         error: estimated largest error of a marker, of the steps and of the distance to the periodic motion, m; NaN when
             the steps were given.
+        growth: of a disturbance of the periodic motion in a beat, as far as the beats told; below 1 it dies out.
         reason: why the individual failed, else None.
         motion: pose and twist of all bodies and the two rods [n, N+2, .], when asked for.
     """
@@ -44,6 +46,7 @@ class Beat:
     power: Array
     beats: int
     error: float
+    growth: float
     reason: str | None
     motion: State | None = None
 
@@ -64,10 +67,15 @@ def periodic_beats(
     courses = [Course(genome) for genome in genomes]
     ladder = numerics.ladder(condition)
     for rung, steps in enumerate(ladder):
-        for group in _groups([course for course in courses if not course.done]):
+        under_way = [course for course in courses if not course.done]
+        for group in _groups(under_way):
             settle(structure, genes, group, condition, numerics, steps, with_motion)
             for course in group:
                 _judge(course, numerics, steps, last=rung == len(ladder) - 1)
+        suspect = [c for c in under_way if c.done and c.reason is None and c.growth > FLUTTER]
+        for group in _groups(suspect):
+            measure_growth(structure, genes, group, condition, steps)
+            _refuse_flutter(group)
     return tuple(_beat(structure, course, with_motion) for course in courses)
 
 
@@ -81,7 +89,7 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
     """Decide whether an individual is accurate, goes up a rung, or is given up."""
     if course.reason is not None:
         course.failures += 1
-        course.state, course.secants, course.tracks, course.changes = None, None, None, []
+        course.state, course.secants, course.tracks, course.changes, course.error = None, None, None, [], np.nan
         course.done = last or course.failures >= _TRIES
         return
     if numerics.steps is not None:
@@ -99,10 +107,21 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
         course.done = course.error <= numerics.accuracy
     if last and not course.done:
         course.done = True
-        course.reason = (
-            f"not accurate enough with {steps} steps a beat: estimated error {course.error * 1e3:.3g} mm, "
-            f"asked for {numerics.accuracy * 1e3:g} mm"
+        estimate = (
+            f"estimated error {course.error * 1e3:.3g} mm" if course.changes else "no coarser motion to compare with"
         )
+        course.reason = (
+            f"not accurate enough with {steps} steps a beat: {estimate}, asked for {numerics.accuracy * 1e3:g} mm"
+        )
+
+
+def _refuse_flutter(group: list[Course]) -> None:
+    """A leap may find a periodic motion that no wing keeps."""
+    for course in group:
+        if course.growth > FLUTTER:
+            course.reason = (
+                f"flutters: a disturbance of its periodic motion grows {course.growth:.3g}-fold from beat to beat"
+            )
 
 
 def _beat(structure: Structure, course: Course, with_motion: bool) -> Beat:
@@ -120,6 +139,7 @@ def _beat(structure: Structure, course: Course, with_motion: bool) -> Beat:
         trace.power,
         course.beats,
         course.error,
+        course.growth,
         course.reason,
         motion,
     )

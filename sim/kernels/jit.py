@@ -70,10 +70,20 @@ def _cache_folder(source: Path) -> Path:
 
 
 def _forget_old(place: Path) -> None:
-    """Remove all but the last used folders; a process that still needs one makes it again."""
-    folders = sorted(place.glob("kernels-*"), key=lambda folder: folder.stat().st_mtime)
+    """Remove all but the last used folders; a process that still needs one makes it again.
+
+    Another process may be doing the same: a folder that is gone meanwhile is old.
+    """
+    folders = sorted(place.glob("kernels-*"), key=_last_used)
     for folder in folders[:-_KEPT]:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _last_used(folder: Path) -> float:
+    try:
+        return folder.stat().st_mtime
+    except FileNotFoundError:
+        return 0.0
 
 
 @contextmanager

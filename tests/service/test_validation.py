@@ -26,6 +26,8 @@ from tests.service.conftest import Api
         ({"bounds_factor": 101}, "body.bounds_factor"),
         ({"accuracy_mm": 0.01}, "body.accuracy_mm"),
         ({"accuracy_mm": None}, "body.accuracy_mm"),
+        ({"accuracy_mm": "0.1"}, "body.accuracy_mm"),
+        ({"accuracy_mm": True}, "body.accuracy_mm"),
         ({"tolerance": -0.1}, "body.tolerance"),
         ({"tolerance": 1.1}, "body.tolerance"),
         ({"division": "eleven"}, "body.division"),
@@ -47,6 +49,14 @@ def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, 
     assert answer.status_code == 422, answer.text
     assert [error["where"] for error in answer.json()["errors"]] == [where]
     assert api.get("/v1/runs")["items"] == []
+
+
+@pytest.mark.parametrize("division", ["eleven", "128x1", "4 ", "", "4\n", ",".join(["1"] * 65), "1," * 150 + "1"])
+@pytest.mark.parametrize("route", ["runs", "simulations", "loads"])
+def test_a_division_that_is_none_is_answered_with_what_one_looks_like(api: Api, route: str, division: str) -> None:
+    answer = api.client.post(f"/v1/{route}", json={"dataset_id": "x", "recording": "slow", "division": division})
+    (said,) = [error["message"] for error in answer.json()["errors"] if error["where"] == "body.division"]
+    assert "preset 4, 11, 24; strips x bodies of each: 6x4" in said
 
 
 def test_an_unknown_name_lists_the_known_ones(api: Api) -> None:
@@ -83,6 +93,7 @@ def test_a_simulation(api: Api) -> None:
     [
         ({"genome": {"stiffness": 11.0}}, 422, "body.genome"),
         ({"genome": {"stifness": 1.0}}, 422, "body.genome"),
+        ({"genome": {"stiffness": True}}, 422, "body.genome.stiffness"),
         ({"recording": "nope"}, 422, "body.recording"),
         ({"division": "99"}, 422, "body.division"),
         ({"genome": {"stiffness": 9.5}}, 409, None),

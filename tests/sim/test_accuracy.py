@@ -10,9 +10,11 @@ import pytest
 
 from records import Condition
 from sim.flexible_wing import FlexibleWing
+from sim.kernels.integrate import Trace
 from sim.numerics import LADDER, Numerics
 from sim.rig import blank_recording, robird_wing, tunnel, vacuum
-from sim.simulate import Beat
+from sim.settle import Course
+from sim.simulate import Beat, _judge
 
 Array = npt.NDArray[np.float64]
 FINE = Numerics(steps=864, periodic=1e-6, max_beats=60)
@@ -70,6 +72,36 @@ def test_accuracy_out_of_reach_is_said() -> None:
     assert np.isnan(beat.tracks).all()
 
 
+@pytest.mark.parametrize("frequency", [4.0, 24.0, 40.0, 1000.0])
+def test_there_are_always_two_motions_to_compare(frequency: float) -> None:
+    ladder = Numerics().ladder(vacuum(10.0, 0.05, frequency))
+    assert len(ladder) >= 2
+    assert ladder == LADDER[-len(ladder) :]
+
+
+def test_failure_says_so_where_there_is_nothing_to_compare_with() -> None:
+    """The rung before the last failed: no error is made up, nor one kept from before."""
+    course = Course(np.zeros(1), tracks=np.zeros((4, 1, 3)), changes=[1.0], error=1.0, reason="diverged")
+    _judge(course, Numerics(), LADDER[-2], last=False)
+    assert np.isnan(course.error)
+    course.reason, course.trace = None, Trace(*(np.zeros((LADDER[-1], 1, 3)) for _ in Trace._fields))
+    _judge(course, Numerics(), LADDER[-1], last=True)
+    assert course.reason is not None
+    assert "no coarser motion to compare with" in course.reason
+    assert "nan" not in course.reason
+
+
+@pytest.mark.parametrize("periodic", [0.0, np.nan])
+def test_distance_that_no_beat_reaches_is_refused(periodic: float) -> None:
+    with pytest.raises(ValueError, match="periodic"):
+        Numerics(periodic=periodic)
+
+
+def test_window_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="window"):
+        Numerics(window=-1)
+
+
 @pytest.mark.parametrize("accuracy", [0.0, -1e-4, np.nan, np.inf])
 def test_accuracy_that_is_none_is_refused(accuracy: float) -> None:
     with pytest.raises(ValueError, match="accuracy"):
@@ -88,3 +120,25 @@ def test_wing_that_flutters_is_reported_and_harms_nobody() -> None:
     assert wild.reason is not None
     assert "flutter" in wild.reason or "diverged" in wild.reason
     assert np.array_equal(calm.tracks, model.beat(nominal, blank).tracks)
+
+
+# Of random genomes from the whole box: one that no wing could fly, relative to the estimates.
+WILD = (4.36, 0.41, 0.41, 0.65, 0.26, 0.52, 3.69, 0.71, 1.2, 1.03, 2.93, 1.99, 1.79, 0.63, 1.01, 0.23, 0.31, 1.11)
+
+
+def test_periodic_motion_that_no_wing_keeps_is_told_from_one_that_settles_slowly() -> None:
+    """Leaping finds unstable motions too; waiting shows which they are. Light damping is not flutter."""
+    model = FlexibleWing(robird_wing(), "11")
+    nominal = np.array([g.nominal for g in model.genes])
+    wild = nominal * np.array(WILD)
+    stream = blank_recording(model.wing, tunnel(0.0, 2.0, 8.5))
+    found = model.beat(wild, stream)
+    assert found.reason is not None
+    assert "flutters" in found.reason
+    assert found.growth > 1.05
+    waiting = replace(model, numerics=Numerics(steps=144, window=0, max_beats=60))
+    assert waiting.beat(wild, stream).reason is not None
+    light = nominal * [{"D_E": 0.2, "D_G": 0.2}.get(g.name, 1.0) for g in model.genes]
+    settled = model.beat(light, blank_recording(model.wing, vacuum(0.01, 0.12, 4.0)))
+    assert settled.reason is None
+    assert 0.5 < settled.growth < 1.02

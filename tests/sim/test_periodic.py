@@ -14,6 +14,7 @@ from sim.kernels.integrate import State
 from sim.numerics import Numerics
 from sim.periodic import Secants
 from sim.rig import blank_recording, robird_wing, vacuum
+from sim.settle import _mean_growth
 
 Array = npt.NDArray[np.float64]
 
@@ -82,6 +83,52 @@ def test_distance_is_to_the_fixed_point_and_not_to_the_next_beat() -> None:
     assert moved < 0.5 * left
 
 
+@pytest.mark.parametrize("decay", [0.96, 0.99])
+def test_mode_too_slow_to_leap_along_is_not_taken_for_periodic(decay: float) -> None:
+    """Where a leap would be too long the distance is still that to the fixed point."""
+    beat = LinearBeat((decay,), 6)
+    state = beat.state(beat.start)
+    secants = Secants(state, RATE, 8)
+    for _ in range(4):
+        here = state
+        state, told = secants.add(state, beat(state))
+    assert not secants.leapt
+    assert told == pytest.approx(
+        np.abs(beat.coordinates(beat.state(beat.fixed)) - beat.coordinates(here)).max(), rel=0.1
+    )
+
+
+class RingingBeat(LinearBeat):
+    """One mode ``pace`` times as fast as the beat, caught at another phase each time: V is large where x is small."""
+
+    def __init__(self, decay: float, turn: float, pace: float) -> None:
+        super().__init__((0.0,), 7)
+        self.slope = np.zeros((12 * BODIES, 12 * BODIES))
+        for body, angle in enumerate((turn, 0.7 * turn)):
+            here = [12 * body + 3, 12 * body + 9]  # displacement along x, velocity along x
+            c, s = decay * np.cos(angle), decay * np.sin(angle)
+            self.slope[np.ix_(here, here)] = [[c, s / pace], [-s * pace, c]]
+        self.start = self.fixed.copy()
+        self.start[[3, 15]] += 1e-2
+
+
+@pytest.mark.parametrize("turn", [0.6, 1.0, 2.0])
+def test_modes_faster_than_the_beat_are_learnt(turn: float) -> None:
+    """Two of them, four unknowns: five beats. A beat that changes more only because it is caught at another phase is no
+    leap gone wrong.
+    """
+    beat = RingingBeat(0.85, turn, 8.0)
+    end, told, _ = follow(beat, 6)
+    assert np.all(np.isfinite(told)), "a leap was taken back"
+    np.testing.assert_allclose(end.p, beat.state(beat.fixed).p, atol=1e-7)
+
+
+@pytest.mark.parametrize("decays", [(0.6, 0.3), (1.3, 0.5), (-0.9, 0.2, 0.1), (-1.2, 0.4)])
+def test_growth_is_the_largest_multiplier(decays: tuple[float, ...]) -> None:
+    _, _, secants = follow(LinearBeat(decays, 6), len(decays) + 1)
+    assert secants.growth == pytest.approx(max(abs(d) for d in decays), rel=0.05)
+
+
 def test_keeping_nothing_is_waiting() -> None:
     beat = LinearBeat((0.8,), 3)
     end, told, _ = follow(beat, 4, kept=0)
@@ -132,3 +179,21 @@ def test_wing_in_vacuum_is_periodic_sooner_and_the_same() -> None:
     assert slow.reason is None
     assert quick.beats < 0.7 * slow.beats
     np.testing.assert_allclose(quick.tracks, slow.tracks, atol=2e-5)
+
+
+def test_stiff_wing_with_little_damping_is_periodic_within_a_few_beats() -> None:
+    """A corner of the gene box: two ringing modes, whose changes from beat to beat rise and fall."""
+    model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=144))
+    factor = {"E_f": 5.0, "E_r": 5.0, "G_f": 5.0, "D_E": 0.2, "D_G": 0.2}
+    genome = [gene.nominal * factor.get(gene.name, 1.0) for gene in model.genes]
+    beat = model.beat(genome, blank_recording(model.wing, vacuum(10.0, 0.05, 4.0)))
+    assert beat.reason is None
+    assert beat.beats <= 10
+
+
+def test_growth_is_that_of_transients_and_not_of_round_off() -> None:
+    beats, noise = np.arange(16), np.random.default_rng(8).uniform(0.5, 2.0, 16)
+    assert _mean_growth(1e-9 * 1.1**beats) == pytest.approx(1.1)
+    assert _mean_growth(1e-6 * 0.9**beats) == pytest.approx(0.9)
+    dead = 1e-8 * 0.1**beats + 1e-14 * noise * 1.2**beats
+    assert _mean_growth(dead) == pytest.approx(1.0)

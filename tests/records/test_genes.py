@@ -1,0 +1,22 @@
+"""What a gene says about a value that it does not admit."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from records import Gene
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [
+        ("Pa", "gene 'g' is 0 Pa; it must lie in [1, 3] Pa"),
+        ("1", "gene 'g' is 0; it must lie in [1, 3]"),
+    ],
+)
+def test_a_value_out_of_bounds_is_told_with_its_unit_where_it_has_one(unit: str, said: str) -> None:
+    gene = Gene(name="g", unit=unit, nominal=2.0, lower=1.0, upper=3.0, scale="linear", description="")
+    with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
+        gene.check(0.0)
