@@ -59,82 +59,105 @@ class Course:
     done: bool = False
 
 
+class _Group:
+    """Up to LANES individuals side by side under a condition, all at rest or all under way."""
+
+    def __init__(
+        self,
+        structure: Structure,
+        genes: tuple[Gene, ...],
+        courses: list[Course],
+        condition: Condition,
+        steps: int,
+        with_motion: bool = False,
+    ) -> None:
+        self.structure, self.courses = structure, courses
+        self.angular_rate = 2 * np.pi * condition.flap_frequency
+        self.lanes, self.here = (
+            lanes(structure, genes, np.array([c.genome for c in courses])),
+            setting(condition, steps),
+        )
+        self.work, self.trace = (
+            new_work(structure.wiring, self.lanes),
+            new_trace(structure, steps, with_motion=with_motion),
+        )
+        moving = [course.state for course in courses if course.state is not None]
+        self.state = _stacked(moving) if moving else at_rest(structure)
+        self.alive = np.ones(LANES, bool)
+
+    def beat(self, table: Array) -> State:
+        """One beat under a drive; the state from which it started."""
+        start = State(*(array.copy() for array in self.state))
+        advance(self.structure.wiring, self.here, self.lanes, table, self.work, self.state, self.trace, self.alive)
+        return start
+
+    def learn(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
+        """What a beat means for an individual: it diverged, it is periodic, or it goes on from a better start."""
+        course = self.courses[lane]
+        course.beats += 1
+        if not self.alive[lane]:
+            self.alive[lane] = _recover(course, lane, self.state)
+            if not self.alive[lane]:
+                course.reason, course.state, course.secants = f"diverged in beat {beat + 1}: {DIVERGED}", None, None
+        elif beat >= numerics.ramp_beats:
+            before, after = _lane(start, lane), _lane(self.state, lane)
+            if course.secants is None:
+                course.secants = Secants(before, self.angular_rate, numerics.window)
+            course.state, course.distance = course.secants.add(before, after)
+            course.growth = course.secants.growth
+            _put(self.state, lane, course.state)
+            if course.distance <= numerics.settled:
+                course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
+
+
 def settle(
     structure: Structure,
     genes: tuple[Gene, ...],
-    group: list[Course],
+    courses: list[Course],
     condition: Condition,
     numerics: Numerics,
     steps: int,
     with_motion: bool,
 ) -> None:
     """Run up to LANES individuals with ``steps`` a beat until each is periodic, whatever its neighbours do."""
-    lanes_, here = lanes(structure, genes, np.array([c.genome for c in group])), setting(condition, steps)
-    work, trace = new_work(structure.wiring, lanes_), new_trace(structure, steps, with_motion=with_motion)
-    first = 0 if group[0].state is None else numerics.ramp_beats
-    state = at_rest(structure) if first == 0 else _stacked([c.state for c in group if c.state is not None])
+    group = _Group(structure, genes, courses, condition, steps, with_motion)
+    first = 0 if courses[0].state is None else numerics.ramp_beats
     tables = [drive_table(structure, condition, numerics, steps, beat) for beat in range(numerics.ramp_beats + 1)]
-    alive, open_ = np.ones(LANES, bool), list(range(len(group)))
-    for course in group:
+    for course in courses:
         course.reason, course.trace = None, None
         if course.secants is not None:
             course.secants.restart()
+    open_ = list(range(len(courses)))
     for beat in range(first, numerics.max_beats):
-        start = State(*(array.copy() for array in state))
-        table = tables[min(beat, numerics.ramp_beats)]
-        advance(structure.wiring, here, lanes_, table, work, state, trace, alive)
+        start = group.beat(tables[min(beat, numerics.ramp_beats)])
         for lane in open_:
-            course = group[lane]
-            course.beats += 1
-            if not alive[lane]:
-                alive[lane] = _recover(course, lane, state)
-                if not alive[lane]:
-                    course.reason, course.state, course.secants = f"diverged in beat {beat + 1}: {DIVERGED}", None, None
-            elif beat >= numerics.ramp_beats:
-                course.distance = _follow(course, lane, start, state, condition, numerics)
-                if course.distance <= numerics.settled:
-                    course.trace = Trace(*(array[..., lane].copy() for array in trace))
-        open_ = [lane for lane in open_ if group[lane].reason is None and group[lane].trace is None]
+            group.learn(lane, start, beat, numerics)
+        open_ = [lane for lane in open_ if courses[lane].reason is None and courses[lane].trace is None]
         if not open_:
             return
     for lane in open_:
-        group[lane].reason = (
-            f"not periodic after {group[lane].beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
+        courses[lane].reason = (
+            f"not periodic after {courses[lane].beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
             "periodic motion; it may flutter"
         )
 
 
 def measure_growth(
-    structure: Structure, genes: tuple[Gene, ...], group: list[Course], condition: Condition, steps: int
+    structure: Structure, genes: tuple[Gene, ...], courses: list[Course], condition: Condition, steps: int
 ) -> None:
     """Let up to LANES settled individuals go on for GROWING beats, and see whether what is left of transients grows.
 
     What the secants tell of it is mixed with the beats on which the motion was still far from periodic.
     """
-    numerics = Numerics(steps=steps)
-    lanes_, here = lanes(structure, genes, np.array([c.genome for c in group])), setting(condition, steps)
-    work, trace = new_work(structure.wiring, lanes_), new_trace(structure, steps)
-    state, alive = _stacked([c.state for c in group if c.state is not None]), np.ones(LANES, bool)
+    group, numerics = _Group(structure, genes, courses, condition, steps), Numerics(steps=steps)
     table = drive_table(structure, condition, numerics, steps, numerics.ramp_beats)
-    watched = [Secants(_lane(state, k), 2 * np.pi * condition.flap_frequency, 0) for k in range(len(group))]
-    left = np.zeros((GROWING, len(group)))
+    watched = [Secants(_lane(group.state, k), group.angular_rate, 0) for k in range(len(courses))]
+    left = np.zeros((GROWING, len(courses)))
     for beat in range(GROWING):
-        start = State(*(array.copy() for array in state))
-        advance(structure.wiring, here, lanes_, table, work, state, trace, alive)
-        left[beat] = [w.add(_lane(start, k), _lane(state, k))[1] for k, w in enumerate(watched)]
-    for k, course in enumerate(group):
-        course.growth = _mean_growth(left[:, k]) if alive[k] else np.inf
-
-
-def _follow(course: Course, lane: int, start: State, end: State, condition: Condition, numerics: Numerics) -> float:
-    """Learn from a beat and put the lane of ``end`` where the next one starts; distance (m) to the periodic motion."""
-    before, after = _lane(start, lane), _lane(end, lane)
-    if course.secants is None:
-        course.secants = Secants(before, 2 * np.pi * condition.flap_frequency, numerics.window)
-    course.state, distance = course.secants.add(before, after)
-    course.growth = course.secants.growth
-    _put(end, lane, course.state)
-    return distance
+        start = group.beat(table)
+        left[beat] = [w.add(_lane(start, k), _lane(group.state, k))[1] for k, w in enumerate(watched)]
+    for k, course in enumerate(courses):
+        course.growth = _mean_growth(left[:, k]) if group.alive[k] else np.inf
 
 
 def _recover(course: Course, lane: int, state: State) -> bool:
