@@ -167,7 +167,9 @@ class Client(Transport):
     ) -> a.Comparison:
         """Fetch recorded and simulated markers of one recording."""
         params = given(recording=recording, genome=genome)
-        return cast(a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params))
+        return cast(
+            a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params, timeout=self.simulating)
+        )
 
     def loads(
         self,
@@ -178,7 +180,10 @@ class Client(Transport):
     ) -> a.Loads:
         """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
-        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params))
+        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+
+    def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
+        return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
 
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
@@ -242,7 +247,7 @@ class Client(Transport):
             "genome": dict(genome or {}),
             "outputs": outputs if isinstance(outputs, bool) else list(outputs),
         } | given(accuracy_mm=accuracy_mm)
-        return cast(a.Simulation, self._json("POST", "/v1/simulations", json=body, key=str(uuid.uuid4())))
+        return cast(a.Simulation, self._simulated("/v1/simulations", body))
 
     def loads_under(
         self,
@@ -267,7 +272,7 @@ class Client(Transport):
             "genome": dict(genome or {}),
             "outputs": True if outputs is None else list(outputs),
         } | given(accuracy_mm=accuracy_mm)
-        return cast(a.Loads, self._json("POST", "/v1/loads", json=body, key=str(uuid.uuid4())))
+        return cast(a.Loads, self._simulated("/v1/loads", body))
 
 
 def merge(run: a.Run, event: a.Event) -> a.Run:

@@ -71,6 +71,7 @@ class Transport:
 
     ``retries`` is how often a call is repeated when the connection fails or the server says 502, 503 or 504.
     A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
+    Answers that the server simulates for may take ``simulating_s``: one given up too early would be computed again.
     """
 
     def __init__(
@@ -78,11 +79,13 @@ class Transport:
         base_url: str = DEFAULT_URL,
         *,
         timeout_s: float = 60.0,
+        simulating_s: float = 600.0,
         retries: int = 2,
         retry_wait_s: float = 0.3,
     ) -> None:
         self.base_url = base_url.rstrip("/")
         self.retries, self.retry_wait_s = retries, retry_wait_s
+        self.simulating = httpx.Timeout(timeout_s, read=simulating_s)
         try:
             url = httpx.URL(self.base_url)
         except httpx.InvalidURL as error:

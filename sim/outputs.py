@@ -22,13 +22,16 @@ from sim.kernels.bodies import kinetic_and_height
 from sim.kernels.connectors import connect, relative_pose
 from sim.kernels.integrate import Lanes, State
 from sim.model import Solution
+from sim.numerics import LADDER
 from sim.scene import setting
+from sim.simulate import Beat
 from sim.structure import Structure
 from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["root", "spanwise", "chordwise"]
 LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
+CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro
 RODS = ("front rod", "rear rod")
 
 
@@ -171,12 +174,30 @@ class Balance:
 
 
 def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
-    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails."""
+    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails.
+
+    The steps are raised until the balance of the beat closes to CLOSING, unless somebody has chosen them.
+    """
     beat = _fine(model).beat(genome, recording, with_motion=True)
     if beat.reason is not None:  # what cannot be had that well can perhaps be had as well as tracks
         beat = model.beat(genome, recording, with_motion=True)
-    if beat.reason is not None or beat.motion is None:
+    if beat.reason is not None:
         raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
+    found = _outputs(model, genome, recording, beat)
+    for steps in (n for n in LADDER if n > len(beat.tracks) and model.numerics.steps is None):
+        if abs(found.balance.relative_closing) <= CLOSING:
+            break
+        finer = replace(model, numerics=replace(model.numerics, steps=steps, periodic=0.25 * LOAD_ACCURACY))
+        closer = finer.beat(genome, recording, with_motion=True)
+        if closer.reason is not None:
+            break
+        found = _outputs(model, genome, recording, replace(closer, error=beat.error))
+    return found
+
+
+def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording, beat: Beat) -> Outputs:
+    if beat.motion is None:
+        raise AssertionError("a beat without its motion")
     group = lanes(model.structure, model.genes, np.atleast_2d(np.asarray(genome, float)))
     found = from_motion(
         model.structure, group, recording.condition, beat.motion, _crossing(model, recording, beat.tracks)

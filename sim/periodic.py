@@ -44,6 +44,7 @@ class Secants:
     columns: list[tuple[Array, Array]] = field(default_factory=list)
     best: tuple[float, State] | None = None  # smallest change of a beat so far, and the state at its end
     leapt: bool = False
+    target: Array | None = None  # coordinates of the start that was given last
 
     def add(self, start: State, end: State) -> tuple[State, float]:
         """Learn from one beat; the state from which to start the next, and how far (m) that is from this start.
@@ -51,7 +52,8 @@ class Secants:
         That distance is what is left between this beat and the periodic one, as far as the beats can tell: until two of
         them can be compared, and for ever where none is kept, what the beat changes.
         """
-        x, arrived = self._coordinates(start), self._coordinates(end)
+        x = self._coordinates(start) if self.target is None else self.target
+        arrived = self._coordinates(end)
         change = arrived - x
         size = float(np.linalg.norm(change))
         if self.leapt and self.best is not None and not size <= WORSE * self.best[0]:
@@ -65,15 +67,16 @@ class Secants:
         correction = self._correction(change)
         # a longer one means that there is no useful linear map yet: told as a distance, but not gone
         self.leapt = bool(0.0 < np.linalg.norm(correction) <= LONGEST * size)
-        target = arrived + correction
-        return (self._state(target, end) if self.leapt else end), float(np.abs(target - x).max())
+        distance = float(np.abs(arrived + correction - x).max())
+        self.target = arrived + correction if self.leapt else arrived
+        return (self._state(self.target, end) if self.leapt else end), distance
 
     def step_back(self) -> State:
         """Where to go on after a leap that made things worse: from the end of the best beat, having learnt nothing."""
         if self.best is None or not self.leapt:
             raise ValueError("there was no leap to take back")
         _, state = self.best
-        self.columns, self.starts, self.ends, self.best, self.leapt = [], [], [], None, False
+        self.columns, self.starts, self.ends, self.best, self.leapt, self.target = [], [], [], None, False, None
         return State(*(array.copy() for array in state))
 
     @property

@@ -104,9 +104,9 @@ class _Group:
             if course.secants is None:
                 course.secants = Secants(before, self.angular_rate, numerics.window)
             course.state, course.distance = course.secants.add(before, after)
-            course.growth = course.secants.growth
             _put(self.state, lane, course.state)
             if course.distance <= numerics.settled:
+                course.growth = course.secants.growth
                 course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
 
 

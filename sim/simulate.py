@@ -89,7 +89,7 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
     """Decide whether an individual is accurate, goes up a rung, or is given up."""
     if course.reason is not None:
         course.failures += 1
-        course.state, course.secants, course.tracks, course.changes, course.error = None, None, None, [], np.nan
+        course.tracks, course.changes, course.error = None, [], np.nan  # one that diverged starts again from rest
         course.done = last or course.failures >= _TRIES
         return
     if numerics.steps is not None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -247,6 +250,40 @@ def test_a_folder_without_description_is_refused(client: Client, tmp_path: Path)
 def test_parse_events() -> None:
     lines = [": alive", "", "id: 3", "event: generation", 'data: {"a":', "data: 1}", "", "id: 4", 'data: {"cut": 1}']
     assert list(parse_events(iter(lines))) == [{"id": "3", "event": "generation", "data": {"a": 1}}]
+
+
+@pytest.mark.parametrize("route", ["/v1/simulations", "/v1/loads", "/v1/runs/run_1/loads", "/v1/runs/run_1/comparison"])
+def test_a_simulation_may_take_longer_than_other_answers(route: str) -> None:
+    """Given up and sent again, it would be computed once more each time."""
+    asked: list[str] = []
+
+    class Slow(BaseHTTPRequestHandler):
+        def answer(self) -> None:
+            asked.append(self.path)
+            self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            time.sleep(0.5)
+            self.send_response(200)
+            self.send_header("Content-Length", "2")
+            self.end_headers()
+            self.wfile.write(b"{}")
+
+        do_GET = do_POST = answer
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Slow) as server:
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        with Client(f"http://127.0.0.1:{server.server_port}", timeout_s=0.2, simulating_s=30.0) as client:
+            calls: dict[str, Callable[[], Any]] = {
+                "/v1/simulations": lambda: client.simulate("ds_1", "slow"),
+                "/v1/loads": lambda: client.loads_under("ds_1", "slow"),
+                "/v1/runs/run_1/loads": lambda: client.loads("run_1"),
+                "/v1/runs/run_1/comparison": lambda: client.comparison("run_1"),
+            }
+            assert calls[route]() == {}
+        server.shutdown()
+    assert [path.partition("?")[0] for path in asked] == [route]
 
 
 def _sequences(events: list[Event]) -> list[int]:

@@ -253,3 +253,18 @@ def test_a_failing_wing_says_why() -> None:
     wild = [1e6 if gene.name == "L_a" else gene.nominal for gene in model.genes]
     with pytest.raises(ValueError, match="cannot be simulated under 'blank': "):
         simulate_outputs(model, wild, blank_recording(model.wing, TUNNEL))
+
+
+def test_balance_closes_where_losses_are_a_thousandth_of_what_swings() -> None:
+    """Slowly in near vacuum, stiff and lightly damped: steps are raised until the motors' mean power can be believed."""
+    model = model_of("4", Numerics())
+    stiff = {"E_f": 5.0, "E_r": 5.0, "G_f": 5.0, "D_E": 0.2, "D_G": 0.2}
+    genome = [g.nominal * stiff.get(g.name, 1.0) for g in model.genes]
+    recording = blank_recording(model.wing, vacuum(10.0, 0.0, 2.0))
+    outputs = simulate_outputs(model, genome, recording)
+    assert abs(outputs.balance.relative_closing) <= 0.01
+    coarse = model.beat(genome, recording, with_motion=True)
+    assert coarse.motion is not None
+    group = lanes(model.structure, model.genes, np.array([genome]))
+    first = from_motion(model.structure, group, recording.condition, coarse.motion)
+    assert abs(first.balance.relative_closing) > 0.01, "already closed: the test shows nothing"

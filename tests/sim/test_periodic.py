@@ -192,8 +192,9 @@ def test_stiff_wing_with_little_damping_is_periodic_within_a_few_beats() -> None
 
 
 def test_growth_is_that_of_transients_and_not_of_round_off() -> None:
-    beats, noise = np.arange(16), np.random.default_rng(8).uniform(0.5, 2.0, 16)
-    assert _mean_growth(1e-9 * 1.1**beats) == pytest.approx(1.1)
-    assert _mean_growth(1e-6 * 0.9**beats) == pytest.approx(0.9)
-    dead = 1e-8 * 0.1**beats + 1e-14 * noise * 1.2**beats
+    beats: Array = np.arange(16.0)
+    noise: Array = np.random.default_rng(8).uniform(0.5, 2.0, 16)
+    dead = 1e-8 * np.power(0.1, beats) + 1e-14 * noise
+    assert _mean_growth(1e-9 * np.power(1.1, beats)) == pytest.approx(1.1)
+    assert _mean_growth(1e-6 * np.power(0.9, beats)) == pytest.approx(0.9)
     assert _mean_growth(dead) == pytest.approx(1.0)
