@@ -12,7 +12,8 @@ from calibration.result import Comparison, GeneResult, Result
 from calibration.search import CalibrationSpec, Generation
 from records import Dataset, Recording, load_archive
 from sim.flexible_wing import FlexibleWing
-from sim.outputs import Outputs, simulate_outputs
+from sim.loads import simulate_outputs
+from sim.outputs import Outputs
 
 
 class Engine(Protocol):

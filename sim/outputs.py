@@ -6,32 +6,25 @@ laws that made it: the lanes of a kernel, elsewhere individuals, are here eight 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Recording
-from sim.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
-from sim.flexible_wing import FlexibleWing
+from records import Condition
 from sim.kernels import LANES
 from sim.kernels.air import strip_forces
 from sim.kernels.bodies import kinetic_and_height
 from sim.kernels.connectors import connect, relative_pose
 from sim.kernels.integrate import Lanes, State
 from sim.model import Solution
-from sim.numerics import LADDER
 from sim.scene import setting
-from sim.simulate import Beat
 from sim.structure import Structure
-from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["root", "spanwise", "chordwise"]
-LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
-CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro
 RODS = ("front rod", "rear rod")
 
 
@@ -171,50 +164,6 @@ class Balance:
         """The closing error relative to what passes through: all that enters on the mean; 0 where nothing does."""
         entering = max(self.supplied, 0.0) + max(-self.to_air, 0.0)
         return self.closing / entering if entering > 0 else 0.0
-
-
-def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
-    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails.
-
-    The steps are raised until the balance of the beat closes to CLOSING, unless somebody has chosen them.
-    """
-    beat = _fine(model).beat(genome, recording, with_motion=True)
-    if beat.reason is not None:  # what cannot be had that well can perhaps be had as well as tracks
-        beat = model.beat(genome, recording, with_motion=True)
-    if beat.reason is not None:
-        raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
-    found = _outputs(model, genome, recording, beat)
-    for steps in (n for n in LADDER if n > len(beat.tracks) and model.numerics.steps is None):
-        if abs(found.balance.relative_closing) <= CLOSING:
-            break
-        finer = replace(model, numerics=replace(model.numerics, steps=steps, periodic=0.25 * LOAD_ACCURACY))
-        closer = finer.beat(genome, recording, with_motion=True)
-        if closer.reason is not None:
-            break
-        found = _outputs(model, genome, recording, replace(closer, error=beat.error))
-    return found
-
-
-def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording, beat: Beat) -> Outputs:
-    if beat.motion is None:
-        raise AssertionError("a beat without its motion")
-    group = lanes(model.structure, model.genes, np.atleast_2d(np.asarray(genome, float)))
-    found = from_motion(
-        model.structure, group, recording.condition, beat.motion, _crossing(model, recording, beat.tracks)
-    )
-    return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
-
-
-def _fine(model: FlexibleWing) -> FlexibleWing:
-    """The model solved to LOAD_ACCURACY or better, unless somebody has chosen the steps.
-
-    Loads are differences of stiff springs' ends, and losses are small beside what swings to and fro: they need more
-    than tracks that are a tenth of a millimetre right.
-    """
-    if model.numerics.steps is not None:
-        return model
-    accuracy = min(LOAD_ACCURACY, model.numerics.accuracy)
-    return replace(model, numerics=replace(model.numerics, accuracy=accuracy))
 
 
 def from_motion(
@@ -399,21 +348,3 @@ def _nearest_rotation(mean: Array) -> Array:
 def _incidence(condition: Condition) -> float:
     """Of the stream, rad; without wind the axes are those of the world."""
     return condition.angle_of_attack if condition.airspeed > 0 else 0.0
-
-
-def _crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
-    """Drive phase (beats) of the upstroke crossing of ``tracks`` [n, M, 3]; 0 where there is none.
-
-    By the markers that place the recording, so that both phases agree; by all reference markers where nothing was
-    recorded.
-    """
-    names = [marker.name for marker in model.wing.markers]
-    try:
-        references: Sequence[str] = [recording.markers[c] for c in reference_columns(model.wing, recording)]
-    except ValueError:
-        references = model.wing.reference_markers
-    height = tracks[:, [names.index(name) for name in references], 2].mean(axis=1)
-    spectrum = np.fft.rfft(height)[: REFERENCE_HARMONICS + 1] / len(height)
-    spectrum[1:] *= 2
-    crossing = upstroke_crossing(spectrum[None], model.wing.hinge.z)[0] / (2 * np.pi)
-    return float(crossing % 1.0) if np.isfinite(crossing) else 0.0

@@ -207,7 +207,7 @@ def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> No
     slow = replace(model, numerics=Numerics(accuracy=1e-4, periodic=1e-15, max_beats=3))
     settling = slow.beat(nominal, still).reason or ""
     assert with_remedy(settling).endswith("needs a larger accuracy_mm (at most 1)")
-    bent = {"L_a": 400.0, "E_f": 1e5, "E_r": 2e9}
+    bent = {"L_a": 400.0, "E_f": 1e5, "E_r": 2e9, "G_f": 3e4}
     wild = np.array([bent.get(gene.name, gene.nominal) for gene in model.genes])
     windy = blank_recording(wing, tunnel(0.05, 3.0, 6.0))
     assert FLUTTER in with_remedy(FlexibleWing(wing, "4").beat(wild, windy).reason or "")

@@ -279,4 +279,6 @@ def test_the_real_engine() -> None:
     means = [still["averages"][name] for name in ("lift_n", "thrust_n", "side_n", "to_air_w")]
     assert [str(mean) for mean in means] == ["0.0"] * 4
     with pytest.raises(ValueError, match="cannot be simulated under 'windy'"):
-        engine.loads(spec, dataset, engine.genome(spec, dataset, {"L_a": 400.0, "E_f": 1e5, "E_r": 2e9}), recording)
+        engine.loads(
+            spec, dataset, engine.genome(spec, dataset, {"L_a": 400.0, "E_f": 1e5, "E_r": 2e9, "G_f": 3e4}), recording
+        )

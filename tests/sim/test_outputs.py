@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from records import Condition, FourierDrive
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.integrate import State
+from sim.loads import simulate_outputs
 from sim.numerics import Numerics
-from sim.outputs import Outputs, body_names, from_motion, simulate_outputs
+from sim.outputs import Outputs, body_names, from_motion
 from sim.rig import Tracking, blank_recording, record, robird_wing, true_genome, tunnel, vacuum
 from sim.simulate import Beat
 from sim.wing_genes import lanes
@@ -243,7 +244,7 @@ def test_the_balance_closes_at_the_steps_that_are_taken_unasked() -> None:
 
 def test_a_wing_that_cannot_be_solved_finer_has_the_loads_of_its_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
     model, recording = FlexibleWing(robird_wing(), "4"), blank_recording(robird_wing(), TUNNEL)
-    monkeypatch.setattr("sim.outputs.LOAD_ACCURACY", 1e-13)
+    monkeypatch.setattr("sim.loads.LOAD_ACCURACY", 1e-13)
     outputs = simulate_outputs(model, nominal(model), recording)
     assert len(outputs.phase) == len(model.beat(nominal(model), recording).tracks)
 
@@ -256,7 +257,7 @@ def test_a_failing_wing_says_why() -> None:
 
 
 def test_balance_closes_where_losses_are_a_thousandth_of_what_swings() -> None:
-    """Slowly in near vacuum, stiff and lightly damped: steps are raised until the motors' mean power can be believed."""
+    """Slow, stiff and lightly damped in near vacuum: steps are raised until the mean power can be believed."""
     model = model_of("4", Numerics())
     stiff = {"E_f": 5.0, "E_r": 5.0, "G_f": 5.0, "D_E": 0.2, "D_G": 0.2}
     genome = [g.nominal * stiff.get(g.name, 1.0) for g in model.genes]
