@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,19 @@ Column = tuple[str, list[float]]
 Panel = tuple[str, list[Column]]
 
 
-def check_suffix(path: Path | None, option: str, known: tuple[str, ...]) -> None:
-    """Refuse a file name whose ending says no format that can be written."""
-    if path is not None and path.suffix.lower() not in known:
+def check_file(path: Path | None, option: str, known: tuple[str, ...] = ()) -> None:
+    """Refuse, before anything is simulated, a file of no ``known`` ending or that cannot be written."""
+    if path is None:
+        return
+    if known and path.suffix.lower() not in known:
         raise typer.BadParameter(f"{path}: the name must end in {' or '.join(known)}", param_hint=option)
+    if path.is_dir():
+        raise typer.BadParameter(f"{path} is a folder; name a file in it", param_hint=option)
+    place = path if path.exists() else path.parent
+    if not place.exists():
+        raise typer.BadParameter(f"there is no folder {place}; make it first", param_hint=option)
+    if not os.access(place, os.W_OK):
+        raise typer.BadParameter(f"{place} cannot be written; choose another place", param_hint=option)
 
 
 def write_loads(outputs: a.Outputs, path: Path) -> None:

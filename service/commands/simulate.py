@@ -12,7 +12,7 @@ import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
-from service.commands.loads import check_suffix, summary, write_loads, write_plot
+from service.commands.loads import check_file, summary, write_loads, write_plot
 from service.commands.output import AsJson, Url, mm, note, number, print_json, progress, say, table
 
 Track = list[float | None]
@@ -57,8 +57,9 @@ def simulate(
 
     Example: wingfit simulate --dataset ID --genome best.json --genome E_f=6e6 --loads loads.csv --plot loads.html
     """
-    check_suffix(loads, "--loads", (".csv", ".json"))
-    check_suffix(plot, "--plot", (".html",))
+    check_file(loads, "--loads", (".csv", ".json"))
+    check_file(plot, "--plot", (".html",))
+    check_file(output, "--output")
     if at and output:
         raise typer.BadParameter(
             "no tracks were recorded under another condition; leave out --output", param_hint="--at"

@@ -246,12 +246,15 @@ def test_the_command_line_under_another_condition(wingfit: Wingfit, api: Api, tm
     [
         ("--loads", "x.txt", 2, ".csv or .json"),
         ("--plot", "x.svg", 2, ".html"),
-        ("--loads", "no/x.csv", 1, "cannot write"),
+        ("--loads", "no/x.csv", 2, "there is no folder"),
+        ("--loads", "folder.csv", 2, "is a folder"),
+        ("-o", "no/x.csv", 2, "there is no folder"),
     ],
 )
 def test_a_file_that_cannot_be_written_is_told(
     wingfit: Wingfit, api: Api, tmp_path: Path, option: str, name: str, code: int, said: str
 ) -> None:
+    (tmp_path / "folder.csv").mkdir()
     ended, out, err = wingfit("simulate", "--dataset", api.upload()["id"], option, str(tmp_path / name))
     assert (ended, out) == (code, "")
     assert said.replace(" ", "") in err.replace(" ", "").replace("│", "").replace("\n", "")
