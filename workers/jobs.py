@@ -253,6 +253,7 @@ _HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
 }
 
 ETA_MEMORY = 0.2
+ETA_LONGEST = 1e9  # s, thirty years: more is no estimate
 """Share of the elapsed time over which old progress fades out of the estimate, by a factor e."""
 
 
@@ -276,4 +277,4 @@ def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
     spread = sum(w * (t - mean_t) ** 2 for w, (t, _) in zip(weights, points, strict=True))
     rise = sum(w * (t - mean_t) * (p - mean_p) for w, (t, p) in zip(weights, points, strict=True))
     seconds = (1.0 - progress) * spread / rise if rise > 0.0 else math.inf
-    return seconds if math.isfinite(seconds) else None
+    return seconds if seconds < ETA_LONGEST else None
