@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from records import Marker, Rod, Wing
+from records import Marker, Wing
 from sim.division import Division
 from sim.sections import round_area
 
@@ -81,14 +81,6 @@ class Planform:
     def strips(self, division: Division) -> Array:
         """Span positions of the strips' edges, root first."""
         return np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
-
-
-def rod_at(rod: Rod, y: float) -> float | None:
-    """x of a rod at span position y, or None where there is none."""
-    if not rod.y_root - 1e-9 <= y <= rod.y_tip + 1e-9:
-        return None
-    t = (y - rod.y_root) / (rod.y_tip - rod.y_root)
-    return rod.x_root + t * (rod.x_tip - rod.x_root)
 
 
 def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> npt.NDArray[np.int64]:

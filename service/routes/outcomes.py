@@ -101,12 +101,7 @@ def comparison(
     genome: Literal["best", "nominal"] = "best",
 ) -> Response:
     """Return simulated beside recorded markers over one recording."""
-    row = _row(service, run_id)
-    dataset = service.datasets.get(row.dataset_id)
-    wanted = dataset.recordings[0].name if recording is None else recording
-    _check_recording(dataset, wanted, "query.recording")
-    spec = store.spec(row)
-    values = _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
     try:
         tracks = service.engine.compare(spec, dataset, values, wanted)
     except ValueError as error:
@@ -125,12 +120,7 @@ def loads(
     ] = None,
 ) -> Response:
     """Return motor torques, forces, powers and energies over one beat under a recording's condition."""
-    row = _row(service, run_id)
-    dataset = service.datasets.get(row.dataset_id)
-    wanted = dataset.recordings[0].name if recording is None else recording
-    _check_recording(dataset, wanted, "query.recording")
-    spec = store.spec(row)
-    values = _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
     found = _loads(service, spec, dataset, values, dataset.recording(wanted))
     return JSONResponse({"recording": wanted, "outputs": load_views.outputs(found, load_views.wanted(outputs or True))})
 
@@ -211,6 +201,17 @@ def _asked(service: Service, dataset: Dataset, body: SimulationIn) -> tuple[Cali
         return spec, service.engine.genome(spec, dataset, body.genome)
     except ValueError as error:
         raise invalid("a value is out of bounds", [error_item("body.genome", None, str(error))]) from None
+
+
+def _chosen(
+    service: Service, run_id: str, recording: str | None, genome: Literal["best", "nominal"]
+) -> tuple[Dataset, CalibrationSpec, str, dict[str, float]]:
+    """What a simulation of a run is of: its dataset and spec, the name of a recording, and a genome."""
+    row = _row(service, run_id)
+    dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
+    wanted = dataset.recordings[0].name if recording is None else recording
+    _check_recording(dataset, wanted, "query.recording")
+    return dataset, spec, wanted, _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
 
 
 def _loads(

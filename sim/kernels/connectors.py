@@ -24,7 +24,6 @@ from sim.kernels.matrices import (
     load_vector,
     product,
     times,
-    times_floats,
     trace_minus,
     transposed,
 )
@@ -165,7 +164,7 @@ def connect(
             f = (f[0] + more[1][0], f[1] + more[1][1], f[2] + more[1][2])
             energy = energy + more[2]
         e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
-        arm = times_floats(Q, b[c, 0], b[c, 1], b[c, 2])
+        arm = times(Q, (b[c, 0], b[c, 1], b[c, 2]))
         turning = times(Q, load_vector(V, j, 0))
         rate, slide = relative_twist(
             Q, e, arm, load_vector(V, i, 0), load_vector(V, i, 3), turning, load_vector(V, j, 3)

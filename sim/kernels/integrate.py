@@ -274,7 +274,7 @@ def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> 
 
 @kernel
 def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Assemble and factor the step's matrix at its start: S = M / (h gamma) - dW/dV - h gamma dW/dxi."""
+    """Assemble and factor the step's matrix S at its start (``sim.kernels.tangents``)."""
     hg = setting.step * GAMMA
     work.Q0[:] = work.Q
     work.d0[:] = work.d
@@ -315,7 +315,7 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
 @kernel
 def _to_stage(work: Work, state: State, stage: int) -> None:
     """Local coordinates, twist and pose of a stage."""
-    if stage < 5:
+    if stage < STAGES - 1:
         combine(0.0, state.V, work.U_xi, STAGE[stage], stage, work.xi)
         combine(1.0, state.V, work.U_V, STAGE[stage], stage, work.V)
     else:
@@ -353,8 +353,9 @@ def advance(
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 
-    ``drive`` [n, STAGES, 2, 3]: angle, rate and acceleration of both rods at the stages of every step. A lane whose
-    bodies turn more than MAX_ROTATION in a step, or become NaN, is marked dead in ``alive`` and runs on, ignored.
+    ``drive`` [n, STAGES, 2, 3]: angle, rate and acceleration of both rods at the stages of every step; angle and rate
+    are taken at its start only, in between they follow from the acceleration. A lane whose bodies turn more than
+    MAX_ROTATION in a step, or become NaN, is marked dead in ``alive`` and runs on, ignored.
     """
     for t in range(len(drive)):
         set_rods(drive[t, 0], state)

@@ -98,12 +98,6 @@ def times(A: Nine, x: Three) -> Three:
 
 
 @inlined
-def times_floats(A: Nine, x: float, y: float, z: float) -> Three:
-    """A (x, y, z)."""
-    return A[0] * x + A[1] * y + A[2] * z, A[3] * x + A[4] * y + A[5] * z, A[6] * x + A[7] * y + A[8] * z
-
-
-@inlined
 def columns_scaled(A: Nine, s: Three) -> Nine:
     """A diag(s)."""
     return (

@@ -43,7 +43,6 @@ from sim.kernels.matrices import (
     skew,
     skew_times,
     times,
-    times_floats,
     times_skew,
     trace_minus,
     transposed,
@@ -222,7 +221,7 @@ def add_connectors(
         Q, d = load_matrix(Q_, c), load_vector(d_, c, 0)
         ko, kt, do, dt = load_vector(K, c, 0), load_vector(K, c, 3), load_vector(D, c, 0), load_vector(D, c, 3)
         e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
-        arm = times_floats(Q, b[c, 0], b[c, 1], b[c, 2])
+        arm = times(Q, (b[c, 0], b[c, 1], b[c, 2]))
         omega, velocity = load_vector(V, i, 0), load_vector(V, i, 3)
         turning = times(Q, load_vector(V, j, 0))
         rate, slide = relative_twist(Q, e, arm, omega, velocity, turning, load_vector(V, j, 3))
