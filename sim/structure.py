@@ -243,11 +243,10 @@ def _wiring(
     second = np.array([c.second for c in connectors], np.int64)
     base = [c.point - (parts[c.first].centre if c.first >= 0 else hinge) for c in connectors]
     b = np.array([c.point - parts[c.second].centre for c in connectors])
-    pairs = {(int(j), int(i)) for i, j in zip(first, second, strict=True) if i < n}
-    work = eliminate(n, pairs)
     joined = [(int(i), int(j)) for i, j in zip(first, second, strict=True) if i < n]
     if len(set(joined)) < len(joined):
         raise AssertionError("two connectors between the same bodies: their blocks would overwrite each other")
+    work = eliminate(n, set(joined))
     outer, last = len(first) - len(joined), n + 2 * len(work.below)
     starts = np.concatenate([[0], np.cumsum(division.bodies)]).astype(np.int64)
     area = np.array([part.area for part in parts])
