@@ -4,30 +4,51 @@ All quantities are SI, angles in radians; unit suffixes appear only in files and
 Axes (docs/notation.md): x aft along the chord, y outboard along the span, z up. The hinge axis is parallel to x.
 """
 
-from records.dataset import Condition, Dataset, Recording
+from records.dataset import Condition, Dataset, LowPass, Recording
 from records.drive import Drive, FourBarDrive, FourierDrive
 from records.errors import DatasetError, Fault
 from records.genes import Gene, Genome
 from records.storage import load_archive, load_dataset, save_dataset
+from records.vehicle import (
+    ChordStation,
+    Flap,
+    FourierFlap,
+    FourierPitch,
+    PassivePitch,
+    Pitch,
+    SplitCycleFlap,
+    Vehicle,
+    WingMotion,
+)
 from records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 
 __all__ = [
+    "ChordStation",
     "Condition",
     "Dataset",
     "DatasetError",
     "Drive",
     "Fault",
+    "Flap",
     "FourBarDrive",
     "FourierDrive",
+    "FourierFlap",
+    "FourierPitch",
     "Gene",
     "Genome",
     "Hinge",
+    "LowPass",
     "Marker",
     "Materials",
+    "PassivePitch",
+    "Pitch",
     "Recording",
     "Rod",
+    "SplitCycleFlap",
     "Station",
+    "Vehicle",
     "Wing",
+    "WingMotion",
     "load_archive",
     "load_dataset",
     "save_dataset",

@@ -10,9 +10,12 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from records.vehicle import Vehicle, WingMotion
 from records.wing import Wing
 
-Rig = Literal["vacuum_chamber", "wind_tunnel"]
+Rig = Literal["vacuum_chamber", "wind_tunnel", "free_flight"]
+ForceAxis = Literal["x", "z"]
+Kind = Literal["tracks", "forces"]
 STANDARD_GRAVITY = 9.80665
 
 
@@ -26,7 +29,8 @@ class Condition:
         pressure: static air pressure, Pa.
         temperature: air temperature, K.
         airspeed: speed of the airstream along +x (aft) at zero angle of attack, m/s.
-        angle_of_attack: of the rig in the airstream, rad; positive turns the stream upwards.
+        angle_of_attack: of the rig in the airstream, rad; positive turns the stream upwards. Of a vehicle in level
+            flight it is the body pitch theta_b (Armanini et al. 2016, Eq. 16).
         gravity: m/s^2, along -z.
     """
 
@@ -39,12 +43,26 @@ class Condition:
     gravity: float = STANDARD_GRAVITY
 
 
+@dataclass(frozen=True)
+class LowPass:
+    """Zero-phase low-pass: a Butterworth filter run forwards and backwards.
+
+    ``cutoff`` in Hz is where one pass has lost half its power; ``order`` is that of one pass.
+    """
+
+    cutoff: float
+    order: int = 4
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Tracks of markers under one condition.
+    """What was recorded under one condition: tracks of markers, or forces of a vehicle.
 
-    ``values`` has shape [T, C]: at each of the ``times`` (T, in s, increasing) the channels, three per marker in the
-    order x, y, z (m, wing frame). ``standard_deviation`` [C] is the noise where the user knows it, else None.
+    ``values`` has shape [T, C]: at each of the ``times`` (T, in s, increasing) the channels: three per marker in the
+    order x, y, z (m, wing frame), or one per force axis (N, body axes: what the wings exert on the body).
+    ``standard_deviation`` [C] is the noise where the user knows it, else None. Times of forces count from the start of
+    a beat. ``low_pass`` says that the values have been filtered; a model filters alike. ``motion`` is the wings' motion
+    as measured in this recording, and ``mass`` (kg) the vehicle's, where they differ from the vehicle's own.
     """
 
     name: str
@@ -54,6 +72,10 @@ class Recording:
     markers: tuple[str, ...]
     values: npt.NDArray[np.float64]
     standard_deviation: npt.NDArray[np.float64] | None = None
+    forces: tuple[ForceAxis, ...] = ()
+    low_pass: LowPass | None = None
+    motion: WingMotion | None = None
+    mass: float | None = None
 
     @cached_property
     def valid(self) -> npt.NDArray[np.bool_]:
@@ -61,25 +83,53 @@ class Recording:
         return np.isfinite(self.values)
 
     @property
+    def kind(self) -> Kind:
+        """Whether it holds tracks or forces."""
+        return "forces" if self.forces else "tracks"
+
+    @property
     def channels(self) -> tuple[str, ...]:
-        """Channel names in the order of the columns of ``values``: ``<marker>_x``, ``<marker>_y``, ``<marker>_z``."""
-        return tuple(f"{marker}_{axis}" for marker in self.markers for axis in "xyz")
+        """Names of the columns of ``values``: ``<marker>_x``, ``_y``, ``_z`` of each marker, or ``force_x``, ``force_z``."""
+        tracks = tuple(f"{marker}_{axis}" for marker in self.markers for axis in "xyz")
+        return tracks + tuple(f"force_{axis}" for axis in self.forces)
 
     @property
     def positions(self) -> npt.NDArray[np.float64]:
-        """``values`` as [T, M, 3]."""
+        """``values`` of a recording of tracks as [T, M, 3]."""
         return self.values.reshape(len(self.times), len(self.markers), 3)
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """A wing with its recordings; those named in ``held_out`` are never fitted, only predicted."""
+    """A wing or a vehicle with its recordings; those named in ``held_out`` are never fitted, only predicted.
+
+    A wing is recorded as tracks, a vehicle as forces.
+    """
 
     name: str
-    wing: Wing
+    rig: Wing | Vehicle
     recordings: tuple[Recording, ...]
     held_out: tuple[str, ...] = ()
     description: str = ""
+
+    @property
+    def kind(self) -> Kind:
+        """Whether the recordings hold tracks or forces."""
+        return "tracks" if isinstance(self.rig, Wing) else "forces"
+
+    @property
+    def wing(self) -> Wing:
+        """The wing; ValueError for a dataset of a vehicle."""
+        if not isinstance(self.rig, Wing):
+            raise ValueError(f"dataset {self.name!r} describes a vehicle with forces; this needs a wing with tracks")
+        return self.rig
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """The vehicle; ValueError for a dataset of a wing."""
+        if not isinstance(self.rig, Vehicle):
+            raise ValueError(f"dataset {self.name!r} describes a wing with tracks; this needs a vehicle with forces")
+        return self.rig
 
     def recording(self, name: str) -> Recording:
         """The recording called ``name``."""

@@ -326,5 +326,5 @@ def test_a_gene_at_its_bound_is_not_told(small: tuple[Dataset, Genome]) -> None:
 
 def test_estimates_in_another_unit_are_refused(small: tuple[Dataset, Genome]) -> None:
     dataset, _ = small
-    gigapascal = replace(dataset, wing=replace(dataset.wing, estimates={"E_r": 180.0}))
+    gigapascal = replace(dataset, rig=replace(dataset.wing, estimates={"E_r": 180.0}))
     refused(SPEC, gigapascal, r"E_r.* Pa.*check its unit")

@@ -1,0 +1,124 @@
+"""What a calibration on forces hands out: coefficients condition by condition, a global model, and how well each fits.
+
+Plain data; :mod:`calibration.estimation` and :mod:`calibration.evaluation` fill it. SI units, forces in N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.result import GeneResult
+
+Array = npt.NDArray[np.float64]
+Source = Literal["nominal", "local", "joint", "global", "average"]
+Quantity = Literal["lift", "drag", "x", "z"]
+
+
+@dataclass(frozen=True)
+class LocalEstimate:
+    """Maximum-likelihood estimate on one recording, or on several together (Armanini et al. 2016, Eq. 22).
+
+    ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in the
+    order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per recording.
+    ``remarks`` say in words what the data cannot separate.
+    """
+
+    name: str
+    recordings: tuple[str, ...]
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    correlation: tuple[tuple[float, ...], ...]
+    noise: tuple[tuple[tuple[float, ...], ...], ...]
+    cost: float
+    iterations: int
+    converged: bool
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class GlobalGene:
+    """One coefficient over the conditions (Eq. 23): constant + per_hz f + per_rad theta_b; slopes 0 where a mean is used."""
+
+    name: str
+    constant: float
+    per_hz: float
+    per_rad: float
+    largest_error: float
+    """Largest relative difference from a local estimate."""
+    left_out_error: float | None
+    """Largest relative difference from a local estimate that the fit had not seen; None with too few conditions."""
+
+
+@dataclass(frozen=True)
+class GlobalModel:
+    """Coefficients as functions of flap frequency and body pitch, and the range in which they were fitted."""
+
+    genes: tuple[GlobalGene, ...]
+    recordings: tuple[str, ...]
+    frequency_range: tuple[float, float]
+    pitch_range: tuple[float, float]
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How one model agrees with one recording in one quantity.
+
+    ``rmse_percent`` is relative to the range (largest minus smallest) of what was recorded; ``correlation`` is Pearson's;
+    means are over whole beats.
+    """
+
+    recording: str
+    source: Source
+    quantity: Quantity
+    rmse: float
+    rmse_percent: float
+    correlation: float
+    mean_recorded: float
+    mean_modelled: float
+
+
+@dataclass(frozen=True)
+class ForceResult:
+    """Outcome of a calibration on forces.
+
+    ``left_out`` are agreements of a global model fitted without the recording that it predicts. ``held_out`` names the
+    recordings that were never fitted. RMS differences in N of the fitted outputs, before (nominal) and after.
+    """
+
+    genes: tuple[GeneResult, ...]
+    estimates: tuple[LocalEstimate, ...]
+    global_model: GlobalModel | None
+    agreements: tuple[Agreement, ...]
+    left_out: tuple[Agreement, ...]
+    held_out: tuple[str, ...]
+    before: float
+    after: float
+    held_out_before: float | None
+    held_out_after: float | None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ForceComparison:
+    """Recorded and modelled forces of one recording over the beat, and their power spectra.
+
+    ``phase`` [n] is t*, in [0, 1); ``recorded`` and ``modelled`` map quantities to [n] in N (recorded: mean beat);
+    ``spread`` [n] is the standard deviation between beats. ``frequency`` [m] in Hz, spectra in N^2/Hz per quantity.
+    """
+
+    recording: str
+    source: Source
+    phase: Array
+    recorded: Mapping[Quantity, Array]
+    spread: Mapping[Quantity, Array]
+    modelled: Mapping[Quantity, Array]
+    frequency: Array
+    recorded_spectrum: Mapping[Quantity, Array]
+    modelled_spectrum: Mapping[Quantity, Array]
+    remarks: tuple[str, ...] = ()

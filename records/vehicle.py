@@ -1,0 +1,131 @@
+"""Description of a flapping vehicle on a balance or in flight: planform, mass and the prescribed motion of its wings.
+
+SI units, radians. Body axes: x forward to the nose, z down; zero body pitch is level (docs/notation.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+Layout = Literal["x4", "pair", "single"]
+WINGS: Mapping[Layout, int] = {"x4": 4, "pair": 2, "single": 1}
+
+
+@dataclass(frozen=True)
+class ChordStation:
+    """Chord (m) at distance ``r`` (m) from the flapping axis; linear between stations."""
+
+    r: float
+    chord: float
+
+
+@dataclass(frozen=True)
+class SplitCycleFlap:
+    """Flap angle that opens and closes at two speeds in one constant period (Armanini et al. 2016, Eqs. 20-21).
+
+    zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens, the mirrored law with a higher rate while
+    it XX ``smoothing`` is the standard deviation, in beats, of the Gaussian that rounds the law off.
+    """
+
+    amplitude: float
+    bias: float
+    split: float
+    smoothing: float = 0.01
+    kind: Literal["split_cycle"] = "split_cycle"
+
+
+@dataclass(frozen=True)
+class FourierFlap:
+    """Flap angle (rad): mean + sum_k [cosine[k-1] cos(2 pi k t*) + sine[k-1] sin(2 pi k t*)], k = 1, 2, ..."""
+
+    mean: float
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    kind: Literal["fourier"] = "fourier"
+
+
+@dataclass(frozen=True)
+class PassivePitch:
+    """Wing pitch that follows the flap motion (Armanini et al. 2016, Eq. 17 and Table 5), in rad and s.
+
+    theta_w = pi/2 + constant + flap zeta + flap_rate zeta' + flap_rate_squared zeta'^2.
+    """
+
+    constant: float
+    flap: float
+    flap_rate: float
+    flap_rate_squared: float
+    kind: Literal["passive"] = "passive"
+
+
+@dataclass(frozen=True)
+class FourierPitch:
+    """Wing pitch theta_w (rad) as such a series."""
+
+    mean: float
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+    kind: Literal["fourier"] = "fourier"
+
+
+Flap = SplitCycleFlap | FourierFlap
+Pitch = PassivePitch | FourierPitch
+
+
+@dataclass(frozen=True)
+class WingMotion:
+    """Prescribed motion of the wings over a beat, which starts (t* = 0) where the wings are closest and begin to open.
+
+    ``pitch`` holds at the span fraction ``pitch_station``; from there the twist is linear in span to ``root_pitch`` at
+    the flapping axis (pi/2 is a chord along the body). ``peel_end`` is the t* at which the whole chord has come apart.
+    """
+
+    flap: Flap
+    pitch: Pitch
+    pitch_station: float = 0.7
+    root_pitch: float = 0.0
+    peel_end: float = 0.17
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A flapping vehicle or animal as built: everything a blade-element model needs that is not a gene.
+
+    Attributes:
+        layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair"; "single" one wing.
+        claps: whether wings meet at the start of the beat, so that chord peels off and fling circulation can act.
+        stations: chord from the flapping axis (r = 0) to the tip.
+        wing_mass: of one wing, kg.
+        thickness: of the wing, m.
+        pitch_axis: place of the axis of wing pitch, in chords behind the leading edge (x0 of Eq. 4).
+        dihedral: zeta_0, rad, flap angle at which the wings of a pair are closed.
+        mass: of the whole vehicle, kg.
+        motion: of the wings where a recording brings none of its own.
+        velocities: "mirrored" (upper wing the mirror image of the lower) or "printed" (Eq. 18 as it stands in print).
+        estimates: the user's estimates of genes by name, overriding the model's defaults.
+    """
+
+    name: str
+    layout: Layout
+    claps: bool
+    stations: tuple[ChordStation, ...]
+    wing_mass: float
+    thickness: float
+    pitch_axis: float
+    dihedral: float
+    mass: float
+    motion: WingMotion
+    velocities: Literal["mirrored", "printed"] = "mirrored"
+    estimates: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def span(self) -> float:
+        """Length R of one wing, from the flapping axis to the tip, m."""
+        return self.stations[-1].r
+
+    @property
+    def wings(self) -> int:
+        """Number of wings."""
+        return WINGS[self.layout]
