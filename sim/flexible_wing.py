@@ -45,6 +45,11 @@ class FlexibleWing:
         """Structural genes (thesis Eq. 18), then aerodynamic ones (Eq. 19)."""
         return wing_genes(self.wing.estimates, self.bounds_factor)
 
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """All genes."""
+        return tuple(gene.name for gene in self.genes)
+
     @cached_property
     def structure(self) -> Structure:
         """Bodies and connectors."""

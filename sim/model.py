@@ -43,6 +43,11 @@ class Model(Protocol):
         """All genes of the model, in the order of the columns of a genome batch."""
         ...
 
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the genes that a calibration searches where the user names none."""
+        ...
+
     def observe(self, genomes: Array, recording: Recording) -> Observation:
         """Simulate ``genomes`` [B, G] under the recording's condition, sampled and aligned like the recording."""
         ...

@@ -1,0 +1,73 @@
+"""Zero-phase low-pass, alike for what was recorded and what a model predicts (Armanini et al. 2016, section 3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import butter, sosfiltfilt, sosfreqz
+
+from records import LowPass, Recording
+
+Array = npt.NDArray[np.float64]
+
+CUTOFF_HARMONIC = 3.2  # the seed's 40 Hz at 12.5 beats per second: just above the third harmonic
+UNEVEN = 0.01  # of a step: the largest departure from even sampling that a filter may take
+
+
+def default_cutoff(flap_frequency: float) -> float:
+    """Cutoff (Hz) just above the third harmonic, as the seed's 40 Hz is."""
+    return CUTOFF_HARMONIC * flap_frequency
+
+
+def sampling_rate(recording: Recording) -> float:
+    """Samples per second; ValueError where the sampling is not even."""
+    steps = np.diff(recording.times)
+    mean = float(steps.mean())
+    worst = float(np.abs(steps - mean).max())
+    if worst > UNEVEN * mean:
+        raise ValueError(
+            f"recording {recording.name!r} is not sampled evenly: steps differ by up to {worst * 1e3:.3g} ms from "
+            f"their mean of {mean * 1e3:.4g} ms (limit {UNEVEN:.0%}); resample it, or calibrate without low-pass filter"
+        )
+    return 1.0 / mean
+
+
+def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
+    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filter before this one."""
+    if recording.low_pass is not None:
+        raise ValueError(
+            f"recording {recording.name!r} has been low-passed at {recording.low_pass.cutoff:g} Hz already; "
+            "filter the raw recording instead, or calibrate without another filter"
+        )
+    gaps = int(np.count_nonzero(~recording.valid))
+    if gaps:
+        raise ValueError(
+            f"recording {recording.name!r} lacks {gaps} values, and a filter needs all; "
+            "fill the gaps, cut the recording, or calibrate without low-pass filter"
+        )
+    sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
+    # The pad must outlast the filter's memory, of the order of its cutoff's period.
+    pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
+    values = sosfiltfilt(sections, recording.values, axis=0, padlen=pad)
+    return replace(recording, values=np.ascontiguousarray(values), low_pass=low_pass)
+
+
+def gain(low_pass: LowPass, rate: float, frequency: npt.ArrayLike) -> Array:
+    """Gain (real: no phase) at ``frequency`` (Hz) of the filter as it works on samples taken at ``rate`` (Hz).
+
+    Above half the rate there is nothing to filter: a model's harmonics there would be aliases, and get none.
+    """
+    f = np.asarray(frequency, float)
+    response = sosfreqz(_sections(low_pass, rate, "the recording"), worN=np.minimum(f, 0.5 * rate), fs=rate)[1]
+    return np.where(f < 0.5 * rate, np.abs(response) ** 2, 0.0)
+
+
+def _sections(low_pass: LowPass, rate: float, what: str) -> Array:
+    if not 0 < low_pass.cutoff < 0.5 * rate:
+        raise ValueError(
+            f"a low-pass at {low_pass.cutoff:g} Hz does not fit {what}, sampled at {rate:g} Hz; "
+            f"the cutoff must lie in (0, {0.5 * rate:g}) Hz"
+        )
+    return np.asarray(butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos"))
