@@ -1,7 +1,8 @@
-"""What flows through wingfit: wings, conditions, recordings, genes. Nothing here computes physics.
+"""What flows through wingfit: wings, vehicles, conditions, recordings, genes. Nothing here computes physics.
 
 All quantities are SI, angles in radians; unit suffixes appear only in files and over HTTP.
-Axes (docs/notation.md): x aft along the chord, y outboard along the span, z up. The hinge axis is parallel to x.
+Axes (docs/notation.md) of a wing: x aft along the chord, y outboard along the span, z up, the hinge axis parallel to x;
+of a vehicle: x forward to the nose, z down.
 """
 
 from records.dataset import Condition, Dataset, LowPass, Recording

@@ -1,63 +1,77 @@
-"""From a description and tracks, however stored, to a dataset; and the same checks before writing."""
+"""From a description and numbers, however stored, to a dataset; and the same checks before writing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from records.convert import describe, to_condition, to_deviations, to_wing
+from records import convert_vehicle, convert_wing
 from records.dataset import Dataset, Recording
+from records.description import VehicleDatasetFile
 from records.errors import DatasetError, Faults, nearest
 from records.explain import check_description
-from records.limits import MAX_VALUES
+from records.forces import AXES
+from records.limits import FORMAT_VERSION, MAX_VALUES
 from records.plausibility import check_numbers
-from records.tracks import Tracks, too_much
+from records.table import Samples, too_much
+from records.vehicle import Vehicle
+from records.vehicle_file import VehicleRecordingFile
+from records.wing import Wing
+from records.wing_file import WingRecordingFile
 from records.yaml_text import Document
 
-ReadTracks = Callable[[str, int], Tracks]
-At = Callable[[str, Tracks, int], str]
+ReadSamples = Callable[[str, int], Samples]
+At = Callable[[str, Samples, int], str]
 
 
-def assemble(document: Document, read: ReadTracks, where: Callable[[str], str], at: At) -> Dataset:
+def assemble(document: Document, read: ReadSamples, where: Callable[[str], str], at: At) -> Dataset:
     """Build the dataset described by ``document``.
 
-    ``read(name, room)`` gives the tracks of a recording of at most ``room`` numbers, ``where(name)``
-    says where they are stored, ``at(name, tracks, row)`` where one instant is. Faults of all recordings are
+    ``read(name, room)`` gives the samples of a recording of at most ``room`` numbers, ``where(name)``
+    says where they are stored, ``at(name, samples, row)`` where one instant is. Faults of all recordings are
     collected.
     """
     checked = check_description(document)
-    wing, faults, recordings, room = to_wing(checked.wing), Faults(), [], MAX_VALUES
-    for index, entry in enumerate(checked.recordings):
+    rig: Wing | Vehicle
+    if isinstance(checked, VehicleDatasetFile):
+        rig = convert_vehicle.to_vehicle(checked.vehicle)
+    else:
+        rig = convert_wing.to_wing(checked.wing)
+    faults, recordings, room = Faults(), list[Recording](), MAX_VALUES
+    entries: Sequence[WingRecordingFile | VehicleRecordingFile] = checked.recordings
+    for index, entry in enumerate(entries):
         try:
-            tracks = read(entry.name, room)
+            samples = read(entry.name, room)
         except DatasetError as error:
             faults.extend(error)
             continue
-        room -= tracks.values.size + tracks.times.size
+        room -= samples.values.size + samples.times.size
+        path = ("recordings", index)
+        recording = (
+            convert_wing.to_recording(entry, samples, document, path, faults)
+            if isinstance(entry, WingRecordingFile)
+            else convert_vehicle.to_recording(entry, samples, document, path, faults)
+        )
         check_numbers(
-            tracks.times,
-            tracks.values,
-            wing,
+            recording,
+            rig,
             where(entry.name),
-            lambda row, name=entry.name, tracks=tracks: at(name, tracks, row),  # type: ignore[misc]
+            lambda row, name=entry.name, samples=samples: at(name, samples, row),  # type: ignore[misc]
             faults,
         )
-        path = ("recordings", index, "standard_deviation_m")
-        noise = to_deviations(entry, tracks.markers, document, path, faults)
-        recordings.append(
-            Recording(entry.name, entry.rig, to_condition(entry), tracks.times, tracks.markers, tracks.values, noise)
-        )
+        recordings.append(recording)
         if faults.full:
             break
     faults.raise_any()
-    return Dataset(checked.name, wing, tuple(recordings), tuple(checked.held_out), checked.description)
+    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
 
 
 def checked_description(dataset: Dataset) -> dict[str, object]:
     """Describe ``dataset``, after the checks that reading makes: what is written can be read."""
     faults = Faults()
     for recording in dataset.recordings:
+        _check_kind(recording, dataset, faults)
         _check_shapes(recording, faults)
     faults.raise_any()
     data = describe(dataset)
@@ -65,11 +79,11 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
     numbers = 0
     for recording in dataset.recordings:
         where = f"recording {recording.name!r}"
-        _check_markers(recording, dataset, where, faults)
+        if dataset.kind == "tracks":
+            _check_markers(recording, dataset.wing, where, faults)
         check_numbers(
-            recording.times,
-            recording.values,
-            dataset.wing,
+            recording,
+            dataset.rig,
             where,
             lambda row, where=where: f"{where}, frame {row}",  # type: ignore[misc]
             faults,
@@ -81,8 +95,46 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
     return data
 
 
+def describe(dataset: Dataset) -> dict[str, object]:
+    """``dataset`` without its numbers, as the plain data of ``dataset.yaml``."""
+    rig: dict[str, object]
+    if isinstance(dataset.rig, Vehicle):
+        rig = {"vehicle": convert_vehicle.describe_vehicle(dataset.rig)}
+        recordings = [convert_vehicle.describe_recording(recording) for recording in dataset.recordings]
+    else:
+        rig = {"wing": convert_wing.describe_wing(dataset.rig)}
+        recordings = [convert_wing.describe_recording(recording) for recording in dataset.recordings]
+    return {
+        "format_version": FORMAT_VERSION,
+        "name": dataset.name,
+        **({"description": dataset.description} if dataset.description else {}),
+        **rig,
+        "recordings": recordings,
+        **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
+    }
+
+
+def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
+    """Note what the file of this kind of dataset has no place for, rather than lose it."""
+    where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
+    lost: list[tuple[str, object]] = [
+        ("markers", recording.markers),
+        ("condition.phase_lag", recording.condition.phase_lag),
+    ]
+    if not kept:
+        lost = [(name, getattr(recording, name)) for name in ("forces", "low_pass", "motion", "mass")]
+    for name, value in lost:
+        if value:
+            what = "a vehicle with forces" if kept else "a wing with tracks"
+            faults.add(f"{where}: {name}", value, f"has no place in a dataset of {what}: remove it")
+    orders = [AXES[:1], AXES[1:], AXES]
+    if kept and recording.forces not in orders:
+        message = f"forces are {recording.forces!r}; they must be one of {', '.join(map(str, orders))}"
+        faults.add(f"{where}: forces", ", ".join(recording.forces), message)
+
+
 def _check_shapes(recording: Recording, faults: Faults) -> None:
-    where, times, channels = f"recording {recording.name!r}", len(recording.times), 3 * len(recording.markers)
+    where, times, channels = f"recording {recording.name!r}", len(recording.times), len(recording.channels)
     wanted = {"times": (times,), "values": (times, channels), "standard_deviation": (channels,)}
     for name, shape in wanted.items():
         array = getattr(recording, name)
@@ -97,8 +149,8 @@ def _check_shapes(recording: Recording, faults: Faults) -> None:
             )
 
 
-def _check_markers(recording: Recording, dataset: Dataset, where: str, faults: Faults) -> None:
-    known = [marker.name for marker in dataset.wing.markers]
+def _check_markers(recording: Recording, wing: Wing, where: str, faults: Faults) -> None:
+    known = [marker.name for marker in wing.markers]
     for index, name in enumerate(recording.markers):
         if name not in known:
             faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")

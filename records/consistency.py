@@ -1,15 +1,20 @@
-"""What takes several values to judge: references between names, order, markers on the planform."""
+"""What takes several values to judge: references between names, order, markers on the planform, masses, motion."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from decimal import Decimal
 
 import numpy as np
 import numpy.typing as npt
 
-from records.description import DatasetFile, StationFile, WingFile
+from records.description import DatasetFile, VehicleDatasetFile
 from records.errors import nearest
-from records.limits import PLANFORM_MARGIN
+from records.fields import FourierFile
+from records.limits import MAX_OPEN_AT_START, PLANFORM_MARGIN
+from records.vehicle import WINGS
+from records.vehicle_file import MotionFile
+from records.wing_file import StationFile, WingFile
 from records.yaml_text import Path
 
 Inconsistency = tuple[Path, object, str]
@@ -17,8 +22,14 @@ Inconsistency = tuple[Path, object, str]
 
 def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
     """Everything that does not fit together: path, value, message."""
-    wing = dataset.wing
-    yield from _stations(wing.stations)
+    yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
+    recordings = [recording.name for recording in dataset.recordings]
+    yield from _unique(("recordings",), recordings, "name", ignore_case=True)
+    yield from _references(("held_out",), dataset.held_out, recordings, "recording")
+
+
+def _wing(wing: WingFile) -> Iterator[Inconsistency]:
+    yield from _increasing(("wing", "stations"), "y", [station.y_m for station in wing.stations])
     yield from _unique(("wing", "rods"), [rod.name for rod in wing.rods], "name")
     yield from _unique(("wing", "markers"), [marker.name for marker in wing.markers], "name")
     yield from _rods(wing)
@@ -26,17 +37,52 @@ def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
     markers = [marker.name for marker in wing.markers]
     yield from _references(("wing", "reference_markers"), wing.reference_markers, markers, "marker")
     yield from _markers(wing)
-    recordings = [recording.name for recording in dataset.recordings]
-    yield from _unique(("recordings",), recordings, "name", ignore_case=True)
-    yield from _references(("held_out",), dataset.held_out, recordings, "recording")
 
 
-def _stations(stations: Sequence[StationFile]) -> Iterator[Inconsistency]:
-    for index in range(1, len(stations)):
-        before, here = stations[index - 1].y_m, stations[index].y_m
+def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
+    vehicle = dataset.vehicle
+    places = [station.r_m for station in vehicle.stations]
+    if places[0] != 0:
+        message = f"is {places[0]} m; the first station lies on the flapping axis: r_m must be 0 there"
+        yield ("vehicle", "stations", 0, "r_m"), places[0], message
+    yield from _increasing(("vehicle", "stations"), "r", places)
+    wings = WINGS[vehicle.layout] * vehicle.wing_mass_kg
+    masses: list[tuple[Path, Decimal | None]] = [(("vehicle",), vehicle.mass_kg)]
+    masses += [(("recordings", index), recording.mass_kg) for index, recording in enumerate(dataset.recordings)]
+    for path, mass in masses:
+        if mass is not None and wings >= mass:
+            message = f"is {mass} kg; it must be more than the mass of all wings, {wings} kg: check the units (kg)"
+            yield (*path, "mass_kg"), mass, message
+    motions: list[tuple[Path, MotionFile | None]] = [(("vehicle",), vehicle.motion)]
+    motions += [(("recordings", index), recording.motion) for index, recording in enumerate(dataset.recordings)]
+    for path, motion in motions:
+        if vehicle.claps and motion is not None:
+            yield from _starts_closed(motion, (*path, "motion", "flap"))
+
+
+def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
+    """Wings that clap must be about closed at the start of the beat; a split cycle is so by its law."""
+    flap = motion.flap
+    if not isinstance(flap, FourierFile):
+        return
+    phase = 2 * np.pi * np.outer(np.arange(360) / 360, np.arange(1, len(flap.cosine_deg) + 1))
+    angle = np.cos(phase) @ np.array(flap.cosine_deg, float) + np.sin(phase) @ np.array(flap.sine_deg, float)
+    late = (angle[0] - angle.min()) / max(float(np.ptp(angle)), 1e-12)
+    if late > MAX_OPEN_AT_START:
+        message = (
+            f"the wings are closest at {angle.argmin() / 360:.2f} of the beat and {100 * late:.0f} % open at its "
+            f"start; at most {100 * MAX_OPEN_AT_START:g} % are accepted: shift the series to a beat that starts "
+            "with the wings closed, and the recordings' times with it"
+        )
+        yield path, None, message
+
+
+def _increasing(path: Path, key: str, places: Sequence[Decimal]) -> Iterator[Inconsistency]:
+    for index in range(1, len(places)):
+        before, here = places[index - 1], places[index]
         if here <= before:
-            message = f"is {here} m after {before} m; y must increase from root to tip: sort the stations"
-            yield ("wing", "stations", index, "y_m"), here, message
+            message = f"is {here} m after {before} m; {key} must increase from root to tip: sort the stations"
+            yield (*path, index, f"{key}_m"), here, message
 
 
 def _unique(
@@ -69,7 +115,7 @@ def _rods(wing: WingFile) -> Iterator[Inconsistency]:
 
 
 def _markers(wing: WingFile) -> Iterator[Inconsistency]:
-    if list(_stations(wing.stations)):
+    if list(_increasing((), "y", [station.y_m for station in wing.stations])):
         return
     outline = planform_outline(wing.stations)
     for index, marker in enumerate(wing.markers):

@@ -89,7 +89,7 @@ class Recording:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the columns of ``values``: ``<marker>_x``, ``_y``, ``_z`` of each marker, or ``force_x``, ``force_z``."""
+        """Names of the columns of ``values``: ``<marker>_x``, ``_y``, ``_z`` of each, or ``force_x``, ``force_z``."""
         tracks = tuple(f"{marker}_{axis}" for marker in self.markers for axis in "xyz")
         return tracks + tuple(f"force_{axis}" for axis in self.forces)
 

@@ -7,14 +7,17 @@ from pathlib import Path
 from typing import Protocol
 
 from records.assemble import assemble, checked_description
-from records.dataset import Dataset
+from records.dataset import Dataset, Recording
+from records.description import VehicleDatasetFile, model_of
 from records.errors import DatasetError, Faults, fail
+from records.forces import read_forces
 from records.limits import MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB
-from records.tracks import Tracks, read_tracks, write_tracks
+from records.table import Samples, write_table
+from records.tracks import read_tracks
 from records.yaml_text import read_yaml, write_yaml
 
 DESCRIPTION = "dataset.yaml"
-TRACKS = "recordings"
+RECORDINGS = "recordings"
 
 
 class Files(Protocol):
@@ -44,7 +47,7 @@ class FolderFiles:
     def names(self) -> list[str]:
         """Files that may belong to a dataset: the description and what lies in ``recordings``."""
         top = [path.name for path in self.path.iterdir() if path.is_file()]
-        inner = [f"{TRACKS}/{p.name}" for p in (self.path / TRACKS).glob("*") if p.is_file()]
+        inner = [f"{RECORDINGS}/{p.name}" for p in (self.path / RECORDINGS).glob("*") if p.is_file()]
         names = top + inner
         if len(names) > MAX_ENTRIES:
             message = f"holds {len(names)} files; at most {MAX_ENTRIES} are read: is this the right folder?"
@@ -73,23 +76,25 @@ def read_files(files: Files) -> Dataset:
     markers = document.names("wing", "markers")
     listed = document.names("recordings")
 
-    def read(name: str, room: int) -> Tracks:
-        file = track_file(name)
+    def read(name: str, room: int) -> Samples:
+        file = sample_file(name)
         if file not in names:
-            raise fail(document.where(_place(listed, name)), name, _no_tracks(file, names))
+            raise fail(document.where(_place(listed, name)), name, _no_samples(file, names))
+        if model_of(document.data) is VehicleDatasetFile:
+            return read_forces(files.read(file), file, room)
         return read_tracks(files.read(file), file, markers, room)
 
-    def at(name: str, tracks: Tracks, row: int) -> str:
-        return f"{track_file(name)}, line {tracks.lines[row]}"
+    def at(name: str, samples: Samples, row: int) -> str:
+        return f"{sample_file(name)}, line {samples.lines[row]}"
 
     faults = Faults()
     dataset = None
     try:
-        dataset = assemble(document, read, track_file, at)
+        dataset = assemble(document, read, sample_file, at)
     except DatasetError as error:
         faults.extend(error)
     for name in sorted(names):
-        if name.startswith(f"{TRACKS}/") and name.lower().endswith(".csv") and _stem(name) not in listed:
+        if name.startswith(f"{RECORDINGS}/") and name.lower().endswith(".csv") and _stem(name) not in listed:
             message = f"is not listed in {DESCRIPTION}; add '- name: {_stem(name)}' to recordings, or remove it"
             faults.add(name, name, message)
     faults.raise_any()
@@ -101,8 +106,13 @@ def contents(dataset: Dataset) -> dict[str, bytes]:
     """Write the files of ``dataset`` into memory, sorted; DatasetError when it breaks a limit."""
     files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
     for recording in sorted(dataset.recordings, key=lambda r: r.name):
-        files[track_file(recording.name)] = write_tracks(recording).encode()
+        files[sample_file(recording.name)] = _table(recording).encode()
     return files
+
+
+def _table(recording: Recording) -> str:
+    unit = "n" if recording.kind == "forces" else "m"
+    return write_table([f"{channel}_{unit}" for channel in recording.channels], recording.times, recording.values)
 
 
 def write_folder(dataset: Dataset, path: Path) -> None:
@@ -115,9 +125,9 @@ def write_folder(dataset: Dataset, path: Path) -> None:
         target.write_bytes(data)
 
 
-def track_file(name: str) -> str:
-    """Name of the file with the tracks of a recording."""
-    return f"{TRACKS}/{name}.csv"
+def sample_file(name: str) -> str:
+    """Name of the file with the samples of a recording."""
+    return f"{RECORDINGS}/{name}.csv"
 
 
 def _stem(name: str) -> str:
@@ -134,7 +144,7 @@ def _no_description(names: list[str]) -> str:
     return f"{DESCRIPTION} is missing; {found} (docs/formats.md shows one)"
 
 
-def _no_tracks(file: str, names: list[str]) -> str:
+def _no_samples(file: str, names: list[str]) -> str:
     close = [n for n in names if n.rpartition("/")[2].lower() == file.rpartition("/")[2].lower()]
     close = close or difflib.get_close_matches(file, [n for n in names if n.endswith(".csv")], 1, 0.8)
     hint = f"found {close[0]!r}: rename or move it" if close else "add the file, or remove the recording from the list"

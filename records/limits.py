@@ -24,7 +24,7 @@ MAX_DESCRIPTION_BYTES = 16 * MIB
 """Size of dataset.yaml."""
 
 MAX_DEPTH = 12
-"""Nesting of dataset.yaml; the format itself needs 5."""
+"""Nesting of dataset.yaml; the format itself needs 6."""
 
 MAX_RECORDINGS = 1000
 MAX_MARKERS = 1000
@@ -50,3 +50,15 @@ PLANFORM_MARGIN = 0.01
 
 IMPLAUSIBLE_SPANS = 1.5
 """Markers further than this many spans from the hinge (median) were not recorded in metres."""
+
+MAX_OPEN_AT_START = 0.1
+"""How far wings that clap may be open where the beat starts, as a part of the range of their flap angle."""
+
+IMPLAUSIBLE_WEIGHTS = 50
+"""Forces above this many weights of the vehicle (root mean square) were not recorded in newtons."""
+
+NEGLIGIBLE_WEIGHTS = 1e-6
+"""Nor those below this."""
+
+UNEVEN_STEPS = 0.01
+"""How far the time steps of forces may differ from their median, relative: a filter needs an even clock."""

@@ -1,9 +1,9 @@
 """A dataset as one NetCDF-4 file: the text of ``dataset.yaml`` as an attribute, one group per recording.
 
-Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)``,
-``position_m(time, marker, axis)``, NaN where missing, and ``marker(marker)``. Written with h5netcdf; read
-with h5py, because an uploaded HDF5 file can point to other files of the server and every such pointer must be
-refused.
+Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)`` and, NaN
+where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
+``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can point to other files of the
+server and every such pointer must be refused.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ import h5py
 import numpy as np
 
 from records.assemble import assemble, checked_description
-from records.dataset import Dataset
+from records.dataset import Dataset, Recording
+from records.description import VehicleDatasetFile, model_of
 from records.errors import DatasetError, fail, nearest, shown
-from records.folder import TRACKS
+from records.folder import RECORDINGS
+from records.forces import AXES
 from records.limits import MAX_MARKERS, MAX_ROWS
-from records.tracks import Tracks, too_much
+from records.table import Samples, too_much
 from records.yaml_text import read_yaml, write_yaml
 
 FORMAT = "wingfit dataset"
@@ -37,49 +39,56 @@ def write_netcdf(dataset: Dataset) -> bytes:
         file.attrs["format"] = FORMAT
         file.attrs["dataset_yaml"] = text
         for recording in dataset.recordings:
-            group = file.create_group(f"{TRACKS}/{recording.name}")
-            group.dimensions = {"time": len(recording.times), "marker": len(recording.markers), "axis": 3}
-            names = np.array(recording.markers, dtype=object)
-            group.create_variable("marker", ("marker",), dtype=h5py.string_dtype(), data=names)
-            group.create_variable("time_s", ("time",), data=recording.times).attrs["units"] = "s"
-            positions = group.create_variable(
-                "position_m",
-                ("time", "marker", "axis"),
-                data=recording.positions,
-                fillvalue=np.nan,
-                compression="gzip",
-                shuffle=True,
-            )
-            positions.attrs["units"] = "m"
+            group = file.create_group(f"{RECORDINGS}/{recording.name}")
+            _write_recording(group, recording)
     return buffer.getvalue()
+
+
+def _write_recording(group: Any, recording: Recording) -> None:
+    frames, markers = len(recording.times), recording.markers
+    axes: tuple[str, ...]
+    if recording.kind == "forces":
+        group.dimensions = {"time": frames, "axis": len(recording.forces)}
+        of, names = "axis", np.array(recording.forces, dtype=object)
+        name, unit, axes, data = "force_n", "N", ("time", "axis"), recording.values
+    else:
+        group.dimensions = {"time": frames, "marker": len(markers), "axis": 3}
+        of, names = "marker", np.array(markers, dtype=object)
+        name, unit, axes, data = "position_m", "m", ("time", "marker", "axis"), recording.positions
+    group.create_variable(of, (of,), dtype=h5py.string_dtype(), data=names)
+    group.create_variable("time_s", ("time",), data=recording.times).attrs["units"] = "s"
+    values = group.create_variable(name, axes, data=data, fillvalue=np.nan, compression="gzip", shuffle=True)
+    values.attrs["units"] = unit
 
 
 def read_netcdf(data: bytes, label: str) -> Dataset:
     """Read a dataset from the bytes of a NetCDF-4 file."""
     with _damage(label), h5py.File(io.BytesIO(data), "r") as file:
         document = read_yaml(_attribute(file, "dataset_yaml", label), f"{label}: dataset_yaml")
-        listed = _group(file, TRACKS, label)
+        listed = _group(file, RECORDINGS, label)
         markers = document.names("wing", "markers")
         unlisted = sorted(set(listed) - set(document.names("recordings")))
         if unlisted:
             message = "this group is not listed in dataset_yaml; add it under recordings, or remove the group"
-            raise fail(f"{label}: {TRACKS}/{unlisted[0]}", unlisted[0], message)
+            raise fail(f"{label}: {RECORDINGS}/{unlisted[0]}", unlisted[0], message)
 
-        def read(name: str, room: int) -> Tracks:
-            where = f"{label}: {TRACKS}/{name}"
+        def read(name: str, room: int) -> Samples:
+            where = f"{label}: {RECORDINGS}/{name}"
             with _damage(where):
-                return _tracks(_group(listed, name, where), where, markers, room)
+                group = _group(listed, name, where)
+                forces = model_of(document.data) is VehicleDatasetFile
+                return _forces(group, where, room) if forces else _tracks(group, where, markers, room)
 
         return assemble(
             document,
             read,
-            lambda name: f"{label}: {TRACKS}/{name}",
+            lambda name: f"{label}: {RECORDINGS}/{name}",
             lambda name, _, row: _at(label, name, row),
         )
 
 
 def _at(label: str, name: str, row: int) -> str:
-    return f"{label}: {TRACKS}/{name}, time index {row}"
+    return f"{label}: {RECORDINGS}/{name}, time index {row}"
 
 
 @contextmanager
@@ -130,7 +139,7 @@ def _variable(group: Any, name: str, where: str) -> Any:
     return variable
 
 
-def _tracks(group: Any, where: str, known: list[str], room: int) -> Tracks:
+def _tracks(group: Any, where: str, known: list[str], room: int) -> Samples:
     times, positions = _variable(group, "time_s", where), _variable(group, "position_m", where)
     names = _variable(group, "marker", where)
     frames, count = times.shape[0] if len(times.shape) == 1 else -1, names.size
@@ -140,22 +149,49 @@ def _tracks(group: Any, where: str, known: list[str], room: int) -> Tracks:
             f"{list(positions.shape)} do not fit; they must be [T], [M] and [T, M, 3]"
         )
         raise fail(where, list(positions.shape), message)
-    # Declared shapes cost nothing to write: check them before memory is spent.
-    if frames > MAX_ROWS or count > MAX_MARKERS:
-        message = f"{frames} times and {count} markers; at most {MAX_ROWS} and {MAX_MARKERS} are read: cut it"
-        raise fail(where, frames, message)
-    if frames * (3 * count + 1) > room:
+    if count > MAX_MARKERS:
+        raise fail(where, count, f"{count} markers; at most {MAX_MARKERS} are read: remove some")
+    _check_size(times, positions, where, room)
+    markers = _names(names, "marker", where)
+    _check_names(markers, known, where)
+    values = np.ascontiguousarray(positions[:], dtype=np.float64).reshape(frames, 3 * count)
+    return Samples(np.asarray(times[:], dtype=np.float64), values, np.arange(frames), markers=markers)
+
+
+def _forces(group: Any, where: str, room: int) -> Samples:
+    times, forces, names = (_variable(group, name, where) for name in ("time_s", "force_n", "axis"))
+    frames = times.shape[0] if len(times.shape) == 1 else -1
+    if names.shape not in {(1,), (2,)} or forces.shape != (frames, *names.shape):
+        message = (
+            f"shapes time_s {list(times.shape)}, axis {list(names.shape)}, force_n {list(forces.shape)} do not fit; "
+            "they must be [T], [C] and [T, C], with 1 or 2 axes"
+        )
+        raise fail(where, list(forces.shape), message)
+    _check_size(times, forces, where, room)
+    found = _names(names, "axis", where)
+    axes = tuple(axis for axis in AXES if axis in found)
+    if len(axes) != len(found):
+        raise fail(where, ", ".join(found), f"axis is {', '.join(found)}; it must hold x, z, or both")
+    values = np.ascontiguousarray(forces[:][:, [found.index(axis) for axis in axes]], dtype=np.float64)
+    return Samples(np.asarray(times[:], dtype=np.float64), values, np.arange(frames), forces=axes)
+
+
+def _check_size(times: Any, values: Any, where: str, room: int) -> None:
+    """Declared shapes cost nothing to write: check them before memory is spent."""
+    if times.size > MAX_ROWS:
+        raise fail(where, times.size, f"{times.size} times; at most {MAX_ROWS} are read: cut it")
+    if times.size + values.size > room:
         raise too_much(where)
-    for variable in (times, positions):
+    for variable in (times, values):
         if variable.dtype.kind != "f" or variable.dtype.itemsize > 8:
             message = f"{variable.name} is of type {variable.dtype}; write 32- or 64-bit floating-point numbers"
             raise fail(where, str(variable.dtype), message)
-    if h5py.check_string_dtype(names.dtype) is None:
-        raise fail(where, str(names.dtype), f"marker is of type {names.dtype}; it must hold text")
-    markers = tuple(str(name) for name in names.asstr()[:])
-    _check_names(markers, known, where)
-    values = np.ascontiguousarray(positions[:], dtype=np.float64).reshape(frames, 3 * count)
-    return Tracks(np.asarray(times[:], dtype=np.float64), markers, values, np.arange(frames))
+
+
+def _names(variable: Any, name: str, where: str) -> tuple[str, ...]:
+    if h5py.check_string_dtype(variable.dtype) is None:
+        raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
+    return tuple(str(text) for text in variable.asstr()[:])
 
 
 def _check_names(markers: tuple[str, ...], known: list[str], where: str) -> None:

@@ -7,8 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from records.dataset import STANDARD_GRAVITY, Recording
 from records.errors import Faults
-from records.limits import IMPLAUSIBLE_SPANS, MAX_MARKERS, MAX_ROWS, MIN_FRAMES
+from records.limits import (
+    IMPLAUSIBLE_SPANS,
+    IMPLAUSIBLE_WEIGHTS,
+    MAX_MARKERS,
+    MAX_ROWS,
+    MIN_FRAMES,
+    NEGLIGIBLE_WEIGHTS,
+    UNEVEN_STEPS,
+)
+from records.vehicle import Vehicle
 from records.wing import Wing
 
 Array = npt.NDArray[np.float64]
@@ -16,43 +26,52 @@ Locate = Callable[[int], str]
 _SHOWN = 3
 
 
-def check_numbers(times: Array, values: Array, wing: Wing, where: str, at: Locate, faults: Faults) -> None:
-    """Note what is wrong with ``times`` [T] and ``values`` [T, C]; ``at(row)`` says where a row stands."""
-    frames, markers = len(times), values.shape[1] // 3
+def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
+    """Note what is wrong with the times and values of ``recording``; ``at(row)`` says where a row stands."""
+    times, values, frames = recording.times, recording.values, len(recording.times)
+    quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not MIN_FRAMES <= frames <= MAX_ROWS:
         faults.add(
             where,
             frames,
             f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or cut in parts",
         )
-    if not 1 <= markers <= MAX_MARKERS:
-        faults.add(where, markers, f"{markers} markers; it must be 1 to {MAX_MARKERS}")
-    _check_times(times, at, faults)
+    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= MAX_MARKERS:
+        faults.add(where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {MAX_MARKERS}")
+    increasing = _check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:_SHOWN]:
-        faults.add(at(int(row)), "inf", "a position is infinite; it must be finite, or missing")
+        faults.add(at(int(row)), "inf", f"a {quantity} is infinite; it must be finite, or missing")
     if infinite.size or not values.size:
         return
     if np.isnan(values).all():
-        faults.add(where, None, "there is no position at all; leave the recording out")
+        faults.add(where, None, f"there is no {quantity} at all; leave the recording out")
         return
-    _check_unit(values, wing, where, faults)
+    if isinstance(rig, Wing):
+        _check_positions(values, rig, where, faults)
+        return
+    _check_forces(recording, rig, where, faults)
+    if increasing and frames >= MIN_FRAMES:
+        _check_clock(recording, where, at, faults)
 
 
-def _check_times(times: Array, at: Locate, faults: Faults) -> None:
+def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
+    """Whether times are finite and increase; notes where not."""
     bad = np.flatnonzero(~np.isfinite(times))
     for row in bad[:_SHOWN]:
         faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
     if bad.size:
-        return
-    for row in np.flatnonzero(np.diff(times) <= 0)[:_SHOWN] + 1:
+        return False
+    back = np.flatnonzero(np.diff(times) <= 0) + 1
+    for row in back[:_SHOWN]:
         before, here = float(times[row - 1]), float(times[row])
         how = "the same as" if here == before else "before"
         message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
         faults.add(at(int(row)), here, message)
+    return not back.size
 
 
-def _check_unit(values: Array, wing: Wing, where: str, faults: Faults) -> None:
+def _check_positions(values: Array, wing: Wing, where: str, faults: Faults) -> None:
     """Markers stay within about a span of the hinge; typical ones further out are in another unit or frame."""
     from_hinge = values.reshape(len(values), -1, 3) - np.array([0.0, wing.hinge.y, wing.hinge.z])
     along_axes = [np.abs(axis[np.isfinite(axis)]) for axis in np.moveaxis(from_hinge, 2, 0)]
@@ -69,3 +88,53 @@ def _check_unit(values: Array, wing: Wing, where: str, faults: Faults) -> None:
             "convert to metres, in the wing frame"
         )
         faults.add(where, f"{distance:.4g}", message)
+
+
+def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
+    """Forces in flight are about a weight; typical ones far from it are in another unit."""
+    along_axes = [axis[np.isfinite(axis)] for axis in recording.values.T]
+    for name, axis in zip(recording.forces, along_axes, strict=True):
+        if not axis.size:
+            faults.add(where, None, f"force_{name}_n has no value at all; remove the column")
+    mass = vehicle.mass if recording.mass is None else recording.mass
+    weight = mass * STANDARD_GRAVITY
+    with np.errstate(over="ignore"):
+        force = max(float(np.sqrt(np.mean(axis**2))) for axis in along_axes if axis.size)
+    low, high = NEGLIGIBLE_WEIGHTS * weight, IMPLAUSIBLE_WEIGHTS * weight
+    if low <= force <= high:
+        return
+    unit = "kilonewtons" if force < low else "millinewtons" if force > 4 * high else "gram-force or millinewtons"
+    message = (
+        f"forces are typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; they must "
+        f"lie in [{low:.4g}, {high:.4g}] N; that looks like {unit} in columns named _n: convert to newtons, or "
+        "check mass_kg"
+    )
+    faults.add(where, f"{force:.4g}", message)
+
+
+def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -> None:
+    """Forces cover a beat at an even clock, fast enough for the filter that they have been through."""
+    times, frequency, low_pass = recording.times, recording.condition.flap_frequency, recording.low_pass
+    steps = np.diff(times)
+    step = float(np.median(steps))
+    uneven = np.flatnonzero(np.abs(steps - step) > UNEVEN_STEPS * step) + 1
+    for row in uneven[:_SHOWN]:
+        message = (
+            f"time_s is {steps[row - 1]:.6g} s after the one above, typically {step:.6g} s; steps must be equal within "
+            f"{100 * UNEVEN_STEPS:g} %: write times with more digits, give lost samples a row with empty cells, or "
+            "resample to an even clock"
+        )
+        faults.add(at(int(row)), float(times[row]), message)
+    beats = frequency * float(times[-1] - times[0] + 1.5 * step)
+    if beats < 1.0:
+        message = (
+            f"the times cover {frequency * (times[-1] - times[0] + step):.2f} beats of {1 / frequency:.4g} s; at least "
+            "one whole beat is needed (two or more are better): record longer, or check flap_frequency_hz and time_s"
+        )
+        faults.add(where, None, message)
+    if low_pass is not None and low_pass.cutoff >= 0.5 / step:
+        message = (
+            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "
+            "Hz: check both, or leave low_pass out"
+        )
+        faults.add(where, low_pass.cutoff, message)

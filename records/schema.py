@@ -6,6 +6,8 @@ import json
 import sys
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from records.description import DatasetFile
 from records.limits import FORMAT_VERSION
 
@@ -15,7 +17,7 @@ def dataset_schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:wingfit:schema:dataset:{FORMAT_VERSION}",
-        **_untitled(DatasetFile.model_json_schema()),
+        **_untitled(TypeAdapter[object](DatasetFile).json_schema()),
         "title": f"wingfit dataset.yaml, format {FORMAT_VERSION}",
     }
 

@@ -25,8 +25,10 @@ class ChordStation:
 class SplitCycleFlap:
     """Flap angle that opens and closes at two speeds in one constant period (Armanini et al. 2016, Eqs. 20-21).
 
-    zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens, the mirrored law with a higher rate while
-    it XX ``smoothing`` is the standard deviation, in beats, of the Gaussian that rounds the law off.
+    With omega = 2 pi, zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens and
+    bias - amplitude cos((omega + sigma) t* + xi) while it closes, sigma = split omega / (omega - 2 split) and
+    xi = -2 pi split / (omega - 2 split): a positive split (rad per beat, below pi) opens slowly and closes fast.
+    ``smoothing`` is the standard deviation, in beats, of the Gaussian that rounds the law off.
     """
 
     amplitude: float
@@ -84,8 +86,8 @@ class WingMotion:
 
     flap: Flap
     pitch: Pitch
+    root_pitch: float
     pitch_station: float = 0.7
-    root_pitch: float = 0.0
     peel_end: float = 0.17
 
 

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 HARMONICS = 100  # of the split cycle, before its smoothing
-LARGEST_SPLIT = 2.0  # rad per beat; at pi the closing stroke would take no time
+SPLITS = (-12.0, 2.5)  # rad per beat: the wings open for 17 to 83 % of it
 _NO_SPLIT = 1e-7  # rad per beat
 
 # field of the motion, gene, unit, half width of the box, description
@@ -109,10 +109,11 @@ def split_cycle_series(delta: Array, harmonics: int) -> Complex:
     It opens as -cos((omega - delta) t*) until (omega - delta) t* = pi, and closes as -cos((omega + sigma) t* + xi),
     with omega = 2 pi, sigma = delta omega / (omega - 2 delta), xi = -2 pi delta / (omega - 2 delta); ``delta`` [B, 1].
     """
-    if not np.all(np.abs(delta) <= LARGEST_SPLIT):
+    out = delta[~((SPLITS[0] <= delta) & (delta <= SPLITS[1]))]
+    if len(out):
         raise ValueError(
-            f"the split-cycle parameter delta is {np.abs(delta).max():g} rad; it must lie in "
-            f"[{-LARGEST_SPLIT:g}, {LARGEST_SPLIT:g}] rad: at pi the wings would close in no time"
+            f"the split-cycle parameter delta is {out[0]:g} rad; it must lie in [{SPLITS[0]:g}, {SPLITS[1]:g}] rad: "
+            "outside, one of the strokes takes less than a sixth of the beat"
         )
     omega = 2 * np.pi
     delta = np.where(np.abs(delta) < _NO_SPLIT, _NO_SPLIT, delta)  # the closed form is 0 / 0 at zero

@@ -14,13 +14,14 @@ from typing import Any
 
 import pytest
 
-from records import FourBarDrive, load_archive
+from records import FourBarDrive, LowPass, load_archive
 from records import limits as limits_module
 from records.limits import FORMAT_VERSION
 from records.schema import dataset_schema, schema_text
 from records.tracks import read_tracks
 from records.yaml_text import read_yaml
 from tests.records.malformed import YAML, error_of_zip, good_files, with_yaml, zipped
+from tests.records.vehicles import good_vehicle, vehicle_yaml
 
 jsonschema: Any = import_module("jsonschema")
 DOCS = Path(__file__).parents[2] / "docs"
@@ -44,6 +45,12 @@ def example() -> dict[str, bytes]:
     return {YAML: block("yaml").encode(), **{f"recordings/{n}-3hz.csv": tracks for n in ("vacuum", "tunnel")}}
 
 
+def vehicle_example() -> dict[str, bytes]:
+    forces = block("csv", 1).encode()
+    files = {f"recordings/{name}.csv": forces for name in ("hover", "forward")}
+    return {YAML: block("yaml", 2).encode(), **files}
+
+
 def test_the_published_schema_is_the_code_s() -> None:
     published = (DOCS / "schemas" / "dataset.schema.json").read_text(encoding="utf-8")
     assert published == schema_text(), "run: python -m records.schema > docs/schemas/dataset.schema.json"
@@ -52,10 +59,15 @@ def test_the_published_schema_is_the_code_s() -> None:
 def test_the_schema_is_valid_and_versioned() -> None:
     schema = dataset_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["properties"]["format_version"]["const"] == FORMAT_VERSION
+    for model in ("WingDatasetFile", "VehicleDatasetFile"):
+        assert schema["$defs"][model]["properties"]["format_version"]["const"] == FORMAT_VERSION
 
 
-@pytest.mark.parametrize("raw", [good_files()[YAML], example()[YAML]], ids=["sample", "page"])
+@pytest.mark.parametrize(
+    "raw",
+    [good_files()[YAML], example()[YAML], good_vehicle()[YAML], vehicle_example()[YAML]],
+    ids=["wing", "page's wing", "vehicle", "page's vehicle"],
+)
 def test_the_schema_accepts_what_is_read(raw: bytes) -> None:
     jsonschema.Draft202012Validator(dataset_schema()).validate(plain(read_yaml(raw, YAML).data))
 
@@ -76,6 +88,39 @@ def test_the_schema_refuses_what_is_refused(old: str, new: str) -> None:
     files = with_yaml(old, new)
     error_of_zip(zipped(files))
     assert not jsonschema.Draft202012Validator(dataset_schema()).is_valid(plain(read_yaml(files[YAML], YAML).data))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("vehicle:\n", "wing: {name: a}\nvehicle:\n"),
+        ("body_pitch_deg: 83.0", "body_pitch_deg: 130"),
+        ("body_pitch_deg: 83.0", "body_pitch_deg: 83, phase_lag_deg: 0"),
+        ("claps: true", "claps: yes"),
+        ("order: 2", "order: 9"),
+        ("    root_pitch_deg: 90.0\n", ""),
+    ],
+)
+def test_the_schema_refuses_the_same_of_a_vehicle(old: str, new: str) -> None:
+    files = vehicle_yaml(old, new)
+    error_of_zip(zipped(files))
+    assert not jsonschema.Draft202012Validator(dataset_schema()).is_valid(plain(read_yaml(files[YAML], YAML).data))
+
+
+def test_the_vehicle_of_the_page_loads() -> None:
+    dataset = load_archive(zipped(vehicle_example()), "page.zip")
+    assert [r.name for r in dataset.fitted] == ["hover"]
+    assert math.isclose(dataset.recordings[0].condition.angle_of_attack, math.radians(83.0))
+    assert dataset.vehicle.motion.root_pitch == math.pi / 2
+    hover, forward = dataset.recordings
+    assert hover.forces == ("x", "z")
+    assert hover.values[0].tolist() == [0.168, 0.048]
+    assert forward.low_pass == LowPass(40.0, 4)
+    assert forward.mass == 0.0184
+    assert forward.motion is not None
+    assert forward.motion.peel_end == 0.17
+    assert forward.standard_deviation is not None
+    assert forward.standard_deviation.tolist() == [0.005, 0.004]
 
 
 def test_the_example_of_the_page_loads() -> None:

@@ -1,4 +1,4 @@
-"""Between the models of ``dataset.yaml`` and the dataclasses. Exact both ways: see ``records.units``."""
+"""Between the models of a wing in ``dataset.yaml`` and the dataclasses. Exact both ways: see ``records.units``."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from decimal import Decimal
 import numpy as np
 import numpy.typing as npt
 
-from records.dataset import Condition, Dataset, Recording
-from records.description import FourBarFile, RecordingFile, WingFile
+from records.dataset import Condition, Recording
 from records.drive import Drive, FourBarDrive, FourierDrive
 from records.errors import Faults, nearest
-from records.limits import FORMAT_VERSION
-from records.units import CELSIUS, DEG, MBAR, from_si, to_si
+from records.fields import fourier_data
+from records.table import Samples
+from records.units import CELSIUS, DEG, MBAR, decimals, from_si, to_si
 from records.wing import Hinge, Marker, Materials, Rod, Station, Wing
+from records.wing_file import FourBarFile, WingFile, WingRecordingFile
 from records.yaml_text import Document, Path
 
 Deviations = npt.NDArray[np.float64]
@@ -60,28 +61,28 @@ def _to_drive(wing: WingFile) -> Drive:
         links = (drive.ground_m, drive.crank_m, drive.coupler_m, drive.rocker_m)
         ground, crank, coupler, rocker = (float(length) for length in links)
         return FourBarDrive(ground, crank, coupler, rocker, to_si(drive.offset_deg, DEG))
-    return FourierDrive(
-        to_si(drive.mean_deg, DEG),
-        tuple(to_si(value, DEG) for value in drive.cosine_deg),
-        tuple(to_si(value, DEG) for value in drive.sine_deg),
+    return FourierDrive(*drive.radians())
+
+
+def to_recording(
+    entry: WingRecordingFile, samples: Samples, document: Document, path: Path, faults: Faults
+) -> Recording:
+    """Convert an entry of the list at ``path``, with its tracks; notes what is wrong with its noise."""
+    condition = Condition(
+        flap_frequency=float(entry.flap_frequency_hz),
+        phase_lag=to_si(entry.phase_lag_deg, DEG),
+        pressure=to_si(entry.pressure_mbar, MBAR),
+        temperature=to_si(entry.temperature_c, CELSIUS),
+        airspeed=float(entry.airspeed_m_s),
+        angle_of_attack=to_si(entry.angle_of_attack_deg, DEG),
+        gravity=float(entry.gravity_m_s2),
     )
+    noise = _to_deviations(entry, samples.markers, document, (*path, "standard_deviation_m"), faults)
+    return Recording(entry.name, entry.rig, condition, samples.times, samples.markers, samples.values, noise)
 
 
-def to_condition(recording: RecordingFile) -> Condition:
-    """Convert the setting of the rig to SI units."""
-    return Condition(
-        flap_frequency=float(recording.flap_frequency_hz),
-        phase_lag=to_si(recording.phase_lag_deg, DEG),
-        pressure=to_si(recording.pressure_mbar, MBAR),
-        temperature=to_si(recording.temperature_c, CELSIUS),
-        airspeed=float(recording.airspeed_m_s),
-        angle_of_attack=to_si(recording.angle_of_attack_deg, DEG),
-        gravity=float(recording.gravity_m_s2),
-    )
-
-
-def to_deviations(
-    recording: RecordingFile, markers: Sequence[str], document: Document, path: Path, faults: Faults
+def _to_deviations(
+    recording: WingRecordingFile, markers: Sequence[str], document: Document, path: Path, faults: Faults
 ) -> Deviations | None:
     """Known noise per channel [C], or None; notes markers that are missing or unknown."""
     noise = recording.standard_deviation_m
@@ -101,43 +102,33 @@ def to_deviations(
     return np.array([[float(value) for value in axis] for axis in axes]).ravel()
 
 
-def describe(dataset: Dataset) -> dict[str, object]:
-    """``dataset`` without its tracks, as the plain data of ``dataset.yaml``."""
-    return {
-        "format_version": FORMAT_VERSION,
-        "name": dataset.name,
-        **({"description": dataset.description} if dataset.description else {}),
-        "wing": _wing(dataset.wing),
-        "recordings": [_recording(recording) for recording in dataset.recordings],
-        **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
-    }
-
-
-def _wing(wing: Wing) -> dict[str, object]:
+def describe_wing(wing: Wing) -> dict[str, object]:
+    """``wing`` as the plain data of ``dataset.yaml``."""
     return {
         "name": wing.name,
         "stations": [
-            _si(y_m=s.y, leading_edge_m=s.leading_edge, chord_m=s.chord, thickness_m=s.thickness) for s in wing.stations
+            decimals(y_m=s.y, leading_edge_m=s.leading_edge, chord_m=s.chord, thickness_m=s.thickness)
+            for s in wing.stations
         ],
-        "materials": _si(
+        "materials": decimals(
             foam_density_kg_m3=wing.materials.foam_density,
             skin_areal_density_kg_m2=wing.materials.skin_areal_density,
         ),
         "rods": [{"name": rod.name, **_rod(rod)} for rod in wing.rods],
         "driven_rods": list(wing.driven_rods),
         "markers": [
-            {"name": m.name, **_si(x_m=m.position[0], y_m=m.position[1], z_m=m.position[2], mass_kg=m.mass)}
+            {"name": m.name, **decimals(x_m=m.position[0], y_m=m.position[1], z_m=m.position[2], mass_kg=m.mass)}
             for m in wing.markers
         ],
         "reference_markers": list(wing.reference_markers),
-        "hinge": _si(y_m=wing.hinge.y, z_m=wing.hinge.z),
+        "hinge": decimals(y_m=wing.hinge.y, z_m=wing.hinge.z),
         "drive": _drive(wing.drive),
-        **({"estimates": _si(**wing.estimates)} if wing.estimates else {}),
+        **({"estimates": decimals(**wing.estimates)} if wing.estimates else {}),
     }
 
 
 def _rod(rod: Rod) -> dict[str, Decimal]:
-    return _si(
+    return decimals(
         x_root_m=rod.x_root,
         y_root_m=rod.y_root,
         x_tip_m=rod.x_tip,
@@ -150,17 +141,13 @@ def _rod(rod: Rod) -> dict[str, Decimal]:
 
 def _drive(drive: Drive) -> dict[str, object]:
     if isinstance(drive, FourBarDrive):
-        lengths = _si(ground_m=drive.ground, crank_m=drive.crank, coupler_m=drive.coupler, rocker_m=drive.rocker)
+        lengths = decimals(ground_m=drive.ground, crank_m=drive.crank, coupler_m=drive.coupler, rocker_m=drive.rocker)
         return {"kind": drive.kind, **lengths, "offset_deg": from_si(drive.offset, DEG)}
-    return {
-        "kind": drive.kind,
-        "mean_deg": from_si(drive.mean, DEG),
-        "cosine_deg": [from_si(value, DEG) for value in drive.cosine],
-        "sine_deg": [from_si(value, DEG) for value in drive.sine],
-    }
+    return fourier_data(drive)
 
 
-def _recording(recording: Recording) -> dict[str, object]:
+def describe_recording(recording: Recording) -> dict[str, object]:
+    """``recording`` without its tracks, as the plain data of ``dataset.yaml``."""
     condition = recording.condition
     noise = _deviations(recording)
     return {
@@ -187,7 +174,3 @@ def _deviations(recording: Recording) -> object:
         marker: [from_si(value) for value in values[3 * index : 3 * index + 3]]
         for index, marker in enumerate(recording.markers)
     }
-
-
-def _si(**values: float) -> dict[str, Decimal]:
-    return {key: from_si(value) for key, value in values.items()}
