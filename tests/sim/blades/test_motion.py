@@ -80,6 +80,13 @@ def test_peel_lasts_until_the_wing_stops_pitching() -> None:
     assert (apart.peeled == 1).all()
 
 
+def test_wings_that_pitch_the_other_way_do_not_peel() -> None:
+    motion = replace(DELFLY.motion, pitch=FourierPitch(1.5, (), (0.4,)))
+    assert not angles(motion, {}, 12.5, 400, claps=True).peel.any()
+    turned = replace(DELFLY.motion, pitch=FourierPitch(1.5, (), (-0.4,)))
+    assert np.nonzero(angles(turned, {}, 12.5, 400, claps=True).peel[0])[0][-1] == pytest.approx(100, abs=1)
+
+
 def test_refusals() -> None:
     with pytest.raises(ValueError, match=r"delta is 2.6 rad; it must lie in \[-12, 2.5\] rad"):
         angles(replace(DELFLY.motion, flap=SplitCycleFlap(0.3, 0.3, 2.6)), {}, 12.5, 400, True)
