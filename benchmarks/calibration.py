@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.machine import commit, cpu
 from calibration.evaluator import Evaluator
 from calibration.problem import Problem, base_genome
-from calibration.result import Result, summarise
+from calibration.result import Result, judge
 from calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
 from records import Dataset, Genome, load_dataset
 from sim.flexible_wing import FlexibleWing
@@ -50,12 +50,12 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
     print(file=sys.stderr)
     if last is None:
         raise RuntimeError("the calibration had no generation")
-    return Outcome(last, summarise(spec, dataset, evaluator, last.genome), time.perf_counter() - start)
+    return Outcome(last, judge(spec, dataset, evaluator, last.genome), time.perf_counter() - start)
 
 
 def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
     """Mean distance (m) that the true genome leaves on fitted and on held-out recordings."""
-    found = summarise(spec, dataset, evaluator, truth.as_dict())
+    found = judge(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
         raise ValueError("the campaign holds no recording out")
     return found.after, found.held_out_after
@@ -100,7 +100,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 def evaluators_are_identical(dataset: Dataset) -> bool:
     """The same individuals in this process, on a pool of two and on Ray."""
     spec = CalibrationSpec(division="11")
-    model, stage = model_for(dataset, spec.division), plan(spec, dataset)[1]
+    model, stage = model_for(dataset, spec), plan(spec, dataset)[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     rng = np.random.default_rng(0)
     genes = [g for g in model.genes if g.name in stage.free]

@@ -23,9 +23,9 @@ Quantity = Literal["lift", "drag", "x", "z"]
 class LocalEstimate:
     """Maximum-likelihood estimate on one recording, or on several together (Armanini et al. 2016, Eq. 22).
 
-    ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in the
-    order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per recording.
-    ``remarks`` say in words what the data cannot separate.
+    ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in
+    the order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per
+    recording. ``remarks`` say in words what the data cannot separate.
     """
 
     name: str
@@ -35,42 +35,60 @@ class LocalEstimate:
     correlation: tuple[tuple[float, ...], ...]
     noise: tuple[tuple[tuple[float, ...], ...], ...]
     cost: float
-    iterations: int
     converged: bool
     remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class GlobalGene:
-    """One coefficient over the conditions (Eq. 23): constant + per_hz f + per_rad theta_b; slopes 0 where a mean is used."""
+    """One coefficient over the conditions (Eq. 23): constant + per_hz f + per_rad theta_b; slopes 0 for a mean.
+
+    Attributes:
+        scatter: standard deviation of the local coefficients about the law beyond their standard errors; None where
+            the conditions are too few to tell, and every one of them counts the same.
+        largest_error: largest relative difference from a local estimate.
+        left_out_error: largest relative difference from a local estimate that the fit had not seen; None with too few
+            conditions.
+    """
 
     name: str
     constant: float
     per_hz: float
     per_rad: float
+    scatter: float | None
     largest_error: float
-    """Largest relative difference from a local estimate."""
     left_out_error: float | None
-    """Largest relative difference from a local estimate that the fit had not seen; None with too few conditions."""
 
 
 @dataclass(frozen=True)
 class GlobalModel:
-    """Coefficients as functions of flap frequency and body pitch, and the range in which they were fitted."""
+    """Coefficients as functions of flap frequency and body pitch, and the conditions to which they were fitted.
+
+    ``conditions`` are the flap frequency (Hz) and body pitch (rad) of each of the ``recordings``.
+    """
 
     genes: tuple[GlobalGene, ...]
     recordings: tuple[str, ...]
-    frequency_range: tuple[float, float]
-    pitch_range: tuple[float, float]
+    conditions: tuple[tuple[float, float], ...]
     remarks: tuple[str, ...] = ()
+
+    @property
+    def frequency_range(self) -> tuple[float, float]:
+        """Smallest and largest flap frequency, Hz."""
+        return min(f for f, _ in self.conditions), max(f for f, _ in self.conditions)
+
+    @property
+    def pitch_range(self) -> tuple[float, float]:
+        """Smallest and largest body pitch, rad."""
+        return min(pitch for _, pitch in self.conditions), max(pitch for _, pitch in self.conditions)
 
 
 @dataclass(frozen=True)
 class Agreement:
     """How one model agrees with one recording in one quantity.
 
-    ``rmse_percent`` is relative to the range (largest minus smallest) of what was recorded; ``correlation`` is Pearson's;
-    means are over whole beats.
+    RMS difference and Pearson's correlation are over all samples of the whole beats; ``rmse_percent`` is relative to
+    the range (largest minus smallest) of the recorded mean beat; means are over whole beats.
     """
 
     recording: str

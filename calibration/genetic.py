@@ -33,7 +33,7 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
     weights = (-1.0,)
 
 
-class _Individual(list[float]):
+class Individual(list[float]):
     """Unit coordinates with DEAP's fitness attached."""
 
     def __init__(self, u: Sequence[float], fitness: float | None = None) -> None:
@@ -71,6 +71,11 @@ class Population:
         return cls(**state)
 
     @property
+    def mean(self) -> float:
+        """Mean fitness of those that did not fail."""
+        return float(np.mean([f for f in self.fitness if f < FAILED]))
+
+    @property
     def diversity(self) -> float:
         """Mean over the genes of the standard deviation in unit coordinates."""
         return float(np.mean(np.std(np.array(self.unit), axis=0)))
@@ -87,7 +92,7 @@ def first_generation(seed: int, stage: str, size: int, start: Sequence[float]) -
 
 def offspring(population: Population, seed: int, stage: str, size: int) -> Array:
     """Unit coordinates [size, F] of the next generation's children."""
-    parents = [_Individual(u, f) for u, f in zip(population.unit, population.fitness, strict=True)]
+    parents = [Individual(u, f) for u, f in zip(population.unit, population.fitness, strict=True)]
     generation = population.generation + 1
     with _LOCK:
         before = random.getstate()
@@ -97,7 +102,7 @@ def offspring(population: Population, seed: int, stage: str, size: int) -> Array
             random.setstate(before)
 
 
-def _child(parents: list[_Individual], key: str) -> list[float]:
+def _child(parents: list[Individual], key: str) -> list[float]:
     """One child by differential crossover, blend crossover or mutation.
 
     Stiffnesses compensate each other, so good individuals lie in narrow oblique valleys. Crossovers that mix gene by
@@ -112,17 +117,17 @@ def _child(parents: list[_Individual], key: str) -> list[float]:
         scale = random.uniform(*DIFFERENCE_SCALE)  # noqa: S311
         child = [u + scale * (v - w) for u, v, w in zip(origin, ahead, behind, strict=True)]
     elif draw < DIFFERENTIAL + BLEND:
-        child, other = (_Individual(p) for p in tools.selTournament(parents, 2, TOURNAMENT))
+        child, other = (Individual(p) for p in tools.selTournament(parents, 2, TOURNAMENT))
         tools.cxBlend(child, other, BLEND_ALPHA)
     else:
-        child = _Individual(tools.selTournament(parents, 1, TOURNAMENT)[0])
+        child = Individual(tools.selTournament(parents, 1, TOURNAMENT)[0])
         before = list(child)
         while list(child) == before:  # a child equal to its parent would be simulated for nothing
             tools.mutPolynomialBounded(child, MUTATION_ETA, 0.0, 1.0, 1.0 / len(child))
-    return [_reflected(u) for u in child]
+    return [reflected(u) for u in child]
 
 
-def _reflected(u: float) -> float:
+def reflected(u: float) -> float:
     """Back into [0, 1] by mirroring at the bounds: unlike clipping it does not pile individuals on them."""
     u = abs(u) % 2.0
     return 2.0 - u if u > 1.0 else u
@@ -132,8 +137,8 @@ def survive(population: Population, unit: Array, fitness: Array, distance: Array
     """The best of parents and children together; equal fitness keeps the elder, so that the order is reproducible."""
     size = len(unit)
     everyone = population.unit + [[float(v) for v in row] for row in unit]
-    scores = population.fitness + [_finite(f) for f in fitness]
-    distances = population.distance + [_finite(d) for d in distance]
+    scores = population.fitness + [finite(f) for f in fitness]
+    distances = population.distance + [finite(d) for d in distance]
     order = sorted(range(len(everyone)), key=lambda k: scores[k])[:size]
     best = scores[order[0]]
     improved = best < population.best * (1.0 - tolerance)
@@ -147,5 +152,6 @@ def survive(population: Population, unit: Array, fitness: Array, distance: Array
     )
 
 
-def _finite(value: float) -> float:
+def finite(value: float) -> float:
+    """``value``, or FAILED when it is not finite."""
     return float(value) if np.isfinite(value) else FAILED

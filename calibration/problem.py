@@ -16,23 +16,29 @@ from sim.model import Model
 
 Array = npt.NDArray[np.float64]
 
+DEFAULT_AXES = ("x",)  # Armanini et al. 2016 fit the X force only
+
 
 @dataclass(frozen=True)
 class Problem:
     """Everything that turns values of the free genes into misfits. Picklable; sent to workers once.
 
     ``free`` are the genes searched, in the order of the columns of a batch; all others keep their value in ``base``.
+    ``axes`` are the force axes that are fitted, by default DEFAULT_AXES; recordings of tracks are fitted whole.
     """
 
     model: Model
     recordings: tuple[Recording, ...]
     free: tuple[str, ...]
     base: Genome
+    axes: tuple[str, ...] = ()
 
     @cached_property
     def key(self) -> str:
         """Content hash, by which workers cache problems."""
-        return hashlib.sha256(pickle.dumps((self.model, self.recordings, self.free, self.base), 5)).hexdigest()
+        return hashlib.sha256(
+            pickle.dumps((self.model, self.recordings, self.free, self.base, self.axes), 5)
+        ).hexdigest()
 
     def genomes(self, values: npt.ArrayLike) -> Array:
         """Full genomes [B, G] for ``values`` [B, F] of the free genes."""
@@ -50,11 +56,13 @@ class Misfit:
     """Misfit of B individuals to one recording.
 
     Attributes:
-        squares: [B] sum over frames and markers of squared distance, m^2 (thesis Eq. 14); inf for a failed individual.
-        distance: [B] mean distance per marker and frame, m; inf for a failed individual.
-        samples: number of (frame, marker) pairs compared.
+        squares: [B] sum of squares, inf for a failed individual. Of tracks: squared distance over frames and markers,
+            m^2 (thesis Eq. 14); of forces: squared difference over instants and fitted axes, N^2.
+        distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N; inf for a failed one.
+        samples: number of (frame, marker) pairs, or of (instant, axis) pairs, compared.
         reasons: per individual, why it failed, else None.
-        residuals: [B, T, C] simulated minus recorded, m, NaN where not recorded; None unless asked for.
+        residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless asked
+            for.
     """
 
     squares: Array
@@ -69,18 +77,36 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
     record = problem.recordings[recording]
     observed = problem.model.observe(problem.genomes(values), record)
     difference = observed.channels - record.values
-    square = difference.reshape(len(difference), -1, 3) ** 2
-    distance2 = square.sum(axis=2)
-    seen = np.isfinite(record.positions).all(axis=2).ravel()
-    kept = distance2[:, seen]
-    reasons = tuple(
-        reason or (None if finite else "the simulated tracks are not finite")
-        for reason, finite in zip(observed.reasons, np.isfinite(kept).all(axis=1), strict=True)
-    )
+    if record.kind == "forces":
+        fitted = compared(record, problem.axes)
+        difference[:, ~fitted] = np.nan
+        kept: Array = difference[:, fitted] ** 2
+        told = "the modelled forces are not finite"
+    else:
+        seen = np.isfinite(record.positions).all(axis=2).ravel()
+        kept = (difference.reshape(len(difference), -1, 3) ** 2).sum(axis=2)[:, seen]
+        told = "the simulated tracks are not finite"
+    finite = [bool(np.isfinite(one).all()) for one in kept]
+    reasons = tuple(reason or (None if fine else told) for reason, fine in zip(observed.reasons, finite, strict=True))
     failed = np.array([reason is not None for reason in reasons])
     squares = np.where(failed, np.inf, kept.sum(axis=1))
-    mean = np.where(failed, np.inf, np.sqrt(kept).mean(axis=1))
-    return Misfit(squares, mean, int(seen.sum()), reasons, difference if residuals else None)
+    mean = np.sqrt(kept.mean(axis=1)) if record.kind == "forces" else np.sqrt(kept).mean(axis=1)
+    distance = np.where(failed, np.inf, mean)
+    return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None)
+
+
+def compared(recording: Recording, axes: tuple[str, ...] = ()) -> npt.NDArray[np.bool_]:
+    """True [T, C] where a recording of forces is fitted: at instants at which every fitted axis was recorded."""
+    axes = axes or DEFAULT_AXES
+    for axis in axes:
+        if axis not in recording.forces:
+            raise ValueError(
+                f"force axis {axis!r} is to be fitted, but recording {recording.name!r} has "
+                f"{', '.join(recording.forces)}; fit those, or leave the recording out"
+            )
+    fitted = np.array([axis in axes for axis in recording.forces])
+    whole = np.all(recording.valid[:, fitted], axis=1, keepdims=True)
+    return np.asarray(whole & fitted)
 
 
 @dataclass(frozen=True)
@@ -91,7 +117,7 @@ class Evaluation:
 
     @property
     def fitness(self) -> Array:
-        """[B] total of Eq. 14 over the recordings, m^2; inf for a failed individual."""
+        """[B] total of the squares over the recordings, m^2 or N^2; inf for a failed individual."""
         total = np.zeros_like(self.per_recording[0].squares)
         for part in self.per_recording:
             total = total + part.squares
@@ -99,7 +125,7 @@ class Evaluation:
 
     @property
     def distance(self) -> Array:
-        """[B] mean distance per marker and frame over all recordings, m."""
+        """[B] mean of the recordings' distances, m or N, weighted by their samples."""
         total = np.zeros_like(self.per_recording[0].distance)
         for part in self.per_recording:
             total = total + part.distance * part.samples

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
 from calibration.noise import noise_distance
+from calibration.plan import Stage, plan
 from calibration.problem import Problem, base_genome
-from calibration.search import CalibrationSpec, Stage, model_for, plan
-from calibration.standing import Standing, standing
+from calibration.search import found
+from calibration.spec import CalibrationSpec, wing_model
+from calibration.uncertainty import Standing, standing
 from records import Dataset, Gene, Genome
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.model import Solution
+
+if TYPE_CHECKING:
+    from calibration.force_result import ForceResult
 
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
@@ -25,7 +31,7 @@ ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is tak
 class GeneResult:
     """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
 
-    ``standard_error`` is relative to the value, from the misfit's curvature and the residual scatter; ``identifiable``
+    ``standard_error`` is relative to the value (:mod:`calibration.uncertainty`); ``identifiable``
     says whether the data can tell the gene: an error of at most 7.5 %, a value off its bounds, and a misfit that noise
     explains (ADEQUATE); None where the gene was not searched.
     """
@@ -89,9 +95,21 @@ class Comparison:
     solution: Solution
 
 
-def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
-    """Judge ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
-    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
+def summarise(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+) -> Result | ForceResult:
+    """Judge what a calibration found, by its last ``checkpoint``, on every recording of the dataset."""
+    if dataset.kind == "forces":
+        from calibration.estimation import summarise_forces  # its results are made of these
+
+        return summarise_forces(spec, dataset, evaluator, checkpoint)
+    (*_, genome) = found(spec, dataset, checkpoint).values()
+    return judge(spec, dataset, evaluator, genome)
+
+
+def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
+    """Judge a wing's ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
+    model = wing_model(dataset, spec)
     nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
     stages = plan(spec, dataset)
     both = evaluator.evaluate(
@@ -138,7 +156,7 @@ def summarise(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, gen
 
 def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str) -> Comparison:
     """Tracks of ``genome`` over the recording called ``recording``; ValueError when the simulation fails."""
-    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
+    model = wing_model(dataset, spec)
     record = dataset.recording(recording)
     observed = model.observe([base_genome(model, genome).values], record)
     if observed.reasons[0] is not None:

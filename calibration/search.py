@@ -1,69 +1,47 @@
-"""A calibration from the outside: its specification, its stages, its generations."""
+"""A calibration from the outside: its stages searched one after the other, generation by generation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from calibration import cma, genetic
 from calibration.evaluator import Evaluator
-from calibration.genetic import FAILED, Population, first_generation, offspring, survive
+from calibration.genetic import FAILED
+from calibration.likelihood import ITERATIONS, Step, iterate
+from calibration.linearised import free_genes, values_at
+from calibration.plan import Stage, plan
 from calibration.problem import Problem, base_genome
-from records import Dataset, Gene, Recording, Wing
-from sim.alignment import recorded_crossing
-from sim.flexible_wing import FlexibleWing
-from sim.numerics import ACCURACY, Numerics
-from sim.wing_genes import FACTOR, group
+from calibration.spec import CalibrationSpec, model_for, resolved
+from records import Dataset, Gene
+from sim.model import Model
 
-Mode = Literal["staged", "joint"]
+__all__ = ["CalibrationSpec", "Generation", "Stage", "calibrate", "found", "model_for", "plan", "resolved"]
 
-VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
 EXPECTED_GENERATIONS = 45
+EXPECTED_ITERATIONS = 10
+FINISHING = 0.2  # part of a stage's progress that belongs to Gauss-Newton after a search
+NEWTON = ", Gauss-Newton"
 
-
-@dataclass(frozen=True)
-class CalibrationSpec:
-    """What to calibrate and how; the defaults are the thesis's (IV-E).
-
-    Attributes:
-        division: preset ("4", "11", "24") or strips as "3,3,3,2" (bodies along the chord of each strip, root first).
-        mode: "staged" fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint" fits all.
-        population: individuals per generation.
-        stall: generations without improvement of the best fitness after which a stage ends.
-        tolerance: relative improvement that counts as one.
-        max_generations: per stage.
-        seed: the same seed gives the same numbers, bit for bit.
-        bounds_factor: the box is [estimate / factor, estimate * factor].
-        accuracy: largest error (m) of any simulated marker at any instant (:class:`sim.numerics.Numerics`).
-        recordings: names to fit; empty means all that are not held out.
-        genes: names to search; empty means all.
-        fixed: values of genes that keep them instead of their estimates.
-    """
-
-    division: str = "11"
-    mode: Mode = "staged"
-    population: int = 50
-    stall: int = 10
-    tolerance: float = 1e-3
-    max_generations: int = 200
-    seed: int = 1
-    bounds_factor: float = 5.0
-    accuracy: float = ACCURACY
-    recordings: tuple[str, ...] = ()
-    genes: tuple[str, ...] = ()
-    fixed: Mapping[str, float] = field(default_factory=dict)
+Population = genetic.Population | cma.Distribution
 
 
 @dataclass(frozen=True)
 class Generation:
     """One finished generation, what a watcher sees; ``checkpoint`` (JSON) is all that is needed to go on from here.
 
-    ``distance`` is the best individual's mean distance per marker in m; ``diversity`` the mean over the free genes of
-    the population's standard deviation in unit coordinates; ``failed`` counts this generation's failed individuals, of
-    which ``reasons`` lists up to ten different ones; ``progress`` is a fraction of the whole calibration (an
-    estimate, non-decreasing, 1 only at the end).
+    A Gauss-Newton iteration is a generation too. It minimises the cost of Eq. 22, which weighs recordings and channels
+    by their noise, so that its ``best`` need not fall every time.
+
+    ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
+    (:class:`calibration.problem.Misfit`); ``diversity`` the mean over the free genes of the population's standard
+    deviation in unit coordinates (of an iteration: the largest move of a gene); ``failed`` counts this generation's
+    failed individuals, of which ``reasons`` lists up to ten different ones; ``genome`` is full; ``progress`` is a
+    fraction of the whole calibration (an estimate, non-decreasing, 1 only at the end). In ``checkpoint``, ``found``
+    maps the names of the stages so far to the best full genome of each.
     """
 
     stage: str
@@ -80,87 +58,6 @@ class Generation:
     checkpoint: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Stage:
-    """One search: which genes are free, on which recordings."""
-
-    name: str
-    free: tuple[str, ...]
-    recordings: tuple[Recording, ...]
-
-
-def model_for(
-    dataset: Dataset, division: str, bounds_factor: float = FACTOR, accuracy: float = ACCURACY
-) -> FlexibleWing:
-    """The model that a dataset asks for, solved to ``accuracy`` (m); ValueError when wing or division is not one."""
-    model = FlexibleWing(dataset.wing, division, bounds_factor, Numerics(accuracy=accuracy))
-    _ = model.structure, model.genes
-    return model
-
-
-def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
-    """The stages of a calibration; ValueError when the spec does not fit the dataset."""
-    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
-    known = [gene.name for gene in model.genes]
-    _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
-    base_genome(model, spec.fixed)
-    recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
-    if not recordings:
-        raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
-    for recording in recordings:
-        if recording.name in dataset.held_out:
-            raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
-    _refuse_repeated("recording", spec.recordings)
-    for recording in dataset.recordings:  # all of them are judged in the end
-        _refuse_unusable(dataset.wing, recording)
-    free = [name for name in known if (not spec.genes or name in spec.genes) and name not in spec.fixed]
-    stages = _joint(free, recordings) if spec.mode == "joint" else _staged(free, recordings)
-    if not stages:
-        raise ValueError("nothing to calibrate: no recording is left, or every gene is fixed")
-    return stages
-
-
-def _joint(free: list[str], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    return (Stage("joint", tuple(free), recordings),) if free and recordings else ()
-
-
-def _staged(free: list[str], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    """Vacuum recordings fit the structure, the others then the aerodynamics (thesis Fig. 2)."""
-    vacuum = tuple(r for r in recordings if r.condition.airspeed == 0 and r.condition.pressure <= VACUUM_LIMIT)
-    air = tuple(r for r in recordings if r not in vacuum)
-    structural = tuple(name for name in free if group(name) == "structure")
-    aerodynamic = tuple(name for name in free if group(name) == "aerodynamics")
-    if (structural and not vacuum) or (aerodynamic and not air):
-        lacking, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
-        raise ValueError(
-            f"a staged calibration fits the {which} genes on recordings in {lacking}, and there is none "
-            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or name other genes"
-        )
-    stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
-    return tuple(stage for stage in stages if stage.free)
-
-
-def _refuse_unknown(what: str, names: Iterable[str], known: list[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise ValueError(f"unknown {what} {name!r}; there are {', '.join(known)}")
-
-
-def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{what} {name!r} is named {names.count(name)} times; name it once")
-
-
-def _refuse_unusable(wing: Wing, recording: Recording) -> None:
-    if not np.isfinite(recording.positions).all(axis=2).any():
-        raise ValueError(
-            f"recording {recording.name!r} has no marker with all of x, y and z in any frame; "
-            "there is nothing to compare: leave the recording out of the dataset"
-        )
-    recorded_crossing(wing, recording)
-
-
 def calibrate(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None = None
 ) -> Iterator[Generation]:
@@ -168,95 +65,188 @@ def calibrate(
 
     Resumed equals uninterrupted, bit for bit. ValueError when the spec does not fit the dataset.
     """
+    spec = resolved(spec, dataset)
     stages = plan(spec, dataset)
-    model = model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
-    state = _State.start(spec, model) if checkpoint is None else _State.from_json(checkpoint)
+    model = model_for(dataset, spec)
+    state = _State.start(spec, model) if checkpoint is None else _State.from_json(checkpoint, spec)
+    if checkpoint is not None:
+        state.found = found(spec, dataset, checkpoint)
     while state.stage < len(stages):
-        stage = stages[state.stage]
-        problem = Problem(model, stage.recordings, stage.free, base_genome(model, state.base))
-        genes = [gene for gene in model.genes if gene.name in stage.free]
-        while not _ended(state.population, spec):
-            yield _generation(state, spec, stages, problem, genes, evaluator)
-        state.base |= _best(state.population, genes)
-        state.stage, state.population = state.stage + 1, Population()
+        run = _Run(spec, stages, model, state, evaluator)
+        if spec.method != "gauss_newton":
+            yield from run.search()
+        if spec.method == "gauss_newton" or spec.finish:
+            yield from run.iterations()
+        if spec.mode != "local":
+            state.base |= {name: state.found[run.stage.name][name] for name in run.stage.free}
+        state.stage, state.population, state.newton = state.stage + 1, _empty(spec), None
+
+
+def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Full genome of each stage so far, by name, from the last generation's checkpoint."""
+    spec = resolved(spec, dataset)
+    state = _State.from_json(checkpoint, spec)
+    if state.found:
+        return state.found
+    # a checkpoint of version 0.1: the genome that the stage under way began with, and its population
+    *earlier, stage = plan(spec, dataset)[: state.stage + 1]
+    genomes = {one.name: dict(state.base) for one in (*earlier, stage)}
+    genes = [gene for gene in model_for(dataset, spec).genes if gene.name in stage.free]
+    genomes[stage.name] |= _named(genes, _leader(state.population)[2])
+    return genomes
 
 
 @dataclass
 class _State:
-    """Everything that the next generation depends on."""
+    """Everything that the next generation depends on.
+
+    ``base`` is the genome that a stage starts from; ``newton`` the checkpoint of a Gauss-Newton iteration under way.
+    """
 
     stage: int
     base: dict[str, float]
     population: Population
     evaluations: int = 0
     progress: float = 0.0
+    found: dict[str, dict[str, float]] = field(default_factory=dict)
+    newton: dict[str, Any] | None = None
 
     @classmethod
-    def start(cls, spec: CalibrationSpec, model: FlexibleWing) -> _State:
-        return cls(0, base_genome(model, spec.fixed).as_dict(), Population())
+    def start(cls, spec: CalibrationSpec, model: Model) -> _State:
+        return cls(0, base_genome(model, spec.fixed).as_dict(), _empty(spec))
 
     @classmethod
-    def from_json(cls, state: dict[str, Any]) -> _State:
-        fields = dict(state) | {"population": Population.from_json(state["population"]), "base": dict(state["base"])}
-        return cls(**fields)
+    def from_json(cls, state: dict[str, Any], spec: CalibrationSpec) -> _State:
+        fields = dict(state) | {"population": type(_empty(spec)).from_json(state["population"])}
+        found = {name: dict(genome) for name, genome in state.get("found", {}).items()}
+        return cls(**fields | {"base": dict(state["base"]), "found": found})
 
     def as_json(self) -> dict[str, Any]:
-        return dict(self.__dict__) | {"population": self.population.as_json(), "base": dict(self.base)}
+        found = {name: dict(genome) for name, genome in self.found.items()}
+        return dict(self.__dict__) | {
+            "population": self.population.as_json(),
+            "base": dict(self.base),
+            "found": found,
+        }
 
 
-def _generation(
-    state: _State,
-    spec: CalibrationSpec,
-    stages: tuple[Stage, ...],
-    problem: Problem,
-    genes: list[Gene],
-    evaluator: Evaluator,
-) -> Generation:
-    """Breed, evaluate and select once; ``state`` moves on."""
-    stage = stages[state.stage]
-    if state.population.generation < 0:
-        start = [float(gene.to_unit(state.base[gene.name])) for gene in genes]
-        unit = first_generation(spec.seed, stage.name, spec.population, start)
-    else:
-        unit = offspring(state.population, spec.seed, stage.name, spec.population)
-    values = np.stack([gene.from_unit(column) for gene, column in zip(genes, unit.T, strict=True)], axis=1)
-    evaluation = evaluator.evaluate(problem, values)
-    state.population = survive(state.population, unit, evaluation.fitness, evaluation.distance, spec.tolerance)
-    if state.population.fitness[0] >= FAILED:
-        first = next(reason for reason in evaluation.reasons if reason)
-        raise ValueError(f"stage {stage.name!r}: every individual of the first generation failed, the first: {first}")
-    state.evaluations += len(unit)
-    state.progress = max(state.progress, _progress(state, spec, len(stages)))
-    population, reasons = state.population, [reason for reason in evaluation.reasons if reason]
-    good = [f for f in population.fitness if f < FAILED]
-    return Generation(
-        stage=stage.name,
-        index=population.generation,
-        best=population.fitness[0],
-        mean=float(np.mean(good)),
-        diversity=population.diversity,
-        distance=population.distance[0],
-        evaluations=state.evaluations,
-        failed=len(reasons),
-        reasons=tuple(sorted(set(reasons))[:10]),
-        genome=state.base | _best(population, genes),
-        progress=state.progress,
-        checkpoint=state.as_json(),
-    )
+def _empty(spec: CalibrationSpec) -> Population:
+    return cma.Distribution() if spec.method == "cma_es" else genetic.Population()
 
 
-def _best(population: Population, genes: list[Gene]) -> dict[str, float]:
-    return {gene.name: float(gene.from_unit(u)) for gene, u in zip(genes, population.unit[0], strict=True)}
+class _Run:
+    """One stage under way; ``state`` moves on with every generation."""
+
+    def __init__(
+        self, spec: CalibrationSpec, stages: tuple[Stage, ...], model: Model, state: _State, evaluator: Evaluator
+    ) -> None:
+        self.spec, self.stages, self.state, self.evaluator = spec, stages, state, evaluator
+        self.stage = stages[state.stage]
+        self.problem = Problem(model, self.stage.recordings, self.stage.free, base_genome(model, state.base), spec.axes)
+        self.genes = free_genes(self.problem)
+
+    def search(self) -> Iterator[Generation]:
+        """Generations of the genetic search or of CMA-ES until it stalls."""
+        while not _ended(self.state.population, self.spec):
+            yield self._generation()
+
+    def iterations(self) -> Iterator[Generation]:
+        """Gauss-Newton iterations, from where the search ended or from the base, to convergence."""
+        start = self.state.found.get(self.stage.name, self.state.base)
+        limit = min(ITERATIONS, self.spec.max_generations)
+        for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
+            yield self._iteration(step, step.converged or step.index + 1 >= limit)
+
+    def _generation(self) -> Generation:
+        """Breed, evaluate and select once."""
+        spec, state, name = self.spec, self.state, self.stage.name
+        unit = self._drawn()
+        evaluation = self.evaluator.evaluate(self.problem, values_at(self.genes, unit))
+        if isinstance(state.population, cma.Distribution):
+            learn = cma.learnt
+            state.population = learn(state.population, unit, evaluation.fitness, evaluation.distance, spec.tolerance)
+        else:
+            state.population = genetic.survive(
+                state.population, unit, evaluation.fitness, evaluation.distance, spec.tolerance
+            )
+        population, reasons = state.population, [reason for reason in evaluation.reasons if reason]
+        fitness, distance, best = _leader(population)
+        if fitness >= FAILED:
+            raise ValueError(
+                f"stage {name!r}: every individual of the first generation failed, the first: {reasons[0]}"
+            )
+        genome = state.base | _named(self.genes, best)
+        return self._seen(
+            genome, len(unit), self._progress(), name, population.generation, fitness, population.mean,
+            population.diversity, distance, reasons,
+        )  # fmt: skip
+
+    def _drawn(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+        spec, state, name = self.spec, self.state, self.stage.name
+        if state.population.generation < 0:
+            start = [float(gene.to_unit(state.base[gene.name])) for gene in self.genes]
+            if isinstance(state.population, genetic.Population):
+                return genetic.first_generation(spec.seed, name, spec.population, start)
+            state.population = cma.Distribution.about(start)
+        if isinstance(state.population, genetic.Population):
+            return genetic.offspring(state.population, spec.seed, name, spec.population)
+        return cma.drawn(state.population, spec.seed, name, spec.population)
+
+    def _iteration(self, step: Step, last: bool) -> Generation:
+        self.state.newton = step.checkpoint
+        searched = 1.0 - FINISHING if self.spec.method != "gauss_newton" else 0.0
+        done = step.index + 1
+        part = 1.0 if last else searched + (1.0 - searched) * done / max(done + 1, EXPECTED_ITERATIONS)
+        return self._seen(
+            self.state.base | step.values, step.evaluations, (self.state.stage + part) / len(self.stages),
+            self.stage.name + NEWTON, step.index, step.fitness, step.fitness, step.step, step.distance,
+            list(step.reasons),
+        )  # fmt: skip
+
+    def _seen(
+        self, genome: dict[str, float], evaluated: int, progress: float, stage: str, index: int,
+        best: float, mean: float, diversity: float, distance: float, reasons: list[str],
+    ) -> Generation:  # fmt: skip
+        """A generation as it is shown; the state has moved on."""
+        state = self.state
+        state.found[self.stage.name] = dict(genome)
+        state.evaluations += evaluated
+        state.progress = max(state.progress, progress)
+        return Generation(
+            stage=stage,
+            index=index,
+            best=best,
+            mean=mean,
+            diversity=diversity,
+            distance=distance,
+            evaluations=state.evaluations,
+            failed=len(reasons),
+            reasons=tuple(sorted(set(reasons))[:10]),
+            genome=genome,
+            progress=state.progress,
+            checkpoint=state.as_json(),
+        )
+
+    def _progress(self) -> float:
+        """Fraction done, taking a search to last EXPECTED_GENERATIONS, or as many more as its stall still allows."""
+        population, spec = self.state.population, self.spec
+        done = population.generation + 1
+        left = 0 if _ended(population, spec) else max(spec.stall - population.stall, EXPECTED_GENERATIONS - done)
+        total = min(done + left, spec.max_generations)
+        share = 1.0 - FINISHING if spec.finish else 1.0
+        return (self.state.stage + share * (done / total)) / len(self.stages)
 
 
 def _ended(population: Population, spec: CalibrationSpec) -> bool:
     return population.stall >= spec.stall or population.generation + 1 >= spec.max_generations
 
 
-def _progress(state: _State, spec: CalibrationSpec, stages: int) -> float:
-    """Fraction done, taking a stage to last EXPECTED_GENERATIONS, or as many more as the stall counter still allows."""
-    population = state.population
-    done = population.generation + 1
-    left = 0 if _ended(population, spec) else max(spec.stall - population.stall, EXPECTED_GENERATIONS - done)
-    total = min(done + left, spec.max_generations)
-    return (state.stage + done / total) / stages
+def _leader(population: Population) -> tuple[float, float, list[float]]:
+    """Fitness, distance and unit coordinates of the best individual."""
+    if isinstance(population, cma.Distribution):
+        return population.fitness, population.distance, population.unit
+    return population.fitness[0], population.distance[0], population.unit[0]
+
+
+def _named(genes: list[Gene], unit: list[float]) -> dict[str, float]:
+    return {gene.name: float(gene.from_unit(u)) for gene, u in zip(genes, unit, strict=True)}

@@ -219,9 +219,11 @@ class BladeElementWing:
         constants = Constants(rho, vehicle.thickness, width, first, step, ADDED_MASS_POINT)
         curves = len(CURVE_ROWS) if "steady_curves" in self.terms else 0
         found = np.zeros((len(prescribed.flap), len(ROWS) + curves, 2, n // LANES, LANES))
-        rows = _motion_rows(prescribed, motion.root_pitch, first, step)
+        rows = _motion_rows(prescribed, motion.root_pitch, first)
+        zeta = prescribed.flap[:, 0]
+        flap = (np.cos(zeta), np.sin(zeta), prescribed.flap[:, 1])
         for upper in (False, True) if vehicle.layout == "x4" else (False,):
-            side = _set_side(rows, vehicle, prescribed, condition, upper)
+            side = _set_side(rows, vehicle, flap, condition, upper)
             wing_forces(rows, side, r, chord, mass, constants, found)
         each = found.reshape(len(found), -1, 2, n)
         if vehicle.layout != "single":
@@ -296,33 +298,38 @@ def _sum(weights: Array, rows: Array) -> Array:
     return total
 
 
-def _motion_rows(prescribed: Angles, root: float, first: float, step: float) -> Array:
-    """Motion [B, 12, n / 8, 8] for :func:`wing_forces`, but for what depends on the side."""
+def _motion_rows(prescribed: Angles, root: float, half_step: float) -> Array:
+    """Motion [B, 12, n / 8, 8] for :func:`wing_forces`, but for what depends on the side.
+
+    The first element lies half a step from the root, so one pair of sine and cosine gives both of its turns.
+    """
     flap, pitch = prescribed.flap, prescribed.pitch
     rows = np.empty((len(flap), 12, flap.shape[2]))
-    twist = pitch[:, 0] - root
+    half = half_step * (pitch[:, 0] - root)
+    c, s = np.cos(half), np.sin(half)
     rows[:, [FLAP_RATE, FLAP_ACCELERATION]] = flap[:, 1:]
     rows[:, [PITCH_RATE, PITCH_ACCELERATION]] = pitch[:, 1:]
     rows[:, PEELED] = prescribed.peeled
-    rows[:, COSINE], rows[:, SINE] = np.cos(root + first * twist), np.sin(root + first * twist)
-    rows[:, STEP_COSINE], rows[:, STEP_SINE] = np.cos(step * twist), np.sin(step * twist)
+    rows[:, COSINE], rows[:, SINE] = np.cos(root) * c - np.sin(root) * s, np.sin(root) * c + np.cos(root) * s
+    rows[:, STEP_COSINE], rows[:, STEP_SINE] = c * c - s * s, 2 * c * s
     return rows.reshape(*rows.shape[:2], -1, LANES)
 
 
-def _set_side(rows: Array, vehicle: Vehicle, prescribed: Angles, condition: Condition, upper: bool) -> Side:
+def _set_side(
+    rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], condition: Condition, upper: bool
+) -> Side:
     """Set the rows of the dihedral for the lower wings, or for the upper ones, and return the stream that they meet.
 
     In axes mirrored at the body's plane the upper wing moves like the lower one, in a stream from the other side. As
     printed, Eq. 18 has the stream along the upper wing's chord from behind (docs/decisions/0005). Wings that are no X
-    move like lower ones.
+    move like lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate.
     """
-    flap, rate = prescribed.flap[:, 0], prescribed.flap[:, 1]
+    (cosine, sine, rate), shape = flap, (len(rows), *rows.shape[2:])
     sign, printed = -1.0 if upper else 1.0, vehicle.velocities == "printed"
-    angle = vehicle.dihedral - sign * flap
-    shape = (len(flap), *rows.shape[2:])
-    rows[:, DIHEDRAL] = np.cos(angle).reshape(shape)
-    rows[:, DIHEDRAL_RATE] = (sign * np.sin(angle) * rate).reshape(shape)
-    rows[:, PROJECTION] = np.cos(flap).reshape(shape) if printed else rows[:, DIHEDRAL]
+    c, s = np.cos(vehicle.dihedral), np.sin(vehicle.dihedral)  # of the angle zeta_0 - sign zeta:
+    rows[:, DIHEDRAL] = (c * cosine + sign * s * sine).reshape(shape)
+    rows[:, DIHEDRAL_RATE] = ((sign * s * cosine - c * sine) * rate).reshape(shape)
+    rows[:, PROJECTION] = cosine.reshape(shape) if printed else rows[:, DIHEDRAL]
     theta_b, speed = condition.angle_of_attack, condition.airspeed
     along = -1.0 if printed and upper else 1.0
     return Side(speed * np.cos(theta_b), sign * speed * np.sin(theta_b), along, float(printed), sign)

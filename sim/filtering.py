@@ -13,6 +13,8 @@ from records import LowPass, Recording
 Array = npt.NDArray[np.float64]
 
 CUTOFF_HARMONIC = 3.2  # the seed's 40 Hz at 12.5 beats per second: just above the third harmonic
+ENDS = 2.0  # periods of the cutoff that a filter needs to settle, at either end
+FEW_BEATS = 4
 UNEVEN = 0.01  # of a step: the largest departure from even sampling that a filter may take
 
 
@@ -35,7 +37,12 @@ def sampling_rate(recording: Recording) -> float:
 
 
 def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
-    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filter before this one."""
+    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filter before this one.
+
+    What lies outside the recording is not known to the filter: the values near both ends would be wrong by a good part
+    of the force, and are missing (NaN) instead, for ENDS periods of the cutoff or one beat. A recording of fewer than
+    FEW_BEATS beats has nothing to spare and keeps them.
+    """
     if recording.low_pass is not None:
         raise ValueError(
             f"recording {recording.name!r} has been low-passed at {recording.low_pass.cutoff:g} Hz already; "
@@ -50,8 +57,12 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
     # The pad must outlast the filter's memory, of the order of its cutoff's period.
     pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
-    values = sosfiltfilt(sections, recording.values, axis=0, padlen=pad)
-    return replace(recording, values=np.ascontiguousarray(values), low_pass=low_pass)
+    values = np.ascontiguousarray(sosfiltfilt(sections, recording.values, axis=0, padlen=pad))
+    frequency, rate = recording.condition.flap_frequency, sampling_rate(recording)
+    if len(values) * frequency >= FEW_BEATS * rate:
+        lost = round(min(ENDS / low_pass.cutoff, 1.0 / frequency) * rate)
+        values[:lost] = values[len(values) - lost :] = np.nan
+    return replace(recording, values=values, low_pass=low_pass)
 
 
 def gain(low_pass: LowPass, rate: float, frequency: npt.ArrayLike) -> Array:

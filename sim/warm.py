@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import time
 
+from sim.balance import TRIALS, delfly
+from sim.balance import blank_recording as blank_forces
+from sim.blade_element_wing import BladeElementWing
 from sim.flexible_wing import FlexibleWing
 from sim.numerics import Numerics
 from sim.rig import WIND_TUNNEL, blank_recording, robird_wing
 
 
 def main() -> None:
-    """Simulate two beats of the coarsest wing once."""
+    """Simulate two beats of the coarsest wing, and a beat of the vehicle, once."""
     start = time.perf_counter()
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=8, max_beats=2))
     model.beat([gene.nominal for gene in model.genes], blank_recording(model.wing, WIND_TUNNEL[0]))
+    vehicle = BladeElementWing(delfly())
+    vehicle.observe([[gene.nominal for gene in vehicle.genes]], blank_forces(TRIALS[0].condition))
     print(f"kernels ready after {time.perf_counter() - start:.0f} s")
 
 

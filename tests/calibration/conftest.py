@@ -5,9 +5,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from records import Dataset, Genome
+from calibration.problem import base_genome
+from records import Condition, Dataset, Genome, Recording
+from sim.balance import delfly
+from sim.blade_element_wing import BladeElementWing
 from sim.flexible_wing import FlexibleWing
 from sim.rig import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
+
+FORCE_TRUTHS = ({"C_l": 1.22, "C_r": 1.45, "C_F": 1.57}, {"C_l": 1.43, "C_r": 1.39, "C_F": 1.61})
+
+
+@pytest.fixture(scope="session")
+def forces() -> Dataset:
+    """Two recordings of a vehicle's forces, eight beats each with 1 mN of white noise, coefficients known."""
+    model, recordings = BladeElementWing(delfly()), []
+    for k, (truth, (speed, pitch, frequency)) in enumerate(
+        zip(FORCE_TRUTHS, ((0.5, 74.0, 12.5), (0.7, 62.0, 11.7)), strict=True)
+    ):
+        condition = Condition(frequency, 0.0, 101325.0, 293.15, speed, np.radians(pitch))
+        times = np.arange(640) / 1000.0
+        blank = Recording(f"test-{k}", "wind_tunnel", condition, times, (), np.zeros((640, 2)), forces=("x", "z"))
+        clean = model.observe([base_genome(model, truth).values], blank).channels[0]
+        noise = 1e-3 * np.random.default_rng(k).normal(size=clean.shape)
+        recordings.append(replace(blank, values=clean + noise))
+    return Dataset("forces", delfly(), tuple(recordings))
 
 
 @pytest.fixture(scope="session")

@@ -11,17 +11,22 @@ import pytest
 from scipy.signal import lfilter
 
 from calibration.evaluator import as_batch, gather, run_unit, units
+from calibration.linearised import linearise, unit_at
 from calibration.noise import noise_distance
+from calibration.plan import prepared
 from calibration.problem import Evaluation, Problem, base_genome, misfit
-from calibration.result import compare, summarise
-from calibration.search import CalibrationSpec, calibrate, model_for, plan
-from calibration.standing import _linearised, standing
-from records import Condition, Dataset, Gene, Genome, Recording
+from calibration.result import compare, judge
+from calibration.search import CalibrationSpec, calibrate, found, plan, resolved
+from calibration.spec import wing_model
+from calibration.uncertainty import standing
+from records import Condition, Dataset, Gene, Genome, LowPass, Recording
 from sim.flexible_wing import FlexibleWing
 from sim.rig import Tracking, _noise
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
+from tests.calibration.conftest import FORCE_TRUTHS
 
 SPEC = CalibrationSpec(division="4", population=16, max_generations=4, seed=7)
+THREE = ("E_r", "G_f", "L_a")
 
 
 class Here:
@@ -65,16 +70,16 @@ def test_everything_is_simulated_as_accurately_as_the_specification_says(small: 
     spec = replace(SPEC, accuracy=3e-4, max_generations=1, population=4, genes=("E_r", "L_a"))
     first, *_ = calibrate(spec, dataset, Noting())
     assert list(calibrate(spec, dataset, Noting(), first.checkpoint))
-    summarise(spec, dataset, Noting(), truth.as_dict())
+    judge(spec, dataset, Noting(), truth.as_dict())
     assert len(seen) > 4
     assert set(seen) == {3e-4}
-    assert CalibrationSpec().accuracy == model_for(dataset, "4").numerics.accuracy == 1e-4
+    assert CalibrationSpec().accuracy == wing_model(dataset, SPEC).numerics.accuracy == 1e-4
 
 
 def test_fitness_is_equation_14(small: tuple[Dataset, Genome]) -> None:
     """Sum over frames and markers of squared distance, over what was recorded; the mean distance in m beside it."""
     dataset, truth = small
-    model = model_for(dataset, "4")
+    model = wing_model(dataset, SPEC)
     problem = Problem(model, dataset.recordings[:1], (), truth)
     record = dataset.recordings[0]
     tracks = model.observe([truth.values], record).channels[0].reshape(record.positions.shape)
@@ -87,7 +92,7 @@ def test_fitness_is_equation_14(small: tuple[Dataset, Genome]) -> None:
 
 def test_a_failed_individual_has_the_worst_fitness_and_a_reason(small: tuple[Dataset, Genome]) -> None:
     dataset, truth = small
-    model = model_for(dataset, "4")
+    model = wing_model(dataset, SPEC)
     problem = Problem(model, dataset.recordings[1:2], ("L_a",), truth)
     part = misfit(problem, np.array([[4.0], [1e6]]), 0)
     assert np.isfinite(part.squares[0])
@@ -105,6 +110,116 @@ def test_resumed_equals_uninterrupted(small: tuple[Dataset, Genome], cut: int) -
     checkpoint = json.loads(json.dumps(whole[cut - 1].checkpoint, allow_nan=False))
     rest = list(calibrate(SPEC, dataset, Here(), checkpoint))
     assert rest == whole[cut:]
+    assert found(SPEC, dataset, checkpoint)[whole[cut - 1].stage] == whole[cut - 1].genome
+    # as version 0.1 left it: no word of what was found, nor of Gauss-Newton
+    earlier = {key: value for key, value in checkpoint.items() if key not in ("found", "newton")}
+    assert [g.genome for g in calibrate(SPEC, dataset, Here(), earlier)] == [g.genome for g in rest]
+    assert list(found(SPEC, dataset, earlier).values())[-1] == whole[cut - 1].genome
+
+
+def test_specs_stored_by_version_0_1_mean_what_they_meant() -> None:
+    stored = {
+        "division": "4", "mode": "staged", "population": 16, "stall": 10, "tolerance": 1e-3, "max_generations": 4,
+        "seed": 7, "bounds_factor": 5.0, "accuracy": 1e-4, "recordings": (), "genes": (), "fixed": {},
+    }  # fmt: skip
+    assert CalibrationSpec(**stored) == replace(SPEC, mode="staged")  # type: ignore[arg-type]
+
+
+def test_mode_and_method_follow_the_dataset(small: tuple[Dataset, Genome], forces: Dataset) -> None:
+    wing, vehicle = resolved(SPEC, small[0]), resolved(SPEC, forces)
+    assert (wing.mode, wing.method) == ("staged", "genetic")
+    assert (vehicle.mode, vehicle.method) == ("local", "gauss_newton")
+    chosen = replace(SPEC, mode="joint", method="cma_es")
+    assert resolved(chosen, small[0]) == resolved(chosen, forces) == chosen
+    refused(replace(SPEC, mode="staged"), forces, "mode 'staged'.*use 'local'")
+    refused(replace(SPEC, mode="local"), small[0], "mode 'local'.*use 'staged' or 'joint'")
+    refused(replace(SPEC, mode="all"), forces, "unknown mode 'all'; there are staged, joint, local")  # type: ignore[arg-type]
+    refused(replace(SPEC, method="simplex"), forces, "unknown method 'simplex'")  # type: ignore[arg-type]
+
+
+def test_finishing_goes_from_the_search_to_the_bottom(small: tuple[Dataset, Genome]) -> None:
+    """Each stage ends with Gauss-Newton iterations, cut and taken up in the search, at its end and among them."""
+    dataset, _ = small
+    spec = replace(SPEC, genes=THREE, max_generations=3, finish=True, mode="joint")
+    whole = list(calibrate(spec, dataset, Here()))
+    names = [g.stage for g in whole]
+    assert names[:3] == ["joint"] * 3
+    assert set(names[3:]) == {"joint, Gauss-Newton"}
+    assert whole[-1].best < whole[2].best
+    assert whole[-1].progress == 1
+    assert all(a.progress <= b.progress < 1 for a, b in pairwise(whole[:-1]))
+    assert list(whole[-1].checkpoint["found"]) == ["joint"]
+    assert whole[-1].checkpoint["found"]["joint"] == whole[-1].genome
+    for cut in (2, 3, 4):
+        checkpoint = json.loads(json.dumps(whole[cut - 1].checkpoint, allow_nan=False))
+        assert list(calibrate(spec, dataset, Here(), checkpoint)) == whole[cut:]
+
+
+def test_cma_es_searches_too_and_resumes(small: tuple[Dataset, Genome]) -> None:
+    dataset, _ = small
+    spec = replace(SPEC, genes=THREE, method="cma_es", population=8)
+    whole = list(calibrate(spec, dataset, Here()))
+    assert [g.stage for g in whole] == ["structure"] * 4 + ["aerodynamics"] * 4
+    assert whole[3].best < whole[0].best
+    assert whole[-1].evaluations == 64
+    for cut in (1, 4, 6):
+        checkpoint = json.loads(json.dumps(whole[cut - 1].checkpoint, allow_nan=False))
+        assert list(calibrate(spec, dataset, Here(), checkpoint)) == whole[cut:]
+
+
+def test_each_recording_of_forces_is_a_stage_of_its_own(forces: Dataset) -> None:
+    whole = list(calibrate(CalibrationSpec(), forces, Here()))
+    stages = [r.name for r in forces.fitted]
+    assert list(dict.fromkeys(g.stage for g in whole)) == [f"{name}, Gauss-Newton" for name in stages]
+    last = {g.stage: g for g in whole}
+    assert list(whole[-1].checkpoint["found"]) == stages
+    for recording, truth in zip(forces.fitted, FORCE_TRUTHS, strict=False):
+        end = last[f"{recording.name}, Gauss-Newton"]
+        assert whole[-1].checkpoint["found"][recording.name] == end.genome
+        for name, value in truth.items():
+            assert end.genome[name] == pytest.approx(value, rel=0.05), name
+        fitted = prepared(CalibrationSpec(), recording)
+        assert end.distance == pytest.approx(np.sqrt(end.best / fitted.valid[:, 0].sum()))
+    assert whole[-1].progress == 1
+    cut = len([g for g in whole if g.stage.startswith(stages[0])])
+    for k in (1, cut, cut + 1):
+        checkpoint = json.loads(json.dumps(whole[k - 1].checkpoint, allow_nan=False))
+        assert list(calibrate(CalibrationSpec(), forces, Here(), checkpoint)) == whole[k:]
+
+
+def test_forces_together_have_one_genome(forces: Dataset) -> None:
+    *_, last = calibrate(CalibrationSpec(mode="joint", axes=("x", "z")), forces, Here())
+    assert last.stage == "joint, Gauss-Newton"
+    low, high = sorted(truth["C_l"] for truth in FORCE_TRUTHS)
+    assert low - 0.05 < last.genome["C_l"] < high + 0.05
+    assert last.checkpoint["found"] == {"joint": last.genome}
+
+
+def test_forces_are_low_passed_before_they_are_fitted(forces: Dataset) -> None:
+    (first, _) = plan(CalibrationSpec(), forces)
+    (record,) = first.recordings
+    assert record.low_pass == LowPass(3.2 * 12.5)
+    assert (
+        np.nanmax(np.abs(np.diff(record.values, axis=0))) < np.abs(np.diff(forces.recordings[0].values, axis=0)).max()
+    )
+    (wide, _) = plan(CalibrationSpec(low_pass=67.0), forces)
+    assert wide.recordings[0].low_pass == LowPass(67.0)
+    (raw, _) = plan(CalibrationSpec(low_pass=0.0), forces)
+    assert raw.recordings[0] is forces.recordings[0]
+    assert plan(CalibrationSpec(low_pass=67.0), replace(forces, recordings=(record, forces.recordings[1])))[
+        0
+    ].recordings == (record,)
+
+
+def test_what_a_vehicle_searches_and_what_is_refused(forces: Dataset) -> None:
+    assert plan(CalibrationSpec(), forces)[0].free == ("C_l", "C_r", "C_F")
+    assert plan(CalibrationSpec(without=("clap_and_peel",)), forces)[0].free == ("C_l", "C_r")
+    assert plan(CalibrationSpec(genes=("C_D0", "C_l")), forces)[0].free == ("C_l", "C_D0")
+    refused(CalibrationSpec(preset="best"), forces, "unknown model 'best'")
+    refused(CalibrationSpec(without=("lift",)), forces, "no term 'lift' to leave out")
+    refused(CalibrationSpec(axes=("y",)), forces, "'y' is to be fitted, but recording")
+    blind = [replace(r, values=np.full_like(r.values, np.nan)) for r in forces.recordings]
+    refused(CalibrationSpec(low_pass=0.0), replace(forces, recordings=tuple(blind)), "nothing to compare")
 
 
 def test_history_is_monotone_and_complete(small: tuple[Dataset, Genome]) -> None:
@@ -123,7 +238,7 @@ def test_history_is_monotone_and_complete(small: tuple[Dataset, Genome]) -> None
 
 def test_result_judges_fitted_and_held_out_recordings(small: tuple[Dataset, Genome]) -> None:
     dataset, truth = small
-    result = summarise(SPEC, dataset, Here(), truth.as_dict())
+    result = judge(SPEC, dataset, Here(), truth.as_dict())
     assert result.after < result.before
     assert result.held_out_after is not None
     assert result.held_out_before is not None
@@ -145,7 +260,7 @@ def test_noise_is_estimated_from_the_scatter_between_beats(small: tuple[Dataset,
 def test_standing_tells_what_the_data_ignore(small: tuple[Dataset, Genome]) -> None:
     """Rod stiffness shows; in vacuum the air does not, and its error is that of the box."""
     dataset, truth = small
-    model = model_for(dataset, "4")
+    model = wing_model(dataset, SPEC)
     problem = Problem(model, dataset.recordings[:1], ("E_r", "G_f", "L_1"), truth)
     known = standing(problem, Here())
     assert known["E_r"].identifiable
@@ -160,13 +275,15 @@ def test_standard_errors_are_honest(small: tuple[Dataset, Genome]) -> None:
     One Gauss-Newton step from the truth for each of 60 draws: 9 % is the standard error of such a scatter.
     """
     dataset, truth = small
-    model, record = model_for(dataset, "4"), dataset.recordings[0]
+    model, record = wing_model(dataset, SPEC), dataset.recordings[0]
     names = ("E_r", "G_f", "D_E")
     problem = Problem(model, (record,), names, truth)
     clean = model.observe([truth.values], record).channels[0]
-    linear = _linearised(Problem(model, (replace(record, values=clean),), names, truth), _free(problem), Here())
-    assert linear is not None
-    pull, shape = np.linalg.pinv(linear[0]), record.positions.shape
+    unit = unit_at(_free(problem), np.array([truth[n] for n in names]))
+    linear = linearise(Problem(model, (replace(record, values=clean),), names, truth), Here(), unit)
+    # residuals by the logarithms of the genes
+    slope = linear.sensitivities[0].reshape(-1, 3) / np.log([gene.upper / gene.lower for gene in _free(problem)])
+    pull, shape = np.linalg.pinv(slope), record.positions.shape
     fits = []
     for k in range(60):
         noise = _noise(shape, Tracking(beats=2), np.random.default_rng(1000 + k)).reshape(clean.shape)
@@ -186,7 +303,7 @@ def _free(problem: Problem) -> list[Gene]:
 def test_a_share_searched_alone_keeps_the_rest_of_its_group(small: tuple[Dataset, Genome]) -> None:
     """With three of four weights fixed, the share still has an error; and it is smaller than with all four free."""
     dataset, truth = small
-    model = model_for(dataset, "4")
+    model = wing_model(dataset, SPEC)
     alone = standing(Problem(model, dataset.recordings[1:2], ("L_1",), truth), Here())["L_1"]
     weights = ("L_1", "L_2", "L_3", "L_4")
     among = standing(Problem(model, dataset.recordings[1:2], weights, truth), Here())["L_1"]
@@ -208,7 +325,7 @@ def test_a_gene_whose_neighbours_fail_has_no_error_and_stops_nothing(small: tupl
             ]
             return Evaluation(tuple(parts))
 
-    model = model_for(dataset, "4")
+    model = wing_model(dataset, SPEC)
     known = standing(Problem(model, dataset.recordings[1:2], ("L_a", "L_b"), truth), Fragile())
     assert known["L_a"].standard_error == np.inf
     assert not known["L_a"].identifiable
@@ -299,16 +416,16 @@ def test_noise_estimate_scales_to_long_recordings() -> None:
 
 
 def nominal_values(dataset: Dataset) -> Mapping[str, float]:
-    return base_genome(model_for(dataset, "4")).as_dict()
+    return base_genome(wing_model(dataset, SPEC)).as_dict()
 
 
 def test_a_poor_fit_tells_no_gene_and_says_why(small: tuple[Dataset, Genome]) -> None:
     """Standard errors count on a misfit that is noise; with the nominal genome it is far more."""
     dataset, truth = small
-    poor = summarise(SPEC, dataset, Here(), nominal_values(dataset))
+    poor = judge(SPEC, dataset, Here(), nominal_values(dataset))
     assert not any(gene.identifiable for gene in poor.genes)
     assert any("times what tracking noise leaves" in remark for remark in poor.remarks)
-    good = summarise(SPEC, dataset, Here(), truth.as_dict())
+    good = judge(SPEC, dataset, Here(), truth.as_dict())
     assert good.remarks == ()
     assert any(gene.identifiable for gene in good.genes)
 
@@ -317,7 +434,7 @@ def test_a_gene_at_its_bound_is_not_told(small: tuple[Dataset, Genome]) -> None:
     from calibration.result import _at_bound
 
     dataset, _ = small
-    nominal = base_genome(model_for(dataset, "4"))
+    nominal = base_genome(wing_model(dataset, SPEC))
     gene = nominal.genes[0]
     assert not _at_bound(gene, nominal)
     assert _at_bound(gene, nominal.replace({gene.name: gene.lower}))

@@ -35,6 +35,10 @@ class Pendulum:
     def genes(self) -> tuple[Gene, ...]:
         return GENES
 
+    @property
+    def searched(self) -> tuple[str, ...]:
+        return tuple(gene.name for gene in GENES)
+
     def observe(self, genomes: Array, recording: Recording) -> Observation:
         batch = genome_batch(self.genes, genomes)
         if self.incident:

@@ -55,6 +55,12 @@ def test_filters_the_model_as_the_data() -> None:
         found = model.observe([values], filtered).channels[0]
         inside = slice(2500, 10000)
         assert found[inside] == pytest.approx(filtered.values[inside], abs=1e-7 * np.abs(raw.values).max())
+        assert not np.isnan(
+            low_passed(replace(raw, times=raw.times[:1400], values=raw.values[:1400]), LowPass(40.0)).values
+        ).any()
+        kept = np.isfinite(filtered.values[:, 0])  # also where the filter has just settled
+        assert 0.9 < kept.mean() < 0.98
+        assert found[kept] == pytest.approx(filtered.values[kept], abs=0.01 * np.abs(raw.values).max())
     assert np.ptp(found[:, 0]) < 0.97 * np.ptp(raw.values[:, 0])
 
 

@@ -1,0 +1,382 @@
+"""The quasi-steady model with clap-and-peel against a virtual balance whose coefficients are known.
+
+``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]`` measures; with ``--json`` the last line is one
+JSON object. ``--example FOLDER`` only writes the example campaign.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.estimators import estimators
+from benchmarks.machine import commit, cpu
+from calibration.evaluation import agreements, lacking
+from calibration.evaluator import Evaluator
+from calibration.force_result import Agreement, GlobalModel, LocalEstimate, Quantity
+from calibration.global_model import at, fit_global
+from calibration.likelihood import Estimate, estimate, iterate
+from calibration.problem import Problem, base_genome
+from records import LowPass, Recording
+from records.dataset import STANDARD_GRAVITY
+from sim.balance import DRAG, TRIALS, Balance, Trial, blank_recording, delfly, record, true_beat, write_campaign
+from sim.blade_element_wing import BladeElementWing
+from sim.blades.motion import motion_genes
+from sim.blades.terms import chosen
+from sim.filtering import low_passed
+from workers import make_evaluator
+
+Array = npt.NDArray[np.float64]
+
+COEFFICIENTS = ("C_l", "C_r", "C_F")
+CUTOFF, FINER_CUTOFF = 40.0, 67.0  # Hz (Armanini et al. 2016, 3.4)
+FINER_TRIAL = 3  # its number four, as in the source's Fig. 13
+INTERVAL = 1.6449  # standard errors to either side: 90 %
+REPETITIONS = 200
+DRAWS = 20  # campaigns for the luck of a seed
+CORNER_TOLERANCE = 1e-3  # relative
+SMALL = Balance(every=10, beats=40)  # for what is repeated many times
+# No residual shows an error that stays the same throughout a recording: the resonance's amplification, slow drift.
+TOLD_BY_RESIDUALS = replace(SMALL, participation=0.0, drift=0.0)
+LIFT_RMSE_PERCENT = (13, 13, 13, 15, 17, 18, 50, 32)  # the source's Table 7
+LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model fitted to one recording, and how it agrees."""
+
+    trial: Trial
+    recording: Recording
+    problem: Problem
+    estimate: Estimate
+    agreement: dict[Quantity, Agreement]
+    lacking: tuple[float, float] | None
+
+    @property
+    def errors(self) -> dict[str, float]:
+        """Relative error of each coefficient that the truth has, per cent."""
+        true = self.trial.coefficients
+        return {name: 100 * (value / true[name] - 1) for name, value in self.estimate.values.items() if name in true}
+
+    @property
+    def local(self) -> LocalEstimate:
+        """As the global model takes it."""
+        found, name = self.estimate, self.recording.name
+        bounds = dict(zip(found.free, np.sqrt(np.diag(found.covariance)).tolist(), strict=True))
+        return LocalEstimate(name, (name,), found.values, bounds, (), (), found.cost, True, ())
+
+
+def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
+    """Coefficients searched on X with the drag fixed, as in the source."""
+    drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
+    return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
+
+
+def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: Evaluator) -> Fitted:
+    """Estimate from the nominal coefficients, and judge."""
+    problem = problem_of(model, recording)
+    found = estimate(problem, evaluator, {})
+    best = replace(problem, base=problem.base.replace(found.values))
+    forces = model.observe([best.base.values], recording).channels[0]
+    agreement = {a.quantity: a for a in agreements(recording, forces, "local")}
+    return Fitted(trial, recording, best, found, agreement, lacking(best, evaluator))
+
+
+def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
+    """Percentage of starts, every corner of the box under every condition, that end at the estimate."""
+    good, total = 0, 0
+    for one in fitted:
+        problem = problem_of(model, one.recording)
+        genes = [gene for gene in model.genes if gene.name in problem.free]
+        for corner in itertools.product(*((gene.lower, gene.upper) for gene in genes)):
+            *_, last = iterate(problem, evaluator, dict(zip(problem.free, corner, strict=True)))
+            off = [abs(last.values[name] / value - 1) for name, value in one.estimate.values.items()]
+            good, total = good + (last.converged and max(off) < CORNER_TOLERANCE), total + 1
+    return 100 * good / total
+
+
+def coverage(
+    model: BladeElementWing, beats: list[Array], balance: Balance, repetitions: int, seed: int, evaluator: Evaluator
+) -> dict[str, float]:
+    """Percentage of 90 % intervals that hold the truth, by coefficient; each repetition has noise of its own."""
+    held = dict.fromkeys(COEFFICIENTS, 0)
+    for k in range(repetitions):
+        trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
+        raw = record(beat, trial, balance, np.random.default_rng([seed, 4, k]))
+        found = estimate(problem_of(model, low_passed(raw, LowPass(CUTOFF))), evaluator, {})
+        for name, error in zip(found.free, np.sqrt(np.diag(found.covariance)), strict=True):
+            held[name] += bool(abs(found.values[name] - trial.coefficients[name]) <= INTERVAL * error)
+    return {name: 100 * count / repetitions for name, count in held.items()}
+
+
+def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
+    """Largest error of a coefficient under any condition, per cent, in other campaigns: median and most."""
+    largest = []
+    for draw in range(DRAWS):
+        errors = []
+        for k, (trial, beat) in enumerate(zip(TRIALS, beats, strict=True)):
+            raw = record(beat, trial, replace(Balance(), every=10), np.random.default_rng([seed, 6, draw, k]))
+            *_, last = iterate(problem_of(model, low_passed(raw, LowPass(CUTOFF))), evaluator, {})
+            errors += [100 * abs(last.values[name] / true - 1) for name, true in trial.coefficients.items()]
+        largest.append(max(errors))
+    return {"median": float(np.median(largest)), "most": max(largest)}
+
+
+def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float]:
+    """Largest error of a coefficient under any condition, per cent, from what stays the same in a whole recording."""
+    still = Balance(every=10, beats=10, sensor=0.0, participation=0.0, rattle=0.0, drift=0.0, scatter=0.0, timing=0.0)
+    largest = dict.fromkeys(
+        ("finer_truth", "resonance", "zero_off_by_1_mn", "phase_off_by_a_thousandth_of_a_beat"), 0.0
+    )
+    for trial in TRIALS:
+        rng, beat = np.random.default_rng(0), true_beat(model.vehicle, trial)
+        plain = record(beat, trial, still, rng)
+        shift = 0.001 / trial.condition.flap_frequency
+        spoilt = (
+            plain,
+            record(beat, trial, replace(still, participation=Balance().participation), rng),
+            replace(plain, values=plain.values + 1e-3),
+            replace(plain, times=plain.times + shift),
+        )
+        for name, raw in zip(largest, spoilt, strict=True):
+            problem = problem_of(model, low_passed(raw, LowPass(CUTOFF)))
+            *_, last = iterate(problem, evaluator, {})
+            errors = [abs(last.values[n] / true - 1) for n, true in trial.coefficients.items()]
+            largest[name] = max(largest[name], 100 * max(errors))
+    return largest
+
+
+def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> float:
+    """Processor time of one individual with a wing motion of its own, in a batch; the best of some rounds."""
+    rng, best = np.random.default_rng(0), np.inf
+    nominal = np.array([gene.nominal for gene in model.genes])
+    width = np.array([gene.upper - gene.lower for gene in model.genes])
+    names = {gene.name for gene in motion_genes(model.vehicle.motion)}
+    inside = np.array([gene.name in names for gene in model.genes])
+    blank = blank_recording(TRIALS[FINER_TRIAL].condition)
+    for _ in range(rounds):
+        genomes = nominal + 0.1 * width * rng.uniform(-1, 1, (batch, len(nominal))) * inside
+        start = time.process_time()
+        model.observe(genomes, blank)
+        best = min(best, time.process_time() - start)
+    return 1e3 * best / batch
+
+
+def global_errors(law: GlobalModel) -> dict[str, float]:
+    """Largest relative difference from a local estimate, per cent, by coefficient."""
+    return {gene.name: 100 * gene.largest_error for gene in law.genes}
+
+
+def lift_by_law(fitted: list[Fitted], law: GlobalModel) -> float:
+    """Mean over the conditions of the lift's RMS difference with the global model, per cent."""
+    found = []
+    for one in fitted:
+        genome = one.problem.base.replace(at(law, one.trial.condition).values)
+        forces = one.problem.model.observe(np.array([genome.values]), one.recording).channels[0]
+        found += [a.rmse_percent for a in agreements(one.recording, forces, "global") if a.quantity == "lift"]
+    return float(np.mean(found))
+
+
+def mean_lift(fitted: list[Fitted]) -> tuple[float, float]:
+    """Mean over the conditions of the lift's correlation and RMS difference in per cent."""
+    lift = [one.agreement["lift"] for one in fitted]
+    return float(np.mean([a.correlation for a in lift])), float(np.mean([a.rmse_percent for a in lift]))
+
+
+def tables_law() -> GlobalModel:
+    """Eq. 23 by plain least squares on the source's own Table 8."""
+    local = [
+        LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(COEFFICIENTS, 0.0), (), (), 0.0, True, ())
+        for t in TRIALS
+    ]
+    return fit_global(local, [trial.condition for trial in TRIALS], weighted=False)
+
+
+def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
+    """From the earliest beginning to the latest end; None where one of them is not located."""
+    known = [one for one in ranges if one is not None]
+    return [min(r[0] for r in known), max(r[1] for r in known)] if len(known) == len(ranges) else None
+
+
+def fits(
+    seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
+) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
+    """Every model on every condition at CUTOFF, and on one of them at FINER_CUTOFF."""
+    vehicle = delfly()
+    found: dict[str, list[Fitted]] = {name: [] for name in models}
+    finer: dict[str, Fitted] = {}
+    for k, trial in enumerate(TRIALS):
+        raw = record(true_beat(vehicle, trial), trial, Balance(), np.random.default_rng([seed, 3, k]))
+        coarse = low_passed(raw, LowPass(CUTOFF))
+        for name, model in models.items():
+            found[name].append(fit(model, coarse, trial, evaluator))
+            if k == FINER_TRIAL:
+                finer[name] = fit(model, low_passed(raw, LowPass(FINER_CUTOFF)), trial, evaluator)
+    return found, finer
+
+
+def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
+    """How well coefficients come back, where the poorer models fail, and how well the lift is met."""
+    figures: dict[str, Any] = {
+        "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
+        "misfit_tstar_range": widest([one.lacking for one in fitted["without_fling"]]),
+        "misfit_tstar_range_berman_wang": widest([one.lacking for one in fitted["berman_wang"]]),
+        "misfit_located_with_fling": sum(one.lacking is not None for one in fitted["proposed"]),
+    }
+    for name, suffix in (("proposed", ""), ("without_fling", "_without_fling"), ("berman_wang", "_berman_wang")):
+        figures[f"lift_correlation{suffix}"], figures[f"lift_rmse_percent{suffix}"] = mean_lift(fitted[name])
+    figures["at_67_hz"] = {
+        name: {
+            "lift_correlation": one.agreement["lift"].correlation,
+            "lift_rmse_percent": one.agreement["lift"].rmse_percent,
+            "coefficients": one.estimate.values,
+            "misfit_tstar_range": one.lacking,
+        }
+        for name, one in finer.items()
+    }
+    return figures
+
+
+def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
+    """The global model: how far it is from the local estimates, weighted, plain, and on the printed table."""
+    local, conditions = [one.local for one in fitted], [one.trial.condition for one in fitted]
+    law, plain = fit_global(local, conditions), fit_global(local, conditions, weighted=False)
+    return {
+        "global_error_percent": max(global_errors(law).values()),
+        "global_error_percent_by_coefficient": global_errors(law),
+        "global_error_percent_plain": global_errors(plain),
+        "global_error_percent_of_printed_table": global_errors(tables_law()),
+        "global_left_out_error_percent": {
+            gene.name: None if gene.left_out_error is None else 100 * gene.left_out_error for gene in law.genes
+        },
+        "lift_rmse_percent_global": lift_by_law(fitted, law),
+    }
+
+
+def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evaluator: Evaluator) -> dict[str, Any]:
+    """What is repeated many times: intervals, with and without systematic errors, and starts from corners."""
+    beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
+    covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
+    begun = [
+        fit(
+            model,
+            low_passed(record(beat, trial, SMALL, np.random.default_rng([seed, 5])), LowPass(CUTOFF)),
+            trial,
+            evaluator,
+        )
+        for trial, beat in zip(TRIALS, beats, strict=True)
+    ]
+    return {
+        "interval_coverage_percent": float(np.mean(list(covered.values()))),
+        "interval_coverage_percent_by_coefficient": covered,
+        "interval_coverage_percent_with_systematic_errors": coverage(model, beats, SMALL, repetitions, seed, evaluator),
+        "converged_from_corners_percent": corners(model, begun, evaluator),
+        "coefficient_error_percent_of_other_draws": luck(model, beats, seed, evaluator),
+        "systematic_error_percent": systematic(model, evaluator),
+    }
+
+
+def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
+    """One row per condition: coefficients beside Table 8, lift beside Table 7, drag, and where the fling is missed."""
+    return [
+        {
+            "condition": one.trial.name,
+            "true": one.trial.coefficients,
+            "found": one.estimate.values,
+            "error_percent": one.errors,
+            "standard_error_percent": {
+                n: 100 * e / abs(one.estimate.values[n]) for n, e in one.local.standard_errors.items()
+            },
+            "lift_rmse_n": one.agreement["lift"].rmse,
+            "lift_rmse_percent": one.agreement["lift"].rmse_percent,
+            "lift_correlation": one.agreement["lift"].correlation,
+            "drag_correlation": one.agreement["drag"].correlation,
+            "mean_lift_n": one.agreement["lift"].mean_recorded,
+            "weight_n": STANDARD_GRAVITY * one.trial.mass,
+            "without_fling": {
+                "found": poorer.estimate.values,
+                "lift_rmse_n": poorer.agreement["lift"].rmse,
+                "lift_rmse_percent": poorer.agreement["lift"].rmse_percent,
+                "lift_correlation": poorer.agreement["lift"].correlation,
+                "mean_lift_modelled_n": poorer.agreement["lift"].mean_modelled,
+                "misfit_tstar_range": poorer.lacking,
+            },
+        }
+        for one, poorer in zip(fitted["proposed"], fitted["without_fling"], strict=True)
+    ]
+
+
+def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]:
+    """All figures but the estimators'."""
+    start, vehicle = time.perf_counter(), delfly()
+    models = {
+        "proposed": BladeElementWing(vehicle),
+        "without_fling": BladeElementWing(vehicle, chosen("proposed", ("clap_and_peel",))),
+        "berman_wang": BladeElementWing(vehicle, chosen("berman_wang")),
+    }
+    fitted, finer = fits(seed, models, evaluator)
+    figures = agreement_figures(fitted, finer) | global_figures(fitted["proposed"])
+    figures |= repeated_figures(models["proposed"], repetitions, seed, evaluator)
+    figures |= {"ms_per_individual": milliseconds(models["proposed"]), "conditions": rows(fitted)}
+    return figures | {"seed": seed, "seconds": time.perf_counter() - start, "cpu": cpu(), "commit": commit()}
+
+
+def table(conditions: list[dict[str, Any]]) -> str:
+    """Human-readable rows; in brackets the source's own figures, on its own measurements."""
+    head = (
+        "condition  C_l found (true)   C_r found (true)   C_F found (true)   lift: RMSE %    correlation   "
+        "without fling: RMSE %  correlation  misfit at t*"
+    )
+    lines = [head]
+    for k, row in enumerate(conditions):
+        coefficients = "   ".join(f"{row['found'][n]:6.3f} ({row['true'][n]:.2f})  " for n in COEFFICIENTS)
+        poorer = row["without_fling"]
+        place = poorer["misfit_tstar_range"]
+        where = "none" if place is None else f"{place[0]:.2f} to {place[1]:.2f}"
+        lines.append(
+            f"{row['condition']:9}  {coefficients}  {row['lift_rmse_percent']:5.1f} ({LIFT_RMSE_PERCENT[k]})     "
+            f"{row['lift_correlation']:.3f} ({LIFT_CORRELATION[k]:.2f})  {poorer['lift_rmse_percent']:12.1f}  "
+            f"{poorer['lift_correlation']:18.3f}      {where}"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.delfly", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
+    parser.add_argument("--no-estimators", action="store_true", help="leave out the comparison of search methods")
+    parser.add_argument("--repetitions", type=int, default=REPETITIONS, help="noise draws for the intervals")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--example", type=Path, help="only write the example campaign to this folder")
+    arguments = parser.parse_args()
+    if arguments.example:
+        print(f"truth: {write_campaign(arguments.example, arguments.seed)}")
+        return
+    evaluator = make_evaluator("in_process")
+    try:
+        figures = measure(arguments.seed, arguments.repetitions, evaluator)
+    finally:
+        evaluator.close()
+    if not arguments.no_estimators:
+        figures["estimators"] = estimators()
+    print(table(figures["conditions"]))
+    for key, value in figures.items():
+        if key != "conditions":
+            print(f"{key}: {value}")
+    if arguments.json:
+        print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()

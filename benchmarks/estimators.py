@@ -1,0 +1,155 @@
+"""Ways of finding the genome, on the example wing: what each costs until it has as good as the best misfit.
+
+``python -m benchmarks.estimators [--json] [--evaluator KIND] [--starts N]``. All genes at once on all fitted
+recordings of examples/robird, 11 bodies. The floor is the best misfit (thesis Eq. 14) that any of them reaches.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.machine import commit, cpu
+from calibration.evaluator import Evaluator
+from calibration.likelihood import iterate
+from calibration.linearised import free_genes, values_at
+from calibration.problem import Problem, base_genome
+from calibration.search import CalibrationSpec, calibrate, model_for, plan
+from records import Dataset, load_dataset
+from workers import make_evaluator
+from workers.factory import EvaluatorKind
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
+AS_GOOD = 1.01  # of the floor
+SPEC = CalibrationSpec(division="11", mode="joint")
+SEARCHES = {
+    "genetic": replace(SPEC, method="genetic"),
+    "CMA-ES": replace(SPEC, method="cma_es", population=16, stall=40, max_generations=150),
+    "genetic, 5 generations, then Gauss-Newton": replace(SPEC, method="genetic", max_generations=5, finish=True),
+    "Gauss-Newton from the estimates": replace(SPEC, method="gauss_newton"),
+}
+
+
+@dataclass(frozen=True)
+class Point:
+    """State of a search: individuals evaluated, seconds, sum of squares of the best so far (m^2)."""
+
+    evaluations: int
+    seconds: float
+    squares: float
+
+
+def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
+    """Follow a search that yields individuals evaluated so far and its sum of squares."""
+    start, points, best = time.perf_counter(), list[Point](), np.inf
+    for evaluations, squares in states:
+        best = min(best, squares)
+        points.append(Point(evaluations, time.perf_counter() - start, best))
+        print(f"\r{label}: {evaluations} evaluations, {best:.6g} m2   ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return points
+
+
+def from_random(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, seed: int
+) -> Iterable[tuple[int, float]]:
+    """Gauss-Newton from a start drawn evenly from the whole box (in unit coordinates)."""
+    (stage,), model = plan(spec, dataset), model_for(dataset, spec)
+    problem = Problem(model, stage.recordings, stage.free, base_genome(model))
+    genes = free_genes(problem)
+    unit = np.random.default_rng([seed, 3]).uniform(size=(1, len(genes)))
+    start = dict(zip(problem.free, values_at(genes, unit)[0].tolist(), strict=True))
+    evaluations = 0
+    for step in iterate(problem, evaluator, start):
+        evaluations += step.evaluations
+        yield evaluations, step.fitness
+
+
+def reached(points: list[Point], floor: float) -> Point | None:
+    """The first state as good as the floor, to AS_GOOD; None when there was none."""
+    return next((point for point in points if point.squares <= AS_GOOD * floor), None)
+
+
+def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
+    """Cost until as good as the floor (None: never), and the end."""
+    first = reached(points, floor)
+    return {
+        "method": method,
+        "evaluations": None if first is None else first.evaluations,
+        "seconds": None if first is None else round(first.seconds, 1),
+        "misfit_over_floor": round(points[-1].squares / floor, 4),
+        "evaluations_in_all": points[-1].evaluations,
+        "seconds_in_all": round(points[-1].seconds, 1),
+    }
+
+
+def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1) -> list[dict[str, Any]]:
+    """One row for each way; that of the random starts is their median, with how many reached the floor."""
+    dataset, evaluator = load_dataset(EXAMPLE), make_evaluator(kind)
+    try:
+        _warm(dataset, evaluator)
+        traces = {
+            name: trace(
+                name, ((g.evaluations, g.best) for g in calibrate(replace(spec, seed=seed), dataset, evaluator))
+            )
+            for name, spec in SEARCHES.items()
+        }
+        drawn = [_started(dataset, evaluator, seed + k) for k in range(starts)]
+    finally:
+        evaluator.close()
+    floor = min(points[-1].squares for points in (*traces.values(), *(d for d in drawn if d)))
+    rows = [row(name, points, floor) for name, points in traces.items()]
+    return [*rows, _random_row(drawn, floor)] if starts else rows
+
+
+def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
+    """Compile the kernels and build the wing before any clock runs."""
+    (stage,), model = plan(SPEC, dataset), model_for(dataset, SPEC)
+    problem = Problem(model, stage.recordings, stage.free, base_genome(model))
+    genes = free_genes(problem)
+    evaluator.evaluate(problem, np.tile([gene.nominal for gene in genes], (16, 1)))
+
+
+def _started(dataset: Dataset, evaluator: Evaluator, seed: int) -> list[Point]:
+    """Trace from a random start; empty where the start cannot be simulated."""
+    try:
+        return trace(f"Gauss-Newton from random start {seed}", from_random(SPEC, dataset, evaluator, seed))
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return []
+
+
+def _random_row(drawn: list[list[Point]], floor: float) -> dict[str, Any]:
+    good = [points for points in drawn if points and reached(points, floor)]
+    middle = sorted(good, key=lambda points: points[-1].evaluations)[len(good) // 2] if good else None
+    name = f"Gauss-Newton from random starts ({len(good)} of {len(drawn)} reach the floor; the median of those)"
+    empty = {"evaluations": None, "seconds": None, "misfit_over_floor": None}
+    found = row(name, middle, floor) if middle else {"method": name, **empty}
+    return found | {"starts": len(drawn), "starts_that_reach_the_floor": len(good)}
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.estimators", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print only the JSON object")
+    parser.add_argument("--evaluator", choices=("in_process", "processes", "ray"), default="processes")
+    parser.add_argument("--starts", type=int, default=4, help="random starts of Gauss-Newton")
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    rows = estimators(arguments.evaluator, arguments.starts, arguments.seed)
+    if not arguments.json:
+        for each in rows:
+            print(" | ".join(f"{key}: {value}" for key, value in each.items()))
+    print(json.dumps({"estimators": rows, "seed": arguments.seed, "cpu": cpu(), "commit": commit()}))
+
+
+if __name__ == "__main__":
+    main()

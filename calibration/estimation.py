@@ -1,0 +1,282 @@
+"""What comes out of a calibration on forces: estimates with their errors, a global model, agreements, predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluation import POINTS, agreements, comparison, quantities
+from calibration.evaluator import Evaluator
+from calibration.force_result import (
+    Agreement,
+    ForceComparison,
+    ForceResult,
+    GlobalModel,
+    LocalEstimate,
+    Quantity,
+    Source,
+)
+from calibration.global_model import GlobalValues, at, average, fit_global
+from calibration.likelihood import STEP, at_bounds, iterate
+from calibration.linearised import free_genes
+from calibration.plan import Stage, plan, prepared
+from calibration.problem import Problem, base_genome, compared
+from calibration.result import GeneResult
+from calibration.search import found as found_by_stage
+from calibration.spec import CalibrationSpec, resolved, vehicle_model
+from calibration.uncertainty import Uncertainty, uncertainty
+from records import Condition, Dataset, Genome, Recording
+from sim.blade_element_wing import BladeElementWing
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Forces that a model predicts for a condition, over one beat and unfiltered.
+
+    ``phase`` [n] is t*; ``forces`` [n] in N per quantity; ``values`` the coefficients that follow from the condition;
+    ``remarks`` say where it extrapolates.
+    """
+
+    phase: Array
+    forces: Mapping[Quantity, Array]
+    values: Mapping[str, float]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A stage, what is known about the genome it found, and the estimate made of that."""
+
+    stage: Stage
+    genome: Genome
+    known: Uncertainty
+    estimate: LocalEstimate
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """One recording beside models: agreements, and the RMS difference (N) of the fitted axes by source."""
+
+    recording: Recording
+    agreements: tuple[Agreement, ...]
+    rms: Mapping[Source, float]
+    samples: int
+
+
+def summarise_forces(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+) -> ForceResult:
+    """Judge what a calibration found on every recording of the dataset, the held-out ones too.
+
+    ``checkpoint`` is the last generation's. The global model is one of local estimates; a recording that was not fitted
+    is predicted by it or, without it, by the joint estimate or the average of the local ones.
+    """
+    spec = resolved(spec, dataset)
+    model, best = vehicle_model(dataset, spec), found_by_stage(spec, dataset, checkpoint)
+    judged = [
+        _judge(stage, model, base_genome(model, best[stage.name]), spec, evaluator)
+        for stage in plan(spec, dataset)
+        if stage.name in best
+    ]
+    law, remarks = _global(spec, dataset, [one.estimate for one in judged])
+    nominal = base_genome(model, spec.fixed)
+    everywhere = []
+    for recording in dataset.recordings:
+        genomes, warnings = _sources(spec, nominal, judged, law, recording)
+        everywhere.append(_compare(model, prepared(spec, recording), genomes, spec.axes))
+        remarks = (*remarks, *warnings)
+    names = {name for one in judged for name in one.estimate.recordings}
+    fitted = [one for one in everywhere if one.recording.name in names]
+    held_out = [one for one in everywhere if one.recording.name in dataset.held_out]
+    return ForceResult(
+        genes=_genes(model, nominal, judged),
+        estimates=tuple(one.estimate for one in judged),
+        global_model=law,
+        agreements=tuple(agreement for one in everywhere for agreement in one.agreements),
+        left_out=_left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else (),
+        held_out=dataset.held_out,
+        before=_mean_rms(fitted, ("nominal",)),
+        after=_mean_rms(fitted, ("local", "joint")),
+        held_out_before=_mean_rms(held_out, ("nominal",)) if held_out else None,
+        held_out_after=_mean_rms(held_out, ("global", "joint", "average")) if held_out else None,
+        remarks=remarks,
+    )
+
+
+def compare_forces(
+    spec: CalibrationSpec, dataset: Dataset, recording: str, source: Source, genome: Mapping[str, float]
+) -> ForceComparison:
+    """Forces of ``genome`` (full, by name) over a recording, low-passed as in the calibration."""
+    spec = resolved(spec, dataset)
+    model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+    return comparison(record, _observed(model, record, [base_genome(model, genome)])[0], source)
+
+
+def predict(
+    spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
+) -> Prediction:
+    """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it."""
+    spec = resolved(spec, dataset)
+    model, law_values = vehicle_model(dataset, spec), at(law, condition)
+    values, remarks = _held(model, law_values)
+    times = np.arange(points) / (points * condition.flap_frequency)
+    blank = Recording(
+        "prediction", "wind_tunnel", condition, times, (), np.full((points, 2), np.nan), forces=("x", "z")
+    )
+    forces = _observed(model, blank, [base_genome(model, spec.fixed).replace(values)])[0]
+    phase = np.arange(points) / points
+    return Prediction(phase, quantities(blank, forces), values, remarks)
+
+
+def _held(model: BladeElementWing, found: GlobalValues) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Coefficients within their genes' boxes, and remarks on those that the law takes out of them."""
+    values, remarks = dict(found.values), list(found.remarks)
+    for gene in model.genes:
+        if gene.name in values and not gene.lower <= values[gene.name] <= gene.upper:
+            held = min(max(values[gene.name], gene.lower), gene.upper)
+            remarks.append(
+                f"the global model gives {gene.name} = {values[gene.name]:.4g} here, outside [{gene.lower:g}, "
+                f"{gene.upper:g}]; {held:g} is taken: the condition is too far from those fitted to be believed"
+            )
+            values[gene.name] = held
+    return values, tuple(remarks)
+
+
+def _observed(model: BladeElementWing, recording: Recording, genomes: list[Genome]) -> Array:
+    """Forces [B, T, C] of ``genomes``; ValueError when one of them fails."""
+    observed = model.observe([genome.values for genome in genomes], recording)
+    for reason in observed.reasons:
+        if reason is not None:
+            raise ValueError(f"the forces under {recording.name!r} cannot be computed: {reason}")
+    return observed.channels
+
+
+def _judge(
+    stage: Stage, model: BladeElementWing, genome: Genome, spec: CalibrationSpec, evaluator: Evaluator
+) -> _Judged:
+    problem = Problem(model, stage.recordings, stage.free, genome, spec.axes)
+    known = uncertainty(problem, evaluator)
+    values = {name: genome[name] for name in stage.free}
+    last = next(iterate(problem, evaluator, values))
+    estimate = LocalEstimate(
+        name=stage.name,
+        recordings=tuple(recording.name for recording in stage.recordings),
+        values=values,
+        standard_errors=known.standard_errors,
+        correlation=tuple(tuple(row) for row in known.correlation.tolist()),
+        noise=tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in known.noise),
+        cost=known.cost,
+        converged=last.step <= STEP,
+        remarks=(*at_bounds(free_genes(problem), values), *known.remarks),
+    )
+    return _Judged(stage, genome, known, estimate)
+
+
+def _global(
+    spec: CalibrationSpec, dataset: Dataset, estimates: list[LocalEstimate]
+) -> tuple[GlobalModel | None, tuple[str, ...]]:
+    """Eq. 23 on local estimates; without one, why."""
+    if spec.mode != "local":
+        return None, ()
+    try:
+        law = fit_global(estimates, [dataset.recording(e.recordings[0]).condition for e in estimates])
+    except ValueError as error:
+        return None, (f"no global model: {error}",)
+    return law, law.remarks
+
+
+def _sources(
+    spec: CalibrationSpec, nominal: Genome, judged: list[_Judged], law: GlobalModel | None, recording: Recording
+) -> tuple[dict[Source, Genome], tuple[str, ...]]:
+    """Genomes to compare with ``recording``, and warnings about them."""
+    found: dict[Source, Genome] = {"nominal": nominal}
+    warnings: tuple[str, ...] = ()
+    for one in judged:
+        if spec.mode != "local":
+            found["joint"] = one.genome
+        elif recording.name in one.estimate.recordings:
+            found["local"] = one.genome
+    if law is not None:
+        genome, warnings = _by_law(nominal, law, recording)
+        found |= {"global": genome} if genome else {}
+    if spec.mode == "local":
+        found["average"] = nominal.replace(average([one.estimate for one in judged]))
+    return found, warnings
+
+
+def _by_law(nominal: Genome, law: GlobalModel, recording: Recording) -> tuple[Genome | None, tuple[str, ...]]:
+    """Genome that the law gives under the recording's condition, None where it leaves the box; remarks on both."""
+    found = at(law, recording.condition)
+    warnings = tuple(f"recording {recording.name!r}: {remark}" for remark in found.remarks)
+    try:
+        return nominal.replace(found.values), warnings
+    except ValueError as error:
+        return None, (*warnings, f"recording {recording.name!r}: the global model cannot be used there: {error}")
+
+
+def _compare(
+    model: BladeElementWing, recording: Recording, genomes: dict[Source, Genome], axes: tuple[str, ...]
+) -> _Compared:
+    forces = dict(zip(genomes, _observed(model, recording, list(genomes.values())), strict=True))
+    fitted = compared(recording, axes)
+    rms: dict[Source, float] = {
+        source: float(np.sqrt(np.mean((found - recording.values)[fitted] ** 2))) for source, found in forces.items()
+    }
+    found = tuple(a for source, modelled in forces.items() for a in agreements(recording, modelled, source))
+    return _Compared(recording, found, rms, int(fitted.sum()))
+
+
+def _mean_rms(some: list[_Compared], order: tuple[Source, ...]) -> float:
+    """Mean over recordings, weighted by samples, of the RMS difference of the first source in ``order`` they have."""
+    rms = [next((one.rms[source] for source in order if source in one.rms), np.nan) for one in some]
+    return float(np.average(rms, weights=[one.samples for one in some]))
+
+
+def _left_out(
+    model: BladeElementWing,
+    spec: CalibrationSpec,
+    dataset: Dataset,
+    nominal: Genome,
+    estimates: list[LocalEstimate],
+) -> tuple[Agreement, ...]:
+    """Agreements with each fitted recording of the law fitted without it; none where the rest is too little."""
+    found: list[Agreement] = []
+    for one in estimates:
+        law, _ = _global(spec, dataset, [other for other in estimates if other is not one])
+        if law is None:
+            continue
+        recording = prepared(spec, dataset.recording(one.recordings[0]))
+        genome, _ = _by_law(nominal, law, recording)
+        if genome is not None:
+            found += agreements(recording, _observed(model, recording, [genome])[0], "global")
+    return tuple(found)
+
+
+def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged]) -> tuple[GeneResult, ...]:
+    """Genes with the mean of the estimates, the largest of their relative errors, and whether all can tell them."""
+    best = nominal.replace(average([one.estimate for one in judged]))
+    results = []
+    for gene in model.genes:
+        standings = [one.known.standing[gene.name] for one in judged if gene.name in one.known.standing]
+        free = [0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged]
+        results.append(
+            GeneResult(
+                gene.name,
+                gene.unit,
+                gene.description,
+                nominal[gene.name],
+                best[gene.name],
+                gene.lower,
+                gene.upper,
+                bool(standings),
+                max(s.standard_error for s in standings) if standings else None,
+                all(s.identifiable for s in standings) and all(free) if standings else None,
+            )
+        )
+    return tuple(results)

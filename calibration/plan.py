@@ -1,0 +1,106 @@
+"""The stages of a calibration: which genes are free on which recordings, and what is refused before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from calibration.problem import base_genome, compared
+from calibration.spec import CalibrationSpec, model_for, resolved
+from records import Dataset, LowPass, Recording
+from sim.alignment import recorded_crossing
+from sim.filtering import default_cutoff, low_passed
+from sim.wing_genes import group
+
+VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One search: which genes are free, on which recordings (forces: low-passed already)."""
+
+    name: str
+    free: tuple[str, ...]
+    recordings: tuple[Recording, ...]
+
+
+def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
+    """The stages of a calibration; ValueError when the spec does not fit the dataset."""
+    spec = resolved(spec, dataset)
+    model = model_for(dataset, spec)
+    known = [gene.name for gene in model.genes]
+    _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
+    base_genome(model, spec.fixed)
+    recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
+    if not recordings:
+        raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
+    for recording in recordings:
+        if recording.name in dataset.held_out:
+            raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
+    _refuse_repeated("recording", spec.recordings)
+    for recording in dataset.recordings:  # all of them are judged in the end
+        _refuse_unusable(spec, dataset, recording)
+    wanted = spec.genes or model.searched
+    free = tuple(name for name in known if name in wanted and name not in spec.fixed)
+    if not free:
+        raise ValueError("nothing to calibrate: every gene is fixed, or the model has none that is searched by itself")
+    recordings = tuple(prepared(spec, recording) for recording in recordings)
+    if spec.mode == "joint":
+        return (Stage("joint", free, recordings),)
+    if spec.mode == "local":
+        return tuple(Stage(recording.name, free, (recording,)) for recording in recordings)
+    return _staged(free, recordings)
+
+
+def prepared(spec: CalibrationSpec, recording: Recording) -> Recording:
+    """``recording`` as it is fitted: forces low-passed, unless they have been or are not to be."""
+    if recording.kind == "tracks" or spec.low_pass == 0 or recording.low_pass is not None:
+        return recording
+    return low_passed(recording, LowPass(spec.low_pass or default_cutoff(recording.condition.flap_frequency)))
+
+
+def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
+    """Vacuum recordings fit the structure, the others then the aerodynamics (thesis Fig. 2)."""
+    vacuum = tuple(r for r in recordings if r.condition.airspeed == 0 and r.condition.pressure <= VACUUM_LIMIT)
+    air = tuple(r for r in recordings if r not in vacuum)
+    structural = tuple(name for name in free if group(name) == "structure")
+    aerodynamic = tuple(name for name in free if group(name) == "aerodynamics")
+    if (structural and not vacuum) or (aerodynamic and not air):
+        lacking, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
+        raise ValueError(
+            f"a staged calibration fits the {which} genes on recordings in {lacking}, and there is none "
+            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or name other genes"
+        )
+    stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
+    return tuple(stage for stage in stages if stage.free)
+
+
+def _refuse_unknown(what: str, names: Iterable[str], known: list[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"unknown {what} {name!r}; there are {', '.join(known)}")
+
+
+def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{what} {name!r} is named {names.count(name)} times; name it once")
+
+
+def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recording) -> None:
+    if dataset.kind == "forces":
+        if not compared(recording, spec.axes).any():
+            raise ValueError(
+                f"recording {recording.name!r} has no instant with all of the fitted force axes "
+                f"({', '.join(spec.axes)}); there is nothing to compare: leave the recording out of the dataset"
+            )
+        prepared(spec, recording)
+        return
+    if not np.isfinite(recording.positions).all(axis=2).any():
+        raise ValueError(
+            f"recording {recording.name!r} has no marker with all of x, y and z in any frame; "
+            "there is nothing to compare: leave the recording out of the dataset"
+        )
+    recorded_crossing(dataset.wing, recording)

@@ -1,0 +1,105 @@
+"""What a user asks of a calibration, and the model that it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from records import Dataset
+from sim.blade_element_wing import BladeElementWing
+from sim.blades.terms import chosen
+from sim.flexible_wing import FlexibleWing
+from sim.numerics import ACCURACY, Numerics
+
+Mode = Literal["staged", "joint", "local"]
+Method = Literal["genetic", "cma_es", "gauss_newton"]
+
+
+@dataclass(frozen=True)
+class CalibrationSpec:
+    """What to calibrate and how; defaults are the thesis's (IV-E) for a wing, those of Armanini et al. for a vehicle.
+
+    Attributes:
+        division: preset ("4", "11", "24") or strips as "3,3,3,2" (bodies along the chord of each strip, root first).
+        mode: "staged" (wings) fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint"
+            fits all on all; "local" (vehicles) fits each recording by itself. None: staged for a wing, local for a
+            vehicle.
+        population: individuals per generation.
+        stall: generations without improvement of the best fitness after which a search ends.
+        tolerance: relative improvement that counts as one.
+        max_generations: per stage; of Gauss-Newton, iterations.
+        seed: the same seed gives the same numbers, bit for bit.
+        bounds_factor: the box is [estimate / factor, estimate * factor]; for wings only.
+        accuracy: largest error (m) of any simulated marker at any instant (:class:`sim.numerics.Numerics`).
+        recordings: names to fit; empty means all that are not held out.
+        genes: names to search; empty means those that the model searches by itself.
+        fixed: values of genes that keep them instead of their estimates.
+        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle.
+        finish: whether Gauss-Newton follows each stage's search.
+        preset: blade-element model (:data:`sim.blades.terms.PRESETS`); for vehicles only.
+        without: names of its terms that are left out.
+        axes: force axes that are fitted.
+        low_pass: cut-off in Hz through which forces go before they are fitted. None: 3.2 times the flap frequency, the
+            seed's 40 Hz at 12.5 Hz; 0: none. Recordings that say that they have been filtered stay as they are.
+        peel_width: beats over which the end of the peel is smoothed.
+    """
+
+    division: str = "11"
+    mode: Mode | None = None
+    population: int = 50
+    stall: int = 10
+    tolerance: float = 1e-3
+    max_generations: int = 200
+    seed: int = 1
+    bounds_factor: float = 5.0
+    accuracy: float = ACCURACY
+    recordings: tuple[str, ...] = ()
+    genes: tuple[str, ...] = ()
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    method: Method | None = None
+    finish: bool = False
+    preset: str = "proposed"
+    without: tuple[str, ...] = ()
+    axes: tuple[str, ...] = ("x",)
+    low_pass: float | None = None
+    peel_width: float = 0.0
+
+
+def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
+    """``spec`` with mode and method decided; ValueError for one that there is not, or not for this dataset."""
+    wing = dataset.kind == "tracks"
+    mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
+    for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):
+        if value not in known:
+            raise ValueError(f"unknown {what} {value!r}; there are {', '.join(known)}")
+    if mode == "staged" and not wing:
+        raise ValueError(
+            "mode 'staged' separates a wing's structure from its aerodynamics, and this dataset describes a vehicle; "
+            "use 'local' (each recording by itself) or 'joint' (all together)"
+        )
+    if mode == "local" and wing:
+        raise ValueError(
+            "mode 'local' fits each recording by itself, and a wing has one genome for all of them; "
+            "use 'staged' or 'joint', and name a single recording to fit that alone"
+        )
+    return replace(spec, mode=mode, method=method)
+
+
+def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
+    """The model of a dataset of a wing, solved to ``spec.accuracy``; ValueError when wing or division is not one."""
+    model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, Numerics(accuracy=spec.accuracy))
+    _ = model.structure, model.genes
+    return model
+
+
+def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:
+    """The model of a dataset of a vehicle; ValueError for a term that there is not."""
+    model = BladeElementWing(dataset.vehicle, chosen(spec.preset, spec.without), peel_width=spec.peel_width)
+    _ = model.genes
+    return model
+
+
+def model_for(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing | BladeElementWing:
+    """The model that a dataset asks for."""
+    return wing_model(dataset, spec) if dataset.kind == "tracks" else vehicle_model(dataset, spec)

@@ -1,0 +1,191 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calibration.evaluation import agreements, comparison, lacking, located, quantities, spectrum, whole_beats
+from calibration.likelihood import estimate
+from calibration.problem import Problem, base_genome
+from records import Condition, LowPass, Recording
+from sim.balance import DRAG, TRIALS, Balance, delfly, record, true_beat
+from sim.blade_element_wing import BladeElementWing
+from sim.blades.terms import chosen
+from sim.filtering import low_passed
+from workers import make_evaluator
+
+Array = np.typing.NDArray[np.float64]
+
+F, RATE, PITCH = 12.5, 1000.0, 0.9
+CONDITION = Condition(F, 0.0, 101_325.0, 293.15, airspeed=0.5, angle_of_attack=PITCH)
+
+
+def recording(values: Array, start: float = 0.0) -> Recording:
+    times = start + np.arange(len(values)) / RATE
+    axes = ("x", "z")[: values.shape[1]]
+    return Recording("r", "wind_tunnel", CONDITION, times, (), values, forces=axes)  # type: ignore[arg-type]
+
+
+def waves(beats: int = 10, noise: float = 0.0, start: float = 0.0) -> Recording:
+    """X = 0.2 + 0.1 cos, Z = -0.05 + 0.03 sin of twice the phase."""
+    t = start + np.arange(round(beats * RATE / F)) / RATE
+    psi = 2 * np.pi * F * t
+    values = np.stack([0.2 + 0.1 * np.cos(psi), -0.05 + 0.03 * np.sin(2 * psi)], axis=1)
+    return recording(values + noise * np.random.default_rng(0).standard_normal(values.shape), start)
+
+
+def test_lift_and_drag_turn_with_the_pitch() -> None:
+    forces = np.array([[1.0, 0.0], [0.0, 1.0]])
+    named = quantities(recording(forces), forces)
+    np.testing.assert_allclose(named["lift"], [np.sin(PITCH), -np.cos(PITCH)])
+    np.testing.assert_allclose(named["drag"], [-np.cos(PITCH), -np.sin(PITCH)])
+    assert set(quantities(recording(forces[:, :1]), forces[:, :1])) == {"x"}
+
+
+def test_mean_beat_begins_at_the_start_of_a_beat_wherever_the_recording_does() -> None:
+    late = waves(start=0.033)
+    beats = whole_beats(late, points=50)
+    np.testing.assert_allclose(beats.mean["x"], 0.2 + 0.1 * np.cos(2 * np.pi * beats.phase), atol=1e-5)
+    assert beats.samples["x"].shape == (9, 50)
+
+
+def test_scatter_between_beats_is_that_of_the_beats() -> None:
+    steady = waves()
+    scale = 1 + 0.1 * np.repeat([-1, 1] * 5, 80)[:, None]
+    spread = whole_beats(replace(steady, values=steady.values * scale), points=80).spread["x"]
+    inside = slice(5, 75)
+    expected = 0.1 * np.sqrt(10 / 9) * (0.2 + 0.1 * np.cos(2 * np.pi * np.arange(80) / 80))
+    np.testing.assert_allclose(spread[inside], expected[inside], rtol=1e-3)
+
+
+def test_beats_with_gaps_are_left_out() -> None:
+    broken = waves().values.copy()
+    broken[100:110] = np.nan
+    found = whole_beats(recording(broken))
+    assert len(found.samples["x"]) == 9
+    assert np.isfinite(found.mean["x"]).all()
+    assert np.isfinite([a.rmse for a in agreements(recording(broken), waves().values, "local")]).all()
+
+
+def test_ends_of_a_filtered_recording_do_not_count() -> None:
+    raw = waves(noise=0.05)
+    low = low_passed(raw, LowPass(40.0))
+    assert len(whole_beats(low).samples["x"]) == 8
+    spoilt = low.values.copy()
+    spoilt[:60] += 1.0
+    assert whole_beats(replace(low, values=spoilt)).mean["x"][:150] == pytest.approx(whole_beats(low).mean["x"][:150])
+    assert len(whole_beats(low_passed(waves(beats=2), LowPass(40.0))).samples["x"]) == 2  # there are no others
+
+
+def test_recording_without_a_whole_beat_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"no whole beat.*a beat 0\.08 s.*at least one beat"):
+        whole_beats(recording(np.zeros((40, 2))))
+
+
+def test_agreement_in_numbers() -> None:
+    recorded = waves()
+    model = recorded.values + np.array([0.02, 0.0])
+    x = next(a for a in agreements(recorded, model, "local") if a.quantity == "x")
+    assert x.rmse == pytest.approx(0.02)
+    assert x.rmse_percent == pytest.approx(10.0, rel=1e-3)  # of the range, 0.2 N
+    assert x.correlation == pytest.approx(1.0)
+    assert (x.mean_recorded, x.mean_modelled) == pytest.approx((0.2, 0.22))
+    against = agreements(recorded, -recorded.values, "local")
+    assert [a.correlation for a in against if a.quantity in "xz"] == pytest.approx([-1.0, -1.0])
+    assert {a.quantity for a in against} == {"x", "z", "lift", "drag"}
+
+
+def test_means_are_over_whole_beats() -> None:
+    cut = waves(beats=10).values[:777]  # 9.7 beats
+    assert agreements(recording(cut), cut, "local")[2].mean_recorded == pytest.approx(0.2, abs=1e-6)
+
+
+def test_spectrum_holds_the_variance() -> None:
+    noisy = waves(beats=12, noise=0.02)
+    frequency, density = spectrum(noisy, noisy.values)
+    pieces = noisy.values[:, 0].reshape(3, -1)
+    assert density["x"].sum() * frequency[1] == pytest.approx(pieces.var(axis=1).mean(), rel=1e-12)
+    assert frequency[1] == pytest.approx(F / 4)
+    assert frequency[-1] <= RATE / 2
+
+
+def test_spectrum_of_a_harmonic_is_one_line() -> None:
+    frequency, density = spectrum(waves(), waves().values)
+    assert frequency[density["z"].argmax()] == pytest.approx(2 * F)
+    assert density["z"].max() * frequency[1] == pytest.approx(0.03**2 / 2, rel=1e-9)
+    assert np.sort(density["z"])[-2] < 1e-9 * density["z"].max()
+
+
+def test_pieces_with_gaps_give_no_spectrum() -> None:
+    holes = waves().values.copy()
+    holes[::30] = np.nan
+    frequency, density = spectrum(recording(holes), holes)
+    assert len(frequency) == len(density) == 0
+
+
+def test_comparison_lays_mean_beats_over_each_other() -> None:
+    found = comparison(waves(), 2 * waves().values, "global")
+    np.testing.assert_allclose(found.modelled["lift"], 2 * found.recorded["lift"])
+    assert found.recorded_spectrum["x"].shape == found.frequency.shape
+    assert found.remarks == ()
+
+
+def bump(phase: Array, centre: float, width: float) -> Array:
+    return np.asarray(0.05 * np.exp(-0.5 * (((phase - centre + 0.5) % 1 - 0.5) / width) ** 2))
+
+
+@pytest.mark.parametrize("centre", [0.3, 0.98])
+def test_misfit_is_located(centre: float) -> None:
+    phase = np.arange(200) / 200
+    found = located(waves(beats=12, noise=0.01), bump(phase, centre, 0.03))
+    assert found is not None
+    middle, length = (found[0] + found[1]) / 2 % 1, found[1] - found[0]
+    assert middle == pytest.approx(centre, abs=0.01)
+    assert length == pytest.approx(2 * 1.163 * 0.03, abs=0.015)  # 90 % of the square of a Gaussian, cut at both ends
+    assert 0 <= found[0] < 1
+
+
+def test_refitted_coefficients_do_not_carry_the_misfit_away() -> None:
+    """A coefficient that acts everywhere is drawn to the missing force; the misfit is still where the force is."""
+    phase = np.arange(200) / 200
+    slope = 0.1 + bump(phase, 0.25, 0.1)[:, None]
+    missing = -4 * bump(phase, 0.2, 0.05)
+    residual = missing - slope @ np.linalg.lstsq(slope, missing, rcond=None)[0]
+    noisy = waves(beats=12, noise=0.01)
+    with_slope, without = located(noisy, residual, slope), located(noisy, residual)
+    assert with_slope is not None
+    assert without is not None
+    assert with_slope[0] == pytest.approx(0.14, abs=0.03)
+    assert with_slope[1] == pytest.approx(0.26, abs=0.03)
+    assert without[1] - without[0] > 2 * (with_slope[1] - with_slope[0])
+
+
+def test_noise_is_not_located() -> None:
+    false_alarms = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        noisy = waves(beats=12)
+        slow = np.repeat(rng.standard_normal(24), 40)[:, None]  # two values a beat
+        noisy = replace(noisy, values=noisy.values + 0.01 * slow + 0.005 * rng.standard_normal(noisy.values.shape))
+        residual = whole_beats(waves(beats=12)).mean["x"] - whole_beats(noisy).mean["x"]
+        false_alarms += located(noisy, residual) is not None
+    assert false_alarms <= 3
+    few = waves(beats=4, noise=0.01)
+    assert located(few, bump(np.arange(200) / 200, 0.3, 0.03)) is None
+
+
+@pytest.mark.parametrize(("left_out", "expected"), [((), False), (("clap_and_peel",), True)])
+def test_missing_fling_is_found_where_the_wings_peel(left_out: tuple[str, ...], expected: bool) -> None:
+    trial, vehicle = TRIALS[3], delfly()
+    raw = record(true_beat(vehicle, trial), trial, Balance(every=10, beats=12), np.random.default_rng(0))
+    low = low_passed(raw, LowPass(40.0))
+    model = BladeElementWing(vehicle, chosen("proposed", left_out))
+    problem = Problem(model, (low,), model.searched, base_genome(model, DRAG), ("x",))
+    evaluator = make_evaluator("in_process")
+    best = problem.base.replace(estimate(problem, evaluator, {}).values)
+    place = lacking(replace(problem, base=best), evaluator)
+    assert (place is not None) is expected
+    if place is not None:
+        assert 0 <= place[0] < 0.15
+        assert 0.25 < place[1] < 0.4
