@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from calibration.beats import ENOUGH, FEWEST, beat_score_covariance, beat_scores
 from calibration.coloured import Block, score_covariance
 from calibration.covariance import Noise, whitened_sensitivity
 from calibration.evaluator import Evaluator
@@ -113,7 +114,8 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
     The box is a weak prior, without which nothing would bound a gene that the data ignore.
     """
     size = len(problem.free)
-    information, blocks = np.zeros((size, size)), []
+    information, blocks, by_beats = np.zeros((size, size)), [], np.zeros((size, size))
+    fewest = np.inf  # beats, of all recordings; no number for tracks
     for record, n, residual, slope in zip(
         problem.recordings, noise, linear.residuals, linear.sensitivities, strict=True
     ):
@@ -123,9 +125,21 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
         information += np.einsum("tcp,tcq->pq", sensitivity, sensitivity, optimize=True)
         grouped = record.kind == "forces"
         blocks.append(Block.of(record.times, white, sensitivity, seen[:, kept], grouped=grouped))
+        scores, used = beat_scores(record, white, sensitivity) if grouped else (np.empty((0, size)), 1.0)
+        fewest = min(fewest, len(scores))
+        if len(scores) >= FEWEST:
+            by_beats += beat_score_covariance(scores, used)
     prior = np.eye(size) / PRIOR**2
     bread = np.asarray(np.linalg.inv(information + prior), float)
-    return np.asarray(bread @ (score_covariance(blocks, bread) + prior) @ bread)
+    beats = np.asarray(bread @ (by_beats + prior) @ bread)
+    if fewest >= ENOUGH:
+        return beats
+    samples = np.asarray(bread @ (score_covariance(blocks, bread) + prior) @ bread)
+    if fewest < FEWEST:
+        return samples
+    # Few beats tell their own scatter badly: whichever error is larger, with the correlations of the samples.
+    larger = np.sqrt(np.maximum(np.diag(beats) / np.diag(samples), 1.0))
+    return samples * larger * larger[:, None]
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal, NotRequired, TypedDict
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
+Kind = Literal["tracks", "forces"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 
 CONDITION = (
@@ -29,13 +30,14 @@ class Health(TypedDict):
 
 
 class RecordingInfo(TypedDict):
-    """One recording of a dataset: its condition and how much of it was tracked."""
+    """One recording of a dataset: its condition, and the markers tracked or the channels of forces."""
 
     name: str
     rig: str
     held_out: bool
     frames: int
     markers: int
+    channels: list[str]
     missing_percent: float
     flap_frequency_hz: float
     phase_lag_deg: float
@@ -50,6 +52,7 @@ class Dataset(TypedDict):
 
     id: str
     name: str
+    kind: Kind
     description: str
     created_at: str
     sha256: str
@@ -64,6 +67,7 @@ class Run(TypedDict):
     id: str
     name: str
     dataset_id: str
+    kind: Kind
     spec: dict[str, Any]
     state: State
     wish: Literal["PAUSE", "CANCEL"] | None
@@ -76,11 +80,14 @@ class Run(TypedDict):
     generations: int
     evaluations: int
     best_mm: float | None
+    best_mn: float | None
     error: str | None
 
 
 class HistoryItem(TypedDict):
-    """One generation; ``best`` and ``mean`` are Eq. 14 in m^2, ``best_mm`` the mean distance per marker.
+    """One generation; ``best`` and ``mean`` are Eq. 14 in m^2 or N^2.
+
+    ``best_mm`` is the mean distance per marker of tracks, ``best_mn`` the RMS difference of forces; the other is None.
 
     ``evaluations`` counts since the run began, ``failed`` in this generation, with up to ten of their ``reasons``.
     """
@@ -92,6 +99,7 @@ class HistoryItem(TypedDict):
     mean: float | None
     diversity: float | None
     best_mm: float | None
+    best_mn: float | None
     evaluations: int
     failed: int
     reasons: list[str]
@@ -132,8 +140,9 @@ class RecordingResult(TypedDict):
 
 
 class Result(TypedDict):
-    """Outcome of a finished run."""
+    """Outcome of a finished run on tracks."""
 
+    kind: Literal["tracks"]
     before_mm: float | None
     after_mm: float | None
     held_out_before_mm: float | None

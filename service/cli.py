@@ -1,4 +1,4 @@
-"""The command line: ``wingfit serve | campaign | datasets | runs | simulate``.
+"""The command line: ``wingfit serve | datasets | runs | simulate | models``, and what prepares data.
 
 Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a wrong use of the command, 130 Ctrl-C.
 """
@@ -11,7 +11,7 @@ import sys
 import typer
 
 from service.client import WingfitError
-from service.commands import datasets, rig, runs, serve, simulate
+from service.commands import datasets, force_runs, freeflight, kinematics, rig, runs, serve, simulate
 from service.commands.output import note
 
 ERROR = 1
@@ -20,14 +20,18 @@ app = typer.Typer(
     name="wingfit",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Calibrate flapping-wing simulations on recordings of tracked markers.",
+    help="Calibrate flapping-wing simulations on recordings of tracked markers or of forces.",
     epilog="Example: wingfit serve, then wingfit datasets upload examples/robird",
 )
 app.command()(serve.serve)
 app.command()(rig.campaign)
+app.command()(rig.balance)
+app.command()(kinematics.kinematics)
+app.command()(freeflight.forces)
 app.add_typer(datasets.app, name="datasets")
 app.add_typer(runs.app, name="runs")
 app.command()(simulate.simulate)
+app.command()(force_runs.models)
 
 
 def main() -> None:

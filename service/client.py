@@ -23,6 +23,7 @@ from urllib.parse import quote
 import httpx
 
 from service import answers as a
+from service import force_answers as f
 from service.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -114,8 +115,9 @@ class Client(Transport):
     def submit_run(self, dataset_id: str, **spec: Any) -> a.Run:
         """Submit a calibration.
 
-        ``spec``: division, mode, population, stall, tolerance, max_generations, seed, bounds_factor,
-        accuracy_mm, recordings, genes, name. What is left out takes the server's default (the thesis's settings).
+        ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, name;
+        of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
+        peel_width_beats. What is left out takes the server's default (the settings of the seeds).
         """
         body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
@@ -158,9 +160,36 @@ class Client(Transport):
         """Fetch the best genome so far, beside the nominal one, with units and bounds."""
         return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
 
-    def result(self, run_id: str) -> a.Result:
-        """Fetch misfits before and after and the genes of a finished run."""
-        return cast(a.Result, self._json("GET", f"{_run(run_id)}/result"))
+    def result(self, run_id: str) -> a.Result | f.ForceResult:
+        """Fetch misfits before and after and the genes of a finished run; ``kind`` says of tracks or of forces."""
+        return cast("a.Result | f.ForceResult", self._json("GET", f"{_run(run_id)}/result"))
+
+    def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
+        """Fetch recorded and modelled forces of one recording over the beat; ``source`` says whose coefficients."""
+        params = given(recording=recording, source=source)
+        return cast(f.Forces, self._json("GET", f"{_run(run_id)}/forces", params=params, timeout=self.simulating))
+
+    def predict(
+        self,
+        run_id: str,
+        *,
+        flap_frequency_hz: float,
+        body_pitch_deg: float,
+        airspeed_m_s: float,
+        pressure_mbar: float | None = None,
+        temperature_c: float | None = None,
+    ) -> f.Prediction:
+        """Predict the forces over a beat under any condition, from the global model of a finished run."""
+        condition: dict[str, float] = {
+            "flap_frequency_hz": flap_frequency_hz,
+            "body_pitch_deg": body_pitch_deg,
+            "airspeed_m_s": airspeed_m_s,
+        } | given(pressure_mbar=pressure_mbar, temperature_c=temperature_c)
+        return cast(f.Prediction, self._simulated(f"{_run(run_id)}/predictions", condition))
+
+    def models(self) -> f.Models:
+        """List the blade-element models of vehicles and their terms."""
+        return cast(f.Models, self._json("GET", "/v1/models"))
 
     def comparison(
         self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
@@ -234,7 +263,7 @@ class Client(Transport):
         accuracy_mm: float | None = None,
         outputs: bool | Sequence[str] = False,
     ) -> a.Simulation:
-        """Simulate one recording; genes not named in ``genome`` keep their nominal value.
+        """Simulate one recording of a wing; genes not named in ``genome`` keep their nominal value.
 
         ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; without it the server's, 0.1.
         ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
@@ -248,6 +277,32 @@ class Client(Transport):
             "outputs": outputs if isinstance(outputs, bool) else list(outputs),
         } | given(accuracy_mm=accuracy_mm)
         return cast(a.Simulation, self._simulated("/v1/simulations", body))
+
+    def simulate_forces(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        genome: Mapping[str, float] | None = None,
+        preset: str = "proposed",
+        without: Sequence[str] = (),
+        low_pass_hz: float | None = None,
+        peel_width_beats: float = 0.0,
+    ) -> f.ForceSimulation:
+        """Compute the forces of one recording of a vehicle; genes not named in ``genome`` keep their nominal value.
+
+        ``preset`` and the terms ``without`` which it is computed are those of :meth:`models`; ``low_pass_hz`` filters
+        recorded and modelled forces: None at 3.2 times the flap frequency, 0 not at all.
+        """
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "genome": dict(genome or {}),
+            "preset": preset,
+            "without": list(without),
+            "peel_width_beats": peel_width_beats,
+        } | given(low_pass_hz=low_pass_hz)
+        return cast(f.ForceSimulation, self._simulated("/v1/simulations", body))
 
     def loads_under(
         self,
@@ -283,7 +338,7 @@ def merge(run: a.Run, event: a.Event) -> a.Run:
     # After a reconnection the server repeats what the run already counts.
     if event["event"] != "generation" or data["sequence"] <= run["generations"]:
         return run
-    kept = ("stage", "progress", "eta_seconds", "best_mm", "evaluations")
+    kept = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
     known = {key: data[key] for key in kept if key in data}
     return cast(a.Run, dict(run) | known | {"generations": data["sequence"]})
 

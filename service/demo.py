@@ -18,7 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 from service import answers as a
 from service.client import Client, ServerAwayError, WingfitError
@@ -99,7 +99,7 @@ def calibrate(client: Client) -> None:
     if run["state"] != "SUCCEEDED":
         raise WingfitError(f"the run is {run['state']}", run["error"] or "the server gives no reason")
     say(f"calibrated in {time.monotonic() - started:.0f} s with {run['evaluations']} evaluations")
-    result = client.result(run["id"])
+    result = cast(a.Result, client.result(run["id"]))
     say("")
     _print_genes(result["genes"])
     say("")

@@ -1,17 +1,21 @@
-"""What the service needs of calibration, behind one seam: `WingEngine` is the real one."""
+"""What the service needs of calibration, behind one seam: `ModelEngine` is the real one."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Protocol
 
-from calibration import result, search
+from calibration import estimation, result, search
+from calibration.estimation import Prediction
+from calibration.evaluation import agreements
 from calibration.evaluator import Evaluator
+from calibration.force_result import Agreement, ForceComparison, ForceResult, GlobalModel, Source
+from calibration.plan import prepared
 from calibration.problem import base_genome
 from calibration.result import Comparison, GeneResult, Result
 from calibration.search import CalibrationSpec, Generation
-from records import Dataset, Recording, load_archive
-from sim.flexible_wing import FlexibleWing
+from calibration.spec import vehicle_model, wing_model
+from records import Condition, Dataset, Recording, load_archive
 from sim.loads import simulate_outputs
 from sim.outputs import Outputs
 
@@ -23,12 +27,12 @@ class Engine(Protocol):
         """Parse an uploaded archive."""
         ...
 
-    def check(self, spec: CalibrationSpec, dataset: Dataset) -> None:
-        """Raise ValueError when ``spec`` does not fit ``dataset``."""
+    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
+        """``spec`` with everything decided; ValueError when it does not fit ``dataset``."""
         ...
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Genes of the model; ValueError for an impossible division."""
+        """Genes of the model; ValueError for an impossible division or an unknown term."""
         ...
 
     def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
@@ -45,10 +49,14 @@ class Engine(Protocol):
         """Search, or go on from ``checkpoint``."""
         ...
 
+    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+        """The best genome of each stage so far, by the stage's name."""
+        ...
+
     def summarise(
-        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]
-    ) -> Result:
-        """Judge the best genome on every recording."""
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+    ) -> Result | ForceResult:
+        """Judge what the search found, by its last checkpoint, on every recording."""
         ...
 
     def compare(
@@ -63,29 +71,46 @@ class Engine(Protocol):
         """Loads, powers and energies of a genome under a recording's condition."""
         ...
 
+    def forces(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
+    ) -> ForceComparison:
+        """Forces of a genome, which comes from ``source``, over a recording."""
+        ...
 
-class WingEngine:
-    """Calibrates the flexible wing."""
+    def agreements(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> tuple[Agreement, ...]:
+        """How the forces of a genome agree with a recording."""
+        ...
+
+    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
+        """Forces under any condition from a global model."""
+        ...
+
+
+class ModelEngine:
+    """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
 
     def load(self, data: bytes, filename: str) -> Dataset:
         """Parse an uploaded archive; DatasetError says where it is malformed."""
         return load_archive(data, filename)
 
-    def check(self, spec: CalibrationSpec, dataset: Dataset) -> None:
+    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
         """Plan the calibration without running it."""
         search.plan(spec, dataset)
+        return search.resolved(spec, dataset)
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Genes of the wing with this division."""
-        return tuple(gene.name for gene in _model(spec, dataset).genes)
+        """Genes of the model with this division, or these terms."""
+        return tuple(gene.name for gene in search.model_for(dataset, spec).genes)
 
     def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
-        """The nominal genome of the wing with ``values`` changed."""
-        return base_genome(_model(spec, dataset), values).as_dict()
+        """The nominal genome with ``values`` changed."""
+        return base_genome(search.model_for(dataset, spec), values).as_dict()
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
         """Standing of the genes while the search runs: no errors of estimation yet."""
-        model = _model(spec, dataset)
+        model = search.model_for(dataset, spec)
         searched = {name for stage in search.plan(spec, dataset) for name in stage.free}
         nominal, best = base_genome(model).normalised(), base_genome(model, genome).normalised()
         return tuple(
@@ -107,14 +132,18 @@ class WingEngine:
     def calibrate(
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
     ) -> Iterator[Generation]:
-        """Search genetically, stage by stage."""
+        """Search, stage by stage."""
         return search.calibrate(spec, dataset, evaluator, checkpoint)
 
+    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+        """The best genome of each stage so far."""
+        return search.found(spec, dataset, checkpoint)
+
     def summarise(
-        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]
-    ) -> Result:
-        """Judge the best genome on every recording."""
-        return result.summarise(spec, dataset, evaluator, genome)
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+    ) -> Result | ForceResult:
+        """Judge what the search found on every recording."""
+        return result.summarise(spec, dataset, evaluator, checkpoint)
 
     def compare(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
@@ -126,9 +155,25 @@ class WingEngine:
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
     ) -> Outputs:
         """Simulate one recording's condition for what acts inside the wing and on it."""
-        model = _model(spec, dataset)
+        model = wing_model(dataset, spec)
         return simulate_outputs(model, base_genome(model, genome).values, recording)
 
+    def forces(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
+    ) -> ForceComparison:
+        """Compute one recording's forces, low-passed like the recording."""
+        return estimation.compare_forces(spec, dataset, recording, source, genome)
 
-def _model(spec: CalibrationSpec, dataset: Dataset) -> FlexibleWing:
-    return search.model_for(dataset, spec.division, spec.bounds_factor, spec.accuracy)
+    def agreements(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> tuple[Agreement, ...]:
+        """Compute one recording's forces and how they agree."""
+        model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+        observed = model.observe([base_genome(model, genome).values], record)
+        if observed.reasons[0] is not None:
+            raise ValueError(f"the forces under {recording!r} cannot be computed: {observed.reasons[0]}")
+        return agreements(record, observed.channels[0], "nominal")
+
+    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
+        """Compute the forces with the coefficients that ``law`` gives."""
+        return estimation.predict(spec, dataset, law, condition)

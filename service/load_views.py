@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from records import Condition
 from service.load_schemas import OUTPUT_NAMES, ConditionIn, OutputName
-from service.views import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, mm
+from service.units import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, mm
 from sim.outputs import ConnectorLoad, Outputs, Section, Strip
 
 Array = npt.NDArray[np.float64]

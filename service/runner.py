@@ -14,8 +14,9 @@ from collections import deque
 from typing import Any
 
 from calibration.evaluator import Evaluator
+from calibration.force_result import ForceResult
 from calibration.search import Generation
-from service import store, views
+from service import force_views, store, views
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError
 from service.datasets import Datasets
@@ -23,6 +24,7 @@ from service.engine import Engine
 from service.problems import conflict
 from service.remedies import with_remedy
 from service.tables import CheckpointRow, GenerationRow, RunRow
+from service.units import finite
 from workers import jobs
 from workers.jobs import Instruction
 
@@ -139,18 +141,21 @@ class Runner:
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, run_id)
             points = [(g.elapsed_seconds, g.progress) for g in store.history(session, run_id, 0)]
-        genome = row.genome
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("run %s: starts after generation %d", run_id, row.generations)
         for generation in self._engine.calibrate(spec, dataset, evaluator, checkpoint):
-            genome = generation.genome
+            checkpoint = generation.checkpoint
             points.append((earlier + time.monotonic() - began, generation.progress))
             goes_on = self._store(run_id, generation, points)
             if self._stopping or not goes_on:
                 return
-        if genome is None:
+        if checkpoint is None:
             raise ValueError("the search ended without a generation")
-        outcome = views.result(self._engine.summarise(spec, dataset, evaluator, genome)).model_dump(mode="json")
+        judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
+        if isinstance(judged, ForceResult):
+            outcome = force_views.result(judged, spec, dataset).model_dump(mode="json")
+        else:
+            outcome = views.result(judged).model_dump(mode="json")
         self._advance(run_id, jobs.Finish(), result=outcome)
 
     def _store(self, run_id: str, generation: Generation, points: list[tuple[float, float]]) -> bool:
@@ -160,7 +165,8 @@ class Runner:
             row = store.run(session, run_id)
             instructions = _step(row, jobs.Generation(generation.progress))
             row.stage, row.genome = generation.stage, generation.genome
-            row.best_mm = views.mm(generation.distance)
+            misfit = views.misfit(row.kind, generation.distance)
+            row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
             row.evaluations = generation.evaluations
             row.elapsed_seconds = points[-1][0]
             row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
@@ -173,10 +179,10 @@ class Runner:
         with self._database.write() as session:
             row = store.run(session, run_id)
             instructions = _step(row, event)
-            if row.state == jobs.State.SUCCEEDED:
+            if row.state == jobs.State.SUCCEEDED and result is not None:
                 row.result = result
                 # while it runs, the best of the present stage; in the end, over all that was fitted
-                row.best_mm = row.best_mm if result is None else result["after_mm"]
+                row.best_mm, row.best_mn = result.get("after_mm"), result.get("after_mn")
         self._obey(run_id, instructions)
         return row
 
@@ -219,10 +225,10 @@ def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> G
         sequence=row.generations,
         stage=generation.stage,
         generation=generation.index,
-        best=views.finite(generation.best),
-        mean=views.finite(generation.mean),
-        diversity=views.finite(generation.diversity),
-        best_mm=views.mm(generation.distance),
+        best=finite(generation.best),
+        mean=finite(generation.mean),
+        diversity=finite(generation.diversity),
+        **views.misfit(row.kind, generation.distance),
         evaluations=generation.evaluations,
         failed=generation.failed,
         reasons=list(generation.reasons),

@@ -2,66 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from service.load_schemas import ConditionIn, Number, OutputsOut, Wanted
+from service.spec_schemas import DATASET_ID, SPEC, Accuracy, Division, Name, SpecOut, VehicleModel
 from workers.jobs import State
 
-LARGEST_SEED = 2**53 - 1
-DIVISION = r"^[1-9][0-9]?(x[1-9][0-9]?|(,[1-9][0-9]?){0,63})$"
-LONGEST_DIVISION = 200
-DIVISION_FORMS = "preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2"
-FINEST_MM, COARSEST_MM = 0.02, 1.0
+Kind = Literal["tracks", "forces"]
 
 Item = TypeVar("Item")
-Name = Annotated[str, Field(min_length=1, max_length=200)]
-Whole = Annotated[int, Field(strict=True)]
-
-
-def _readable(division: str) -> str:
-    if len(division) > LONGEST_DIVISION or not re.fullmatch(DIVISION, division):
-        raise PydanticCustomError("division", "must be a {forms}", {"forms": DIVISION_FORMS})
-    return division
-
-
-Division = Annotated[
-    str,
-    AfterValidator(_readable),
-    Field(
-        json_schema_extra={"pattern": DIVISION, "maxLength": LONGEST_DIVISION},
-        description=DIVISION_FORMS,
-    ),
-]
-
-
-def _attainable(accuracy_mm: float) -> float:
-    if accuracy_mm < FINEST_MM:
-        raise PydanticCustomError(
-            "too_fine",
-            "must be at least {least} mm: below, corners in the law of the air make the estimated error unreliable",
-            {"least": FINEST_MM},
-        )
-    if accuracy_mm > COARSEST_MM:
-        raise PydanticCustomError(
-            "too_coarse",
-            "must be at most {most} mm: beyond, the error of the solution would be as large as what is fitted",
-            {"most": COARSEST_MM},
-        )
-    return accuracy_mm
-
-
-Accuracy = Annotated[
-    Number,
-    AfterValidator(_attainable),
-    Field(
-        json_schema_extra={"minimum": FINEST_MM, "maximum": COARSEST_MM},
-        description="largest error of any simulated marker at any instant; the steps of a beat follow from it",
-    ),
-]
 
 _RECORDING: dict[str, Any] = {
     "name": "vacuum-3hz-0deg",
@@ -69,6 +20,7 @@ _RECORDING: dict[str, Any] = {
     "held_out": False,
     "frames": 90,
     "markers": 40,
+    "channels": [],
     "missing_percent": 4.2,
     "flap_frequency_hz": 3.0,
     "phase_lag_deg": 0.0,
@@ -78,8 +30,9 @@ _RECORDING: dict[str, Any] = {
     "angle_of_attack_deg": 0.0,
 }
 _DATASET: dict[str, Any] = {
-    "id": "ds_0f3c9a7be1d24568",
+    "id": DATASET_ID,
     "name": "Robird campaign",
+    "kind": "tracks",
     "description": "Left wing, vacuum chamber and wind tunnel",
     "created_at": "2026-11-05T09:30:00.000000Z",
     "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
@@ -87,24 +40,12 @@ _DATASET: dict[str, Any] = {
     "markers": 49,
     "recordings": [_RECORDING],
 }
-_SPEC: dict[str, Any] = {
-    "division": "11",
-    "mode": "staged",
-    "population": 50,
-    "stall": 10,
-    "tolerance": 0.001,
-    "max_generations": 200,
-    "seed": 1,
-    "bounds_factor": 5.0,
-    "accuracy_mm": 0.1,
-    "recordings": [],
-    "genes": [],
-}
 _RUN: dict[str, Any] = {
     "id": "run_5c1e07a94bd83f26",
     "name": "first try",
     "dataset_id": _DATASET["id"],
-    "spec": _SPEC,
+    "kind": "tracks",
+    "spec": SPEC,
     "state": "RUNNING",
     "wish": None,
     "stage": "structural",
@@ -116,6 +57,7 @@ _RUN: dict[str, Any] = {
     "generations": 12,
     "evaluations": 600,
     "best_mm": 1.84,
+    "best_mn": None,
     "error": None,
 }
 
@@ -173,13 +115,14 @@ class HealthOut(BaseModel):
 
 
 class RecordingOut(BaseModel):
-    """One recording and its condition."""
+    """One recording and its condition; ``channels`` are those of forces, ``markers`` those tracked."""
 
     name: str
     rig: str
     held_out: bool
     frames: int
     markers: int
+    channels: list[str]
     missing_percent: float
     flap_frequency_hz: float
     phase_lag_deg: float
@@ -196,6 +139,7 @@ class DatasetOut(BaseModel):
 
     id: str
     name: str
+    kind: Kind
     description: str
     created_at: str
     sha256: str
@@ -204,42 +148,18 @@ class DatasetOut(BaseModel):
     recordings: list[RecordingOut]
 
 
-class SpecOut(BaseModel):
-    """How a run calibrates; see `calibration.search.CalibrationSpec`."""
-
-    division: Division = "11"
-    mode: Literal["staged", "joint"] = "staged"
-    population: Annotated[Whole, Field(ge=4, le=1000)] = 50
-    stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
-    tolerance: Annotated[Number, Field(ge=0, le=1)] = 1e-3
-    max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
-    seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1
-    bounds_factor: Annotated[Number, Field(ge=1.01, le=100)] = 5.0
-    accuracy_mm: Accuracy = 0.1
-    recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
-    genes: Annotated[list[Name], Field(max_length=1000, description="empty: all")] = []
-
-
-class RunIn(SpecOut):
-    """A calibration to run."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"dataset_id": _DATASET["id"], "division": "11", "name": "first try"}]},
-    )
-
-    dataset_id: Name
-    name: Name | None = None
-
-
 class RunOut(BaseModel):
-    """A run; ``wish`` is a pause or cancellation that takes effect with the generation under way."""
+    """A run; ``wish`` is a pause or cancellation that takes effect with the generation under way.
+
+    ``best_mm`` is a mean distance per marker, of tracks; ``best_mn`` an RMS difference, of forces; the other is null.
+    """
 
     model_config = _example(_RUN)
 
     id: str
     name: str
     dataset_id: str
+    kind: Kind
     spec: SpecOut
     state: State
     wish: Literal["PAUSE", "CANCEL"] | None
@@ -252,11 +172,12 @@ class RunOut(BaseModel):
     generations: int
     evaluations: int
     best_mm: float | None
+    best_mn: float | None
     error: str | None
 
 
 class HistoryItem(BaseModel):
-    """One finished generation; fitness in m^2."""
+    """One finished generation; fitness in m^2 or N^2."""
 
     sequence: int
     stage: str
@@ -265,6 +186,7 @@ class HistoryItem(BaseModel):
     mean: float | None
     diversity: float | None
     best_mm: float | None
+    best_mn: float | None
     evaluations: int
     failed: int
     reasons: list[str]
@@ -312,8 +234,9 @@ class RecordingResultOut(BaseModel):
 
 
 class ResultOut(BaseModel):
-    """Outcome of a calibration; means over recordings weighted by samples."""
+    """Outcome of a calibration on tracks; means over recordings weighted by samples."""
 
+    kind: Literal["tracks"]
     before_mm: float | None
     after_mm: float | None
     held_out_before_mm: float | None
@@ -350,23 +273,10 @@ class ComparisonOut(BaseModel):
     numerics: NumericsOut
 
 
-class SimulationIn(BaseModel):
-    """A simulation of one recording's condition; genes not named keep their nominal value."""
+class WingIn(BaseModel):
+    """What to simulate a wing of; genes not named keep their nominal value."""
 
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "dataset_id": _DATASET["id"],
-                    "recording": _RECORDING["name"],
-                    "division": "4",
-                    "genome": {"E_f": 7e6},
-                    "outputs": ["motors", "averages"],
-                }
-            ]
-        },
-    )
+    model_config = ConfigDict(extra="forbid")
 
     dataset_id: Name
     recording: Name
@@ -376,12 +286,26 @@ class SimulationIn(BaseModel):
     outputs: Wanted = False
 
 
-class LoadsIn(SimulationIn):
+class SimulationIn(VehicleModel, WingIn):
+    """A simulation of one recording's condition; genes not named keep their nominal value."""
+
+    model_config = _example(
+        {
+            "dataset_id": DATASET_ID,
+            "recording": _RECORDING["name"],
+            "division": "4",
+            "genome": {"E_f": 7e6},
+            "outputs": ["motors", "averages"],
+        }
+    )
+
+
+class LoadsIn(WingIn):
     """A simulation for its loads alone, under the recording's condition or one that differs from it."""
 
     model_config = _example(
         {
-            "dataset_id": _DATASET["id"],
+            "dataset_id": DATASET_ID,
             "recording": _RECORDING["name"],
             "condition": {"flap_frequency_hz": 5.0, "airspeed_m_s": 4.0},
             "outputs": ["motors", "averages"],

@@ -15,7 +15,7 @@ from service import store
 from service.changes import Changes
 from service.database import Database
 from service.datasets import Datasets
-from service.engine import Engine, WingEngine
+from service.engine import Engine, ModelEngine
 from service.pool import Pool
 from service.runner import Runner
 from service.schemas import HealthOut
@@ -38,7 +38,7 @@ class Service:
         make_evaluator: MakeEvaluator | None = None,
     ) -> None:
         self.settings, self.database = settings, database
-        self.engine: Engine = engine or WingEngine()
+        self.engine: Engine = engine or ModelEngine()
         self.changes = Changes()
         self.datasets = Datasets(database, self.engine)
         self.runner = Runner(database, self.engine, self.datasets, self.changes, settings.max_runs)

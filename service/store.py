@@ -20,6 +20,8 @@ from service.tables import AnswerRow, ArchiveRow, CheckpointRow, DatasetRow, Gen
 from workers.jobs import Job, State, Wish
 
 ANSWERS_KEPT = timedelta(days=7)
+# What specifications meant that were stored before there was a choice.
+BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
 Row = TypeVar("Row", DatasetRow, RunRow)
@@ -163,8 +165,10 @@ def spec(row: RunRow) -> CalibrationSpec:
 
 def spec_from(values: dict[str, Any]) -> CalibrationSpec:
     """A specification from its JSON form."""
-    tuples = {"recordings": tuple(values["recordings"]), "genes": tuple(values["genes"])}
-    return CalibrationSpec(**(values | tuples))
+    tuples: dict[str, Any] = {
+        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes") if name in values
+    }
+    return CalibrationSpec(**(BEFORE_METHODS | values | tuples))
 
 
 def spec_json(given: CalibrationSpec) -> dict[str, Any]:

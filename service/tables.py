@@ -23,7 +23,7 @@ class Table(DeclarativeBase):
 
 
 class DatasetRow(Table):
-    """An uploaded dataset: what lists show. Its bytes are in :class:`ArchiveRow`."""
+    """An uploaded dataset: what lists show; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
@@ -31,6 +31,7 @@ class DatasetRow(Table):
     number: Mapped[int] = mapped_column(primary_key=True)
     id: Mapped[str] = mapped_column(unique=True)
     name: Mapped[str]
+    kind: Mapped[str] = mapped_column(server_default="tracks")
     description: Mapped[str]
     filename: Mapped[str]
     created_at: Mapped[str]
@@ -59,6 +60,7 @@ class RunRow(Table):
     id: Mapped[str] = mapped_column(unique=True)
     name: Mapped[str]
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
+    kind: Mapped[str] = mapped_column(server_default="tracks")
     spec: Mapped[dict[str, Any]]
     state: Mapped[str] = mapped_column(index=True)
     wish: Mapped[str]
@@ -72,6 +74,7 @@ class RunRow(Table):
     evaluations: Mapped[int] = mapped_column(default=0)
     elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
     best_mm: Mapped[float | None]
+    best_mn: Mapped[float | None]
     error: Mapped[str | None]
     genome: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
@@ -99,6 +102,7 @@ class GenerationRow(Table):
     mean: Mapped[float | None]
     diversity: Mapped[float | None]
     best_mm: Mapped[float | None]
+    best_mn: Mapped[float | None]
     evaluations: Mapped[int]
     failed: Mapped[int]
     reasons: Mapped[list[str]] = mapped_column(JSON)

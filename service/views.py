@@ -3,41 +3,44 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from calibration.result import Comparison, GeneResult, Result
-from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service import schemas, store
+from service.spec_views import spec_out
 from service.tables import DatasetRow, GenerationRow, RunRow
+from service.units import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, finite, mm, mn, tidy_mm
 from workers.jobs import Wish
 
-MM = 1e3
-PASCAL_PER_MBAR = 100.0
-ZERO_CELSIUS = 273.15
+# What rows of recordings lack that were stored before there were forces.
+BEFORE_FORCES: dict[str, Any] = {"channels": []}
 # Digits that a page can show; a track in full precision is three times as long on the wire.
 TRACK_DECIMALS = 6
 
 
 def dataset(row: DatasetRow) -> schemas.DatasetOut:
     """A dataset as lists show it."""
-    return schemas.DatasetOut.model_validate(_columns(row))
+    columns = _columns(row)
+    columns["recordings"] = [BEFORE_FORCES | record for record in columns["recordings"]]
+    return schemas.DatasetOut.model_validate(columns)
 
 
 def recording(record: Recording, held_out: bool) -> schemas.RecordingOut:
     """One recording with its condition."""
     condition = record.condition
-    seen = np.isfinite(record.positions).all(axis=2)
+    tracked = record.kind == "tracks"
+    seen = np.isfinite(record.positions).all(axis=2) if tracked else record.valid
     return schemas.RecordingOut(
         name=record.name,
         rig=record.rig,
         held_out=held_out,
         frames=len(record.times),
-        markers=int(seen.any(axis=0).sum()),
+        markers=int(seen.any(axis=0).sum()) if tracked else 0,
+        channels=[] if tracked else list(record.channels),
         missing_percent=round(100.0 * (1.0 - float(seen.mean())), 3) if seen.size else 0.0,
         flap_frequency_hz=condition.flap_frequency,
         phase_lag_deg=math.degrees(condition.phase_lag),
@@ -57,12 +60,7 @@ def run(row: RunRow) -> schemas.RunOut:
     """A run."""
     columns = _columns(row)
     wish = None if row.wish == Wish.NONE else row.wish
-    return schemas.RunOut.model_validate(columns | {"wish": wish, "spec": spec(store.spec(row))})
-
-
-def spec(given: CalibrationSpec) -> schemas.SpecOut:
-    """How a run calibrates."""
-    return schemas.SpecOut.model_validate(asdict(given) | {"accuracy_mm": _tidy_mm(given.accuracy)})
+    return schemas.RunOut.model_validate(columns | {"wish": wish, "spec": spec_out(store.spec(row))})
 
 
 def history_item(row: GenerationRow) -> schemas.HistoryItem:
@@ -93,8 +91,9 @@ def gene(result: GeneResult) -> schemas.GeneOut:
 
 
 def result(outcome: Result) -> schemas.ResultOut:
-    """The outcome of a calibration."""
+    """The outcome of a calibration on tracks."""
     return schemas.ResultOut(
+        kind="tracks",
         before_mm=mm(outcome.before),
         after_mm=mm(outcome.after),
         held_out_before_mm=mm(outcome.held_out_before),
@@ -125,7 +124,7 @@ def comparison(tracks: Comparison) -> dict[str, Any]:
         "recorded_mm": _track(tracks.recorded),
         "simulated_mm": _track(tracks.simulated),
         "numerics": {
-            "accuracy_mm": _tidy_mm(tracks.accuracy),
+            "accuracy_mm": tidy_mm(tracks.accuracy),
             "estimated_error_mm": mm(tracks.solution.error),
             "steps_per_beat": tracks.solution.steps,
             "beats": tracks.solution.beats,
@@ -140,19 +139,10 @@ def mean_distance_mm(tracks: Comparison) -> float | None:
     return mm(float(distance[seen].mean())) if seen.any() else None
 
 
-def mm(value: float | None) -> float | None:
-    """Metres to millimetres."""
-    return None if value is None else finite(value * MM)
-
-
-def finite(value: float) -> float | None:
-    """``value``, or None where JSON has no number for it."""
-    return float(value) if math.isfinite(value) else None
-
-
-def _tidy_mm(stated: float) -> float:
-    """A distance (m) that somebody stated, in mm as they wrote it: 0.07, not 0.07000000000000001."""
-    return round(stated * MM, 9)
+def misfit(kind: str, distance: float) -> dict[str, float | None]:
+    """A misfit (m or N, after the kind of the dataset) in the units of people; the other is null."""
+    tracks = kind == "tracks"
+    return {"best_mm": mm(distance) if tracks else None, "best_mn": None if tracks else mn(distance)}
 
 
 def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]:

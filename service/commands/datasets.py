@@ -76,7 +76,8 @@ def show(dataset_id: DatasetId, url: Url = DEFAULT_URL, as_json: AsJson = False)
     say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
     if dataset["description"]:
         say(dataset["description"])
-    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", ">lag", ">pressure", ">airspeed"]
+    angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
+    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", f">{angle}", ">pressure", ">airspeed"]
     table(columns, [_row(r) for r in dataset["recordings"]])
 
 
@@ -120,7 +121,8 @@ def check(path: Source) -> None:
         faults = [vars(fault) for fault in getattr(error, "errors", [])]
         detail = f"{len(faults)} errors" if faults else str(error)
         raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
-    say(f"{path} is valid: '{dataset.name}', wing '{dataset.wing.name}'")
+    what = "wing" if dataset.kind == "tracks" else "vehicle"
+    say(f"{path} is valid: '{dataset.name}', {what} '{dataset.rig.name}'")
     rows = [
         [
             r.name,
@@ -147,7 +149,7 @@ def _row(r: a.RecordingInfo) -> list[str]:
         str(r["frames"]),
         f"{r['missing_percent']:.1f} %",
         number(r["flap_frequency_hz"], unit="Hz"),
-        number(r["phase_lag_deg"], unit="deg"),
+        number(r["angle_of_attack_deg"] if r["channels"] else r["phase_lag_deg"], unit="deg"),
         number(r["pressure_mbar"], unit="mbar"),
         number(r["airspeed_m_s"], unit="m/s"),
     ]

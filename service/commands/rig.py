@@ -1,4 +1,4 @@
-"""``wingfit campaign``: the virtual rig."""
+"""``wingfit campaign`` and ``wingfit balance``: the virtual rig and the virtual balance."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ def campaign(
 
     Example: wingfit campaign my-campaign --division 11 --small --seed 7
     """
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
+    _refuse_existing(out)
     from sim.rig import write_campaign  # compiled kernels wait until they are needed
 
     try:
@@ -33,5 +32,34 @@ def campaign(
             write_campaign(out, division=division, small=small, seed=seed, progress=report)
     except ValueError as error:
         raise WingfitError("no campaign written", str(error)) from error
+    _written(out)
+
+
+def balance(
+    out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip or .nc).")],
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 1,
+) -> None:
+    """Write the DelFly's wind-tunnel tests as a dataset of forces, recorded on a simulated balance.
+
+    The true coefficients lie in a separate file beside the dataset, which a calibration never reads.
+
+    Example: wingfit balance my-balance --seed 7
+    """
+    _refuse_existing(out)
+    from sim.balance import write_campaign  # as above
+
+    try:
+        write_campaign(out, seed)
+    except ValueError as error:
+        raise WingfitError("no campaign written", str(error)) from error
+    _written(out)
+
+
+def _refuse_existing(out: Path) -> None:
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
+
+
+def _written(out: Path) -> None:
     say(f"campaign written to {out}")
     say(f"next: wingfit datasets upload {shlex.quote(str(out))}")

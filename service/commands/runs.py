@@ -11,11 +11,13 @@ import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
+from service.commands.force_runs import RunId, force_result, forces, predict
 from service.commands.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
 
 app = typer.Typer(no_args_is_help=True, help="Submit, watch and steer calibrations; fetch what they found.")
 
-RunId = Annotated[str, typer.Argument(help="Id of a run, from 'wingfit runs list'.")]
+app.command()(forces)
+app.command()(predict)
 INTERRUPTED = 130
 
 
@@ -42,12 +44,12 @@ def list_(
             r["state"],
             f"{100 * r['progress']:.0f} %",
             duration(r["eta_seconds"]),
-            mm(r["best_mm"]),
+            best(r),
             moment(r["created_at"]),
         ]
         for r in runs
     ]
-    columns = ["id", "name", "state", ">progress", ">left", ">best mm", "submitted"]
+    columns = ["id", "name", "state", ">progress", ">left", ">best", "submitted"]
     table(columns, rows, "no runs; submit one: wingfit runs submit DATASET_ID")
 
 
@@ -55,7 +57,12 @@ def list_(
 def submit(
     dataset_id: Annotated[str, typer.Argument(help="Id of a dataset, from 'wingfit datasets list'.")],
     division: Annotated[str | None, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = None,
-    mode: Annotated[str | None, typer.Option(help="staged (vacuum, then tunnel) or joint.")] = None,
+    mode: Annotated[
+        str | None,
+        typer.Option(help="staged (vacuum, then tunnel), joint, or local (each recording by itself)."),
+    ] = None,
+    method: Annotated[str | None, typer.Option(help="genetic, cma_es or gauss_newton.")] = None,
+    finish: Annotated[bool, typer.Option("--finish", help="Gauss-Newton after the search of each stage.")] = False,
     population: Annotated[int | None, typer.Option(help="Individuals per generation.")] = None,
     stall: Annotated[int | None, typer.Option(help="Generations without improvement that end a stage.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Relative improvement that counts.")] = None,
@@ -67,12 +74,25 @@ def submit(
     ] = None,
     recording: Annotated[list[str] | None, typer.Option(help="Fit only this recording; repeatable.")] = None,
     gene: Annotated[list[str] | None, typer.Option(help="Search only this gene; repeatable.")] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; proposed if left out.")
+    ] = None,
+    without: Annotated[list[str] | None, typer.Option(help="Vehicles: leave out this term; repeatable.")] = None,
+    axis: Annotated[
+        list[str] | None, typer.Option(help="Vehicles: fit this force axis, x or z; repeatable; x if left out.")
+    ] = None,
+    low_pass_hz: Annotated[
+        float | None, typer.Option(help="Vehicles: cut-off; 3.2 x flap frequency if left out, 0: none.")
+    ] = None,
+    peel_width: Annotated[
+        float | None, typer.Option(help="Vehicles: beats over which the end of the peel is smoothed.")
+    ] = None,
     name: Annotated[str | None, typer.Option(help="A name to find the run by.")] = None,
     watch_it: Annotated[bool, typer.Option("--watch", help="Stay and show the progress.")] = False,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
-    """Submit a calibration; what is left out takes the thesis's settings.
+    """Submit a calibration; what is left out takes the settings of the seed: thesis for wings, DelFly for vehicles.
 
     Example: wingfit runs submit ID --division 11 --seed 7 --watch
     """
@@ -81,6 +101,8 @@ def submit(
             dataset_id,
             division=division,
             mode=mode,
+            method=method,
+            finish=finish or None,
             population=population,
             stall=stall,
             tolerance=tolerance,
@@ -90,6 +112,11 @@ def submit(
             accuracy_mm=accuracy_mm,
             recordings=recording or None,
             genes=gene or None,
+            preset=preset,
+            without=without or None,
+            axes=axis or None,
+            low_pass_hz=low_pass_hz,
+            peel_width_beats=peel_width,
             name=name,
         )
         if watch_it:
@@ -122,7 +149,7 @@ def show(run_id: RunId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None
         ["state", f"{run['state']}{', stage ' + run['stage'] if run['stage'] else ''}"],
         ["progress", f"{100 * run['progress']:.0f} %, {duration(run['eta_seconds'])} left"],
         ["generations", f"{run['generations']} ({run['evaluations']} evaluations)"],
-        ["best", f"{mm(run['best_mm'])} mm per marker"],
+        ["best", f"{best(run)} {'per marker' if run['kind'] == 'tracks' else 'RMS'}"],
         ["settings", ", ".join(f"{k} {v}" for k, v in run["spec"].items() if v not in (None, [], {}))],
         ["submitted", moment(run["created_at"])],
         ["ended", moment(run["finished_at"])],
@@ -210,7 +237,7 @@ def genome(
 
 @app.command()
 def result(run_id: RunId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
-    """Print the misfit before and after, recording by recording, and the genes.
+    """Print the misfit before and after, recording by recording, and the genes; of forces also their errors.
 
     Example: wingfit runs result ID
     """
@@ -219,9 +246,18 @@ def result(run_id: RunId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> No
     if as_json:
         print_json(answer)
         return
+    if answer["kind"] == "forces":
+        force_result(answer)
+        return
     misfits(answer)
     say("")
     genes(answer["genes"])
+
+
+def best(run: a.Run) -> str:
+    """The misfit of a run so far, in mm of tracks or mN of forces."""
+    misfit, unit = (run["best_mm"], "mm") if run["kind"] == "tracks" else (run["best_mn"], "mN")
+    return "–" if misfit is None else f"{misfit:.2f} {unit}"
 
 
 def genes(items: list[a.GeneInfo]) -> None:
@@ -285,7 +321,7 @@ def _note(run: a.Run) -> str:
     stage = run["stage"] or run["state"].lower()
     if run["state"] != "RUNNING":
         stage = run["state"].lower()
-    return f"{stage}, generation {run['generations']}, best {mm(run['best_mm'])} mm"
+    return f"{stage}, generation {run['generations']}, best {best(run)}"
 
 
 def _steer(url: str, call: Callable[[Client], a.Run]) -> None:
@@ -295,7 +331,7 @@ def _steer(url: str, call: Callable[[Client], a.Run]) -> None:
 
 
 def _ended(run: a.Run) -> None:
-    say(f"run {run['id']} {run['state']}, best {mm(run['best_mm'])} mm after {run['generations']} generations")
+    say(f"run {run['id']} {run['state']}, best {best(run)} after {run['generations']} generations")
     if run["state"] == "SUCCEEDED":
         say(f"next: wingfit runs result {run['id']}")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -12,6 +13,7 @@ import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
+from service.commands.force_runs import given_forces, write_files
 from service.commands.loads import check_file, summary, write_loads, write_plot
 from service.commands.output import AsJson, Url, mm, note, number, print_json, progress, say, table
 
@@ -21,14 +23,16 @@ Track = list[float | None]
 def simulate(
     dataset: Annotated[str, typer.Option(help="Id of a dataset.")],
     recording: Annotated[str | None, typer.Option(help="Recording; default: the first one.")] = None,
-    division: Annotated[str, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = "11",
+    division: Annotated[
+        str | None, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2; 11 if left out.")
+    ] = None,
     genome: Annotated[
         list[str] | None, typer.Option(help="FILE.json or name=value; repeatable. Others stay nominal.")
     ] = None,
     accuracy_mm: Annotated[
         float | None, typer.Option(help="Largest error of a simulated marker, 0.02 to 1; 0.1 if left out.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks as CSV.")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks or forces as CSV.")] = None,
     loads: Annotated[
         Path | None,
         typer.Option(
@@ -38,7 +42,8 @@ def simulate(
         ),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="Draw motor torque, powers, lift, bending moments and energies: FILE.html.")
+        Path | None,
+        typer.Option(help="Draw motor torque, powers, lift, bending moments and energies, or forces: FILE.html."),
     ] = None,
     at: Annotated[
         list[str] | None,
@@ -46,6 +51,16 @@ def simulate(
             help="NAME=VALUE; repeatable. Loads under another condition than the recording's, without tracks: "
             "flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg."
         ),
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; proposed if left out.")
+    ] = None,
+    without: Annotated[list[str] | None, typer.Option(help="Vehicles: leave out this term; repeatable.")] = None,
+    low_pass_hz: Annotated[
+        float | None, typer.Option(help="Vehicles: cut-off; 3.2 x flap frequency if left out, 0: none.")
+    ] = None,
+    peel_width: Annotated[
+        float | None, typer.Option(help="Vehicles: beats over which the end of the peel is smoothed.")
     ] = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
@@ -64,38 +79,69 @@ def simulate(
         raise typer.BadParameter(
             "no tracks were recorded under another condition; leave out --output", param_hint="--at"
         )
-    values, condition = read_genome(genome or []), read_condition(at or [])
-    wanted = loads is not None or plot is not None or bool(condition)
-    with Client(url) as client, progress("simulating") as report:
+    of_wings = {"--division": division, "--accuracy-mm": accuracy_mm, "--loads": loads, "--at": at}
+    of_vehicles = {"--preset": preset, "--without": without, "--low-pass-hz": low_pass_hz, "--peel-width": peel_width}
+    asked: dict[str, Any] = {"genome": read_genome(genome or [])}
+    condition = read_condition(at or [])
+    with Client(url) as client:
+        described = client.dataset(dataset)
+        name = recording or described["recordings"][0]["name"]
+        if described["kind"] == "forces":
+            _refuse(of_wings, "the dataset describes a vehicle, and this is for wings")
+            asked |= {"preset": preset or "proposed", "without": without or (), "low_pass_hz": low_pass_hz}
+            found = client.simulate_forces(dataset, name, peel_width_beats=peel_width or 0.0, **asked)
+            write_files(found, output, plot)
+            print_json(found) if as_json else given_forces(found)
+            return
+        _refuse(of_vehicles, "the dataset describes a wing, and this is for vehicles")
+        asked |= {"division": division or "11", "accuracy_mm": accuracy_mm}
+        wanted = loads is not None or plot is not None or bool(condition)
+        answer = _of_wing(client, dataset, name, condition, asked, wanted)
+    if plot:
+        what = ", ".join([f"Loads under {name}", *(at or []), f"{asked['division']} bodies"])
+        write_plot(answer["outputs"], plot, what)
+        note(f"plots written to {plot}; open it in a browser")
+    _write_and_say(answer, name, output, loads, as_json=as_json)
+
+
+def _of_wing(
+    client: Client, dataset: str, recording: str, condition: dict[str, float], asked: dict[str, Any], wanted: bool
+) -> a.Simulation | a.Loads:
+    with progress("simulating") as report:
         report(None)
-        recording = recording or client.dataset(dataset)["recordings"][0]["name"]
-        answer: a.Simulation | a.Loads
-        asked: dict[str, Any] = {"division": division, "genome": values, "accuracy_mm": accuracy_mm}
         if condition:
-            answer = client.loads_under(dataset, recording, condition=condition, **asked)
-        else:
-            answer = client.simulate(dataset, recording, outputs=wanted, **asked)
-    if output:
-        write_tracks(cast(a.Simulation, answer), output)
+            return client.loads_under(dataset, recording, condition=condition, **asked)
+        return client.simulate(dataset, recording, outputs=wanted, **asked)
+
+
+def _write_and_say(
+    answer: a.Simulation | a.Loads, recording: str, output: Path | None, loads: Path | None, *, as_json: bool
+) -> None:
+    tracks = cast(a.Simulation, answer) if "numerics" in answer else None
+    if output and tracks:
+        write_tracks(tracks, output)
         note(f"tracks written to {output}")
     if loads:
         write_loads(answer["outputs"], loads)
         note(f"loads written to {loads}")
-    if plot:
-        write_plot(answer["outputs"], plot, ", ".join([f"Loads under {recording}", *(at or []), f"{division} bodies"]))
-        note(f"plots written to {plot}; open it in a browser")
     if as_json:
         print_json(answer)
         return
-    if not condition:
-        rows = [[name, mm(distance)] for name, distance in marker_distances(cast(a.Simulation, answer)).items()]
+    if tracks:
+        rows = [[name, mm(distance)] for name, distance in marker_distances(tracks).items()]
         table(["marker", ">mean distance mm"], rows)
-    if wanted:
+    if "outputs" in answer:
         table(["over one beat", "value"], summary(answer["outputs"]))
-    if not condition:
-        distance = cast(a.Simulation, answer)["mean_distance_mm"]
-        say(f"recording {recording}: mean distance {mm(distance)} mm per marker")
-        say(solved(cast(a.Simulation, answer)["numerics"]))
+    if tracks:
+        say(f"recording {recording}: mean distance {mm(tracks['mean_distance_mm'])} mm per marker")
+        say(solved(tracks["numerics"]))
+
+
+def _refuse(options: Mapping[str, object], why: str) -> None:
+    """Refuse options that were given and cannot be meant."""
+    for option, value in options.items():
+        if value:
+            raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
 
 
 def solved(numerics: a.Numerics) -> str:

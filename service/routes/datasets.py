@@ -126,11 +126,12 @@ def _row(loaded: Dataset, name: str | None, filename: str, digest: str, size: in
     return DatasetRow(
         id=store.new_id("ds"),
         name=name or loaded.name,
+        kind=loaded.kind,
         description=loaded.description,
         filename=filename,
         created_at=store.now(),
         sha256=digest,
         size_bytes=size,
-        markers=len(loaded.wing.markers),
+        markers=len(loaded.wing.markers) if loaded.kind == "tracks" else 0,
         recordings=views.recordings(loaded),
     )

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Header, Query
+from pydantic import Field
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
-from service import http, load_views, store, views
+from service import force_views, http, load_views, spec_views, store, views
 from service.events import stream
+from service.force_schemas import ForceResultOut, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.remedies import with_remedy
@@ -25,6 +27,7 @@ from service.schemas import (
     ResultOut,
     SimulationIn,
     SimulationOut,
+    WingIn,
 )
 from service.state import Service, ServiceDep
 from service.tables import RunRow
@@ -32,8 +35,7 @@ from sim.outputs import Outputs
 from workers.jobs import State
 
 router = APIRouter(prefix="/v1", tags=["outcomes"])
-# A simulation may leave the box of a search; how far is the limit of `bounds_factor` itself.
-WIDEST_BOUNDS = 100.0
+AnyResult = Annotated[ResultOut | ForceResultOut, Field(discriminator="kind")]
 
 _EVENTS = """id: 12
 event: generation
@@ -69,7 +71,7 @@ def history(
 @router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the best genome so far, beside the nominal one."""
-    row = _row(service, run_id)
+    row = run_row(service, run_id)
     if row.result is not None:
         found = GenomeOut(genes=row.result["genes"], final=True)
     else:
@@ -79,13 +81,14 @@ def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
     return http.tagged(found, if_none_match)
 
 
-@router.get("/runs/{run_id}/result", response_model=ResultOut, responses=http.errors(404, 409), summary="Result")
+@router.get("/runs/{run_id}/result", response_model=AnyResult, responses=http.errors(404, 409), summary="Result")
 def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the outcome of a run that has succeeded."""
-    row = _row(service, run_id)
+    row = run_row(service, run_id)
     if row.result is None:
         raise conflict(_no_result(row), state=row.state)
-    return http.tagged(ResultOut.model_validate(row.result), if_none_match)
+    shape = ResultOut if row.kind == "tracks" else ForceResultOut
+    return http.tagged(shape.model_validate({"kind": row.kind} | row.result), if_none_match)
 
 
 @router.get(
@@ -105,7 +108,7 @@ def comparison(
     try:
         tracks = service.engine.compare(spec, dataset, values, wanted)
     except ValueError as error:
-        raise _failed(error) from None
+        raise failed(error) from None
     return JSONResponse(views.comparison(tracks))
 
 
@@ -142,7 +145,7 @@ def events(
     ] = None,
 ) -> StreamingResponse:
     """Send generations and states as they happen; ends after the final state."""
-    _row(service, run_id)
+    run_row(service, run_id)
     text = (last_event_id or "0").strip()
     if not (text.isascii() and text.isdecimal() and len(text) <= 15):
         item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
@@ -154,33 +157,35 @@ def events(
 
 @router.post(
     "/simulations",
-    response_model=SimulationOut,
+    response_model=SimulationOut | ForceSimulationOut,
     responses=http.errors(409),
     summary="Simulate one recording's condition",
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
     dataset = load(service, body.dataset_id)
-    _check_recording(dataset, body.recording, "body.recording")
-    spec, values = _asked(service, dataset, body)
+    check_recording(dataset, body.recording, "body.recording")
+    spec_views.refuse_foreign(body, dataset)
+    spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
+    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body)
+    values = _asked(service, dataset, spec, body)
     try:
-        tracks = service.engine.compare(spec, dataset, values, body.recording)
+        simulated = _tracks if dataset.kind == "tracks" else _forces
+        return JSONResponse(simulated(service, spec, dataset, values, body))
     except ValueError as error:
-        raise _failed(error) from None
-    answer = views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)}
-    names = load_views.wanted(body.outputs)
-    if names:
-        found = _loads(service, spec, dataset, values, dataset.recording(body.recording))
-        answer["outputs"] = load_views.outputs(found, names)
-    return JSONResponse(answer)
+        raise failed(error) from None
 
 
 @router.post("/loads", response_model=LoadsOut, responses=http.errors(409), summary="Simulate any condition's loads")
 def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     """Simulate a genome of the caller's for its loads, under any condition; nothing is stored."""
     dataset = load(service, body.dataset_id)
-    _check_recording(dataset, body.recording, "body.recording")
-    spec, values = _asked(service, dataset, body)
+    check_recording(dataset, body.recording, "body.recording")
+    if dataset.kind != "tracks":
+        item = error_item("body.dataset_id", body.dataset_id, "describes a vehicle; loads inside the wing need a wing")
+        raise invalid("there are no such loads", [item])
+    spec = spec_views.of_simulation(body.division, body.accuracy_mm)
+    values = _asked(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))
     found = _loads(service, spec, dataset, values, changed)
@@ -189,16 +194,35 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     )
 
 
-def _asked(service: Service, dataset: Dataset, body: SimulationIn) -> tuple[CalibrationSpec, dict[str, float]]:
-    """Division, accuracy and full genome of a simulation; a 422 where they cannot be."""
-    spec = CalibrationSpec(division=body.division, bounds_factor=WIDEST_BOUNDS, accuracy=body.accuracy_mm / views.MM)
+def _tracks(
+    service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
+) -> dict[str, Any]:
+    tracks = service.engine.compare(spec, dataset, genome, body.recording)
+    answer = views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)}
+    names = load_views.wanted(body.outputs)
+    if names:
+        found = _loads(service, spec, dataset, genome, dataset.recording(body.recording))
+        answer["outputs"] = load_views.outputs(found, names)
+    return answer
+
+
+def _forces(
+    service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
+) -> dict[str, Any]:
+    found = service.engine.forces(spec, dataset, genome, body.recording, "nominal")
+    agreements = service.engine.agreements(spec, dataset, genome, body.recording)
+    return force_views.forces(found, "given") | {"agreements": [force_views.agreement(a, "given") for a in agreements]}
+
+
+def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
+    """Full genome of a simulation; a 422 where it cannot be."""
     known = gene_names(service, spec, dataset)
     unknown = [name for name in body.genome if name not in known]
     if unknown:
         message = f"unknown gene; known are {', '.join(known)}"
         raise invalid("unknown genes", [error_item("body.genome", name, message) for name in unknown])
     try:
-        return spec, service.engine.genome(spec, dataset, body.genome)
+        return service.engine.genome(spec, dataset, body.genome)
     except ValueError as error:
         raise invalid("a value is out of bounds", [error_item("body.genome", None, str(error))]) from None
 
@@ -207,10 +231,12 @@ def _chosen(
     service: Service, run_id: str, recording: str | None, genome: Literal["best", "nominal"]
 ) -> tuple[Dataset, CalibrationSpec, str, dict[str, float]]:
     """What a simulation of a run is of: its dataset and spec, the name of a recording, and a genome."""
-    row = _row(service, run_id)
+    row = run_row(service, run_id)
+    if row.kind != "tracks":
+        raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")
     dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
-    _check_recording(dataset, wanted, "query.recording")
+    check_recording(dataset, wanted, "query.recording")
     return dataset, spec, wanted, _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
 
 
@@ -220,10 +246,11 @@ def _loads(
     try:
         return service.engine.loads(spec, dataset, genome, recording)
     except ValueError as error:
-        raise _failed(error) from None
+        raise failed(error) from None
 
 
-def _row(service: Service, run_id: str) -> RunRow:
+def run_row(service: Service, run_id: str) -> RunRow:
+    """The run, or a 404."""
     with service.database.read() as session:
         return store.run(session, run_id)
 
@@ -240,11 +267,13 @@ def _no_result(row: RunRow) -> str:
     return f"run {row.id} is {row.state}; it has a result when it has SUCCEEDED"
 
 
-def _check_recording(dataset: Dataset, name: str, where: str) -> None:
+def check_recording(dataset: Dataset, name: str, where: str) -> None:
+    """A 422 for a recording that the dataset does not have."""
     known = [recording.name for recording in dataset.recordings]
     if name not in known:
         raise invalid("unknown recording", [error_item(where, name, f"unknown; known are {', '.join(known)}")])
 
 
-def _failed(error: ValueError) -> ProblemError:
+def failed(error: ValueError) -> ProblemError:
+    """A 409 for a simulation that failed, with a remedy."""
     return conflict(f"the simulation failed: {with_remedy(str(error))}")

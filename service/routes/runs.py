@@ -10,9 +10,10 @@ from starlette.responses import Response
 
 from calibration.search import CalibrationSpec
 from records import Dataset
-from service import http, store, views
+from service import http, spec_views, store, views
 from service.problems import ProblemError, error_item, invalid
-from service.schemas import Page, RunIn, RunOut
+from service.schemas import Page, RunOut
+from service.spec_schemas import RunIn
 from service.state import Service, ServiceDep
 from service.tables import RunRow
 from workers import jobs
@@ -36,18 +37,16 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
     if earlier:
         return http.sent(earlier)
     dataset = load(service, body.dataset_id)
-    spec = CalibrationSpec(
-        **body.model_dump(exclude={"dataset_id", "name", "accuracy_mm", "recordings", "genes"}),
-        accuracy=body.accuracy_mm / views.MM,
-        recordings=tuple(body.recordings),
-        genes=tuple(body.genes),
-    )
-    _check(service, spec, dataset)
-    name = body.name or f"{dataset.name}, division {spec.division}"[:200]
+    spec_views.refuse_foreign(body, dataset)
+    spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
+    spec = _checked(service, spec_views.of_run(body), dataset)
+    model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
+    name = body.name or f"{dataset.name}, {model}"[:200]
 
     def create(session: Session) -> store.Answer:
         store.dataset(session, body.dataset_id)
-        row = RunRow(id=store.new_id("run"), name=name, dataset_id=body.dataset_id, spec=store.spec_json(spec))
+        row = RunRow(id=store.new_id("run"), name=name, dataset_id=body.dataset_id, kind=dataset.kind)
+        row.spec = store.spec_json(spec)
         row.created_at, row.evaluations, row.elapsed_seconds = store.now(), 0, 0.0
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
         session.add(row)
@@ -123,18 +122,20 @@ def gene_names(service: Service, spec: CalibrationSpec, dataset: Dataset) -> tup
     try:
         return service.engine.gene_names(spec, dataset)
     except ValueError as error:
-        item = error_item("body.division", spec.division, str(error))
-        raise invalid("there is no such model of this wing", [item]) from None
+        tracks = dataset.kind == "tracks"
+        where, value = ("body.division", spec.division) if tracks else ("body.without", ", ".join(spec.without))
+        raise invalid("there is no such model", [error_item(where, value, str(error))]) from None
 
 
-def _check(service: Service, spec: CalibrationSpec, dataset: Dataset) -> None:
+def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
+    """The specification with everything decided, or a 422."""
     known_genes = gene_names(service, spec, dataset)
     known_recordings = tuple(recording.name for recording in dataset.recordings)
     faults = _unknown("recordings", spec.recordings, known_recordings) + _unknown("genes", spec.genes, known_genes)
     if faults:
         raise invalid("the request names what does not exist", faults)
     try:
-        service.engine.check(spec, dataset)
+        return service.engine.check(spec, dataset)
     except ValueError as error:
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
 

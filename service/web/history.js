@@ -2,30 +2,59 @@
 
 import { mm, significant } from "./format.js";
 import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
+import { mn } from "./words.js";
 
-const GAP = { sequence: null, best: null, mean: null, best_mm: null };
+const GAP = { sequence: null, best: null, mean: null };
+const SIDE_BY_SIDE = 3; // stages whose names fit over the figure; of more, they stand upright
+const UNDER_NAMES = 0.78;
+const LONGEST_UPRIGHT = 9;
+const FEW = 12; // points of a stage, each worth a dot
 
-export async function drawHistory(node, items) {
+// "test-1, Gauss-Newton" is named by its recording, unless it finishes a search on the same one.
+function stageLabel(name, stages, upright) {
+  const base = name.replace(", Gauss-Newton", "");
+  if (base !== name && stages.has(base)) return upright ? "" : "Gauss-Newton";
+  if (!upright) return base === name ? `${name} stage` : base;
+  return base.length > LONGEST_UPRIGHT ? `${base.slice(0, LONGEST_UPRIGHT - 1)}…` : base;
+}
+
+const MARKERS = {
+  unit: "m²", hover: (item) => `, ${mm(item.best_mm)} mm per marker`,
+  about: "Sum of squared distances between simulated and recorded markers; lower is better.",
+};
+const FORCES = {
+  unit: "N²", hover: (item) => `, RMS ${mn(item.best_mn)} mN, ${item.stage}: genes moved by ${significant(item.diversity, 2)} of their range`,
+  about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weighs recordings and axes by their noise, so that the sum need not fall every time.",
+};
+
+export const aboutHistory = (forces) => (forces ? FORCES : MARKERS).about;
+
+export async function drawHistory(node, items, forces = false) {
+  const shown = forces ? FORCES : MARKERS;
   const Plotly = await plotly();
   const look = theme();
   const x = items.map((item) => item.sequence);
   // The stages sum over different recordings: a line across their boundary would compare what cannot be compared.
   const points = items.flatMap((item, i) => (i && items[i - 1].stage !== item.stage ? [GAP, item] : [item]));
-  const line = (name, key, colour, width, labels) => ({
-    x: points.map((item) => item.sequence), y: points.map((item) => item[key]), name, mode: items.length < 3 ? "lines+markers" : "lines", type: "scatter",
+  const boundaries = items.filter((item, i) => i === 0 || items[i - 1].stage !== item.stage);
+  const stages = new Set(boundaries.map((item) => item.stage));
+  const upright = boundaries.length > SIDE_BY_SIDE;
+  const dots = items.length < 3 || (forces && items.length < FEW * boundaries.length);
+  const line = (name, value, colour, width, labels) => ({
+    x: points.map((item) => item.sequence), y: points.map(value), name, mode: dots ? "lines+markers" : "lines", type: "scatter",
     line: { color: colour, width }, marker: { color: colour, size: 6 }, text: labels,
-    hovertemplate: `%{y:.4g} m²${labels ? ", %{text} mm per marker" : ""}<extra>${name}</extra>`,
+    hovertemplate: `%{y:.4g} ${shown.unit}${labels ? "%{text}" : ""}<extra>${name}</extra>`,
   });
   const traces = [
-    line("mean", "mean", look.faint, 1.5),
-    line("best", "best", look.accent, 2.5, points.map((item) => mm(item.best_mm))),
+    // A Gauss-Newton iteration has one individual, so no mean beside it.
+    line("mean", (item) => (item.mean === item.best ? null : item.mean), look.faint, 1.5),
+    line("best", (item) => item.best, look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
   ];
-  const boundaries = items.filter((item, i) => i === 0 || items[i - 1].stage !== item.stage);
   const figure = layout(look, {
     margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
     xaxis: axis(look, { title: { text: "generation", standoff: 8 }, showgrid: false, range: span(x), tickformat: "d" }),
     yaxis: axis(look, {
-      title: { text: "fitness, m²", standoff: 8 }, type: "log", ...logTicks(traces.flatMap((trace) => trace.y)),
+      title: { text: `fitness, ${shown.unit}`, standoff: 8 }, type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)),
     }),
     shapes: boundaries.slice(1).map((item) => ({
       type: "line", x0: item.sequence - 0.5, x1: item.sequence - 0.5, yref: "paper", y0: 0, y1: 1,
@@ -33,8 +62,8 @@ export async function drawHistory(node, items) {
     })),
     annotations: [
       ...boundaries.map((item, i) => ({
-        text: `${item.stage} stage`, x: i ? item.sequence - 0.5 : item.sequence, yref: "paper", y: 1, xanchor: "left",
-        yanchor: "bottom", showarrow: false, font: { color: look.quiet, size: 12 },
+        text: stageLabel(item.stage, stages, upright), x: i || upright ? item.sequence - 0.5 : item.sequence, yref: "paper", y: 1, xanchor: "left",
+        yanchor: upright ? "top" : "bottom", textangle: upright ? 90 : 0, showarrow: false, font: { color: look.quiet, size: 12 },
       })),
       ...endLabels(traces),
     ],
@@ -49,7 +78,7 @@ function logTicks(values) {
   const known = values.filter((value) => value > 0);
   if (!known.length) return {};
   const [low, high] = [Math.min(...known), Math.max(...known)];
-  const digits = high / low < 300 ? [1, 2, 5] : [1];
+  const digits = high / low < 300 ? (high / low < 10 ? [1, 2, 3, 4, 6, 8] : [1, 2, 5]) : [1];
   const ticks = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
     ticks.push(...digits.map((digit) => digit * 10 ** power));

@@ -1,7 +1,8 @@
 // The lists of runs and datasets at the side.
 
 import { isFinal } from "./api.js";
-import { $, duration, el, mm, plural, size, when } from "./format.js";
+import { $, DASH, duration, el, plural, size, when } from "./format.js";
+import { isForces, misfit, modelOf } from "./words.js";
 
 const WORDS = {
   QUEUED: "waiting", RUNNING: "running", PAUSED: "paused", SUCCEEDED: "done", FAILED: "failed", CANCELLED: "cancelled",
@@ -11,7 +12,7 @@ const WISHES = { PAUSE: "pausing", CANCEL: "cancelling" };
 
 export const badge = (run) => el("span", { className: `badge ${LOOKS[run.state] ?? ""}` }, WISHES[run.wish] ?? WORDS[run.state]);
 
-export const runName = (run) => run.name || `${run.spec.division} bodies, ${run.spec.mode}`;
+export const runName = (run) => run.name || `${modelOf(run)}, ${run.spec.mode}`;
 
 export function setBar(bar, run) {
   const percent = Math.round(100 * run.progress);
@@ -45,7 +46,8 @@ export function drawRuns(runs, currentId) {
   const items = runs.map((run) => {
     const bar = el("div", { className: "bar" }, el("span"));
     setBar(bar, run);
-    const best = run.best_mm === null ? "" : `${mm(run.best_mm)} mm`;
+    const { value, unit } = misfit(run);
+    const best = value === DASH ? "" : `${value} ${unit}`;
     const card = el("a", { className: "card", href: `#run=${encodeURIComponent(run.id)}` },
       el("span", { className: "line" }, el("strong", {}, runName(run)), badge(run)), bar,
       el("span", { className: "line" }, el("span", {}, timeLeft(run) || when(run.created_at)), el("span", {}, best)));
@@ -58,7 +60,7 @@ export function drawRuns(runs, currentId) {
 export function drawDatasets(datasets, { onRun, onDelete }) {
   const items = datasets.map((dataset) => {
     const held = dataset.recordings.filter((recording) => recording.held_out).length;
-    const about = `${plural(dataset.recordings.length, "recording")}${held ? `, ${held} held out` : ""}`;
+    const about = `${plural(dataset.recordings.length, "recording")} of ${isForces(dataset) ? "forces" : "markers"}${held ? `, ${held} held out` : ""}`;
     const button = (text, action, key) => keyed(el("button", { type: "button", onclick: () => action(dataset) }, text), `${key}-${dataset.id}`);
     return el("li", {}, el("div", { className: "card" },
       el("strong", { title: dataset.description }, dataset.name),

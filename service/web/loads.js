@@ -2,7 +2,7 @@
 
 import { get, part } from "./api.js";
 import { $, el, significant } from "./format.js";
-import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
+import { lines } from "./plots.js";
 
 const ASKED = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
 
@@ -93,34 +93,14 @@ async function draw() {
   const middle = out.strips.map((strip) => mean(strip.span_mm));
   const byStrip = (key) => out.strips.map((strip) => mean(strip[key]));
   await Promise.all([
-    lines("load-torque", out.phase, [["front", torque.front], ["rear", torque.rear]], { unit: "N m" }),
-    lines("load-power", out.phase, [
+    lines($("load-torque"), out.phase, [["front", torque.front], ["rear", torque.rear]], { unit: "N m" }),
+    lines($("load-power"), out.phase, [
       ["front motor", power.front_motor], ["rear motor", power.rear_motor], ["air", power.air], ["dampers", power.dampers],
     ], { unit: "W" }),
-    lines("load-air", out.phase, [["lift", out.lift_n], ["thrust", out.thrust_n]], { unit: "N" }),
-    lines("load-strips", middle, [["lift", byStrip("lift_n")], ["thrust", byStrip("thrust_n")]],
+    lines($("load-air"), out.phase, [["lift", out.lift_n], ["thrust", out.thrust_n]], { unit: "N" }),
+    lines($("load-strips"), middle, [["lift", byStrip("lift_n")], ["thrust", byStrip("thrust_n")]],
       { unit: "N", x: "mm along the span", dots: true }),
-    lines("load-bending", out.phase, cuts, { unit: "N m", shades: true }),
-    lines("load-energy", out.phase, [["kinetic", kinetic], ["elastic", elastic], ["gravitational", gravitational]], { unit: "J" }),
+    lines($("load-bending"), out.phase, cuts, { unit: "N m", shades: true }),
+    lines($("load-energy"), out.phase, [["kinetic", kinetic], ["elastic", elastic], ["gravitational", gravitational]], { unit: "J" }),
   ]).catch((error) => { $("loads-note").textContent = error.message; });
-}
-
-async function lines(id, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false }) {
-  const Plotly = await plotly();
-  const look = theme();
-  const traces = series.map(([name, y], k) => {
-    const colour = shades ? look.accent : look.series[k];
-    return {
-      x, y, name, type: "scatter", mode: dots ? "lines+markers" : "lines", opacity: shades ? 1 - (0.75 * k) / series.length : 1,
-      line: { color: colour, width: 2, simplify: false }, marker: { color: colour, size: 6 }, hovertemplate: `%{y:.3g} ${unit}<extra>${name}</extra>`,
-    };
-  });
-  const phase = dots ? {} : { range: [0, 1], dtick: 0.25 };
-  const figure = layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", showlegend: true,
-    legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
-    xaxis: axis(look, { title: { text: xTitle, standoff: 6 }, showgrid: false, ...phase }),
-    yaxis: axis(look, { title: { text: unit, standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
-  });
-  return Plotly.react($(id), traces, figure, CONFIG);
 }

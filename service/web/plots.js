@@ -40,3 +40,28 @@ export function layout(look, extra) {
 export const axis = (look, extra) => ({
   gridcolor: look.line, linecolor: look.line, zeroline: false, ticks: "", automargin: true, ...extra,
 });
+
+export const legend = (look) => ({
+  showlegend: true, legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
+});
+
+export const PHASE = { range: [0, 1], dtick: 0.25 };
+
+// Curves [name, y] over the phase of the beat, or with ``dots`` over something else.
+export async function lines(node, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false }) {
+  const Plotly = await plotly();
+  const look = theme();
+  const traces = series.map(([name, y], k) => {
+    const colour = shades ? look.accent : look.series[k];
+    return {
+      x, y, name, type: "scatter", mode: dots ? "lines+markers" : "lines", opacity: shades ? 1 - (0.75 * k) / series.length : 1,
+      line: { color: colour, width: 2, simplify: false }, marker: { color: colour, size: 6 }, hovertemplate: `%{y:.3g} ${unit}<extra>${name}</extra>`,
+    };
+  });
+  const figure = layout(look, {
+    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", ...legend(look),
+    xaxis: axis(look, { title: { text: xTitle, standoff: 6 }, showgrid: false, ...(dots ? {} : PHASE) }),
+    yaxis: axis(look, { title: { text: unit, standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
+  });
+  return Plotly.react(node, traces, figure, CONFIG);
+}

@@ -2,12 +2,14 @@
 
 import { call, follow, get, history, isFinal, part } from "./api.js";
 import { $, copy, curl, plural, toast, when } from "./format.js";
-import { drawHistory } from "./history.js";
+import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
+import { aboutHistory, drawHistory } from "./history.js";
 import { badge, runName, setBar, timeLeft } from "./lists.js";
 import { redrawLoads } from "./loads.js";
 import { remove } from "./submit.js";
 import { drawGenes, drawMisfit, drawNumbers } from "./tables.js";
-import { redrawWing, setUpViewer, showWing } from "./viewer.js";
+import { hideWing, redrawWing, setUpViewer, showWing } from "./viewer.js";
+import { isForces, setup } from "./words.js";
 
 const ALLOWED = {
   pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],
@@ -27,6 +29,7 @@ let hooks = {};
 export function setUpRun(given) {
   hooks = given;
   setUpViewer();
+  setUpForces();
   $("actions").addEventListener("click", (event) => {
     const action = event.target.dataset?.action;
     if (action) act(action);
@@ -62,6 +65,7 @@ export async function selectRun(id) {
     return;
   }
   $("run").hidden = false;
+  suit();
   update();
   if (!isFinal(run)) listen();
 }
@@ -69,8 +73,21 @@ export async function selectRun(id) {
 export function redraw() {
   if (!run) return;
   drawFitness();
+  if (isForces(run)) {
+    redrawForces();
+    return;
+  }
   redrawWing();
   redrawLoads();
+}
+
+// The parts that belong to what the run is fitted to: tracked markers or forces.
+function suit() {
+  const forces = isForces(run);
+  (forces ? hideWing : hideForces)();
+  $("tracks-part").hidden = forces;
+  $("forces-part").hidden = !forces;
+  $("history-about").textContent = aboutHistory(forces);
 }
 
 function listen() {
@@ -82,7 +99,7 @@ function listen() {
       if (item.sequence > run.generations) {
         run = {
           ...run, stage: item.stage, generations: item.sequence, evaluations: item.evaluations,
-          best_mm: item.best_mm, progress: item.progress, eta_seconds: item.eta_seconds,
+          best_mm: item.best_mm, best_mn: item.best_mn, progress: item.progress, eta_seconds: item.eta_seconds,
         };
       }
       schedule();
@@ -109,15 +126,17 @@ function schedule() {
 async function update() {
   drawHead();
   drawFitness();
-  showWing(run, dataset);
+  if (isForces(run)) showForces(run, dataset, result);
+  else showWing(run, dataset);
   const id = run.id;
   if (run.state === "SUCCEEDED" && !result) {
     await get(`runs/${part(id)}/result`).then((answer) => {
       if (run?.id !== id) return;
       result = answer;
       drawNumbers(run, result);
-      drawMisfit(result);
-      drawGenes({ genes: result.genes, final: true });
+      if (isForces(run)) showForces(run, dataset, result);
+      else drawMisfit(result);
+      drawGenes({ genes: result.genes, final: true }, isForces(run));
     }, (error) => toast(error.message));
   } else if (!result && run.generations > 0 && (isFinal(run) || Date.now() - genesAt > GENES_MS)) {
     genesAt = Date.now();
@@ -128,14 +147,13 @@ async function update() {
 function drawHead() {
   document.title = `${runName(run)} · wingfit`;
   $("run-name").replaceChildren(runName(run), " ", badge(run));
-  $("run-about").textContent = `${dataset.name} · ${run.spec.division} bodies, ${run.spec.mode} · population ${run.spec.population}, `
-    + `seed ${run.spec.seed} · solved to ${run.spec.accuracy_mm} mm · ${when(run.created_at)}`;
+  $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
   $("run-error").hidden = !run.error;
   $("run-error").textContent = run.error ?? "";
   setBar($("run-bar"), run);
   $("run-bar").hidden = run.state === "SUCCEEDED";
   const percent = `${Math.round(100 * run.progress)} %`;
-  const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && `${run.stage} stage` : null,
+  const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && (isForces(run) ? run.stage : `${run.stage} stage`) : null,
     plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
   $("run-progress").textContent = parts.filter(Boolean).join(" · ");
   for (const button of $("actions").querySelectorAll("[data-action]")) {
@@ -152,7 +170,7 @@ function drawFitness() {
   $("history-note").textContent = {
     QUEUED: "The run waits for its turn.", RUNNING: "The first generation is being computed.",
   }[run.state] ?? "No generation was finished.";
-  if (sorted.length) drawHistory($("history"), sorted).catch((error) => toast(error.message));
+  if (sorted.length) drawHistory($("history"), sorted, isForces(run)).catch((error) => toast(error.message));
 }
 
 async function act(action) {

@@ -1,9 +1,12 @@
 // Starting a run and uploading a dataset; the server checks, and its words are shown where they belong.
 
-import { ApiError, call, part, postJson } from "./api.js";
+import { ApiError, call, get, part, postJson } from "./api.js";
 import { $, copy, curl, el, size, toast } from "./format.js";
+import { showErrors } from "./said.js";
+import { isForces, METHODS, MODES, PRESETS, spoken } from "./words.js";
 
-const NUMBERS = ["population", "seed", "accuracy_mm"];
+let datasets = [];
+let models = null;
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");
@@ -16,7 +19,7 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
     // The same input sent twice is one run: a new key only when something was changed.
     const text = JSON.stringify(body);
     if (sent?.text !== text) sent = { text, key: randomKey() };
-    showErrors(form, null);
+    showErrors(form, $("submit-errors"), null);
     button.disabled = true;
     try {
       const run = await postJson("runs", body, { "Idempotency-Key": sent.key });
@@ -24,18 +27,22 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
       $("submit-dialog").close();
       onSubmitted(run);
     } catch (error) {
-      showErrors(form, error);
+      showErrors(form, $("submit-errors"), error);
     } finally {
       button.disabled = false;
     }
   });
+  form.dataset_id.addEventListener("change", () => suit(form));
+  form.method.addEventListener("change", () => suitMethod(form));
+  form.preset.addEventListener("change", () => suitPreset(form));
   $("submit-close").addEventListener("click", () => $("submit-dialog").close());
   $("submit-curl").addEventListener("click", () => copy(curl("runs", values(form))));
   $("pick-file").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-export function openSubmit(datasets, datasetId) {
+export function openSubmit(known, datasetId) {
+  datasets = known;
   if (!datasets.length) {
     toast("Upload a dataset first");
     return;
@@ -43,7 +50,8 @@ export function openSubmit(datasets, datasetId) {
   const form = $("submit-form");
   form.dataset_id.replaceChildren(...datasets.map((dataset) => new Option(dataset.name, dataset.id)));
   form.dataset_id.value = datasetId ?? datasets[0].id;
-  showErrors(form, null);
+  showErrors(form, $("submit-errors"), null);
+  suit(form);
   $("submit-dialog").showModal();
 }
 
@@ -51,25 +59,65 @@ export function openSubmit(datasets, datasetId) {
 const randomKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 function values(form) {
-  const body = { dataset_id: form.dataset_id.value, division: form.division.value, mode: form.mode.value };
+  const body = { dataset_id: form.dataset_id.value, method: form.method.value, mode: form.mode.value };
+  const forces = isForces(chosenDataset(form));
+  if (forces) Object.assign(body, { preset: form.preset.value, without: unticked("terms"), axes: ticked("axes") });
+  else body.division = form.division.value;
+  if (searches(form)) body.finish = form.finish.checked;
   // What is not a number goes to the server as it was typed: it knows what to say about it.
-  for (const name of NUMBERS) if (form[name].value !== "") body[name] = Number(form[name].value);
+  for (const name of numbers(form, forces)) if (form[name].value !== "") body[name] = Number(form[name].value);
   const name = form.elements.namedItem("name").value.trim();
   return name ? { ...body, name } : body;
 }
 
-function showErrors(form, error) {
-  const box = $("submit-errors");
-  box.hidden = !error;
-  for (const field of form.elements) field.removeAttribute("aria-invalid");
-  if (!error) return;
-  const items = (error.errors ?? []).map((item) => {
-    const field = item.where.split(".").at(-1);
-    form.elements.namedItem(field)?.setAttribute?.("aria-invalid", "true");
-    return el("li", {}, `${field}: ${item.message}${item.value === null ? "" : ` (it is ${JSON.stringify(item.value)})`}`);
-  });
-  box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));
+const numbers = (form, forces) => [
+  ...(searches(form) ? ["population", "seed"] : []), ...(forces ? ["low_pass_hz", "peel_width_beats"] : ["accuracy_mm"]),
+];
+
+const searches = (form) => form.method.value !== "gauss_newton";
+const boxes = (id) => [...$(id).querySelectorAll("input")];
+const ticked = (id) => boxes(id).filter((box) => box.checked).map((box) => box.value);
+const unticked = (id) => boxes(id).filter((box) => !box.checked).map((box) => box.value);
+const chosenDataset = (form) => datasets.find((dataset) => dataset.id === form.dataset_id.value);
+
+// Show what belongs to the kind of the chosen dataset.
+async function suit(form) {
+  const dataset = chosenDataset(form);
+  const forces = isForces(dataset);
+  for (const node of form.querySelectorAll("[data-kind]")) node.hidden = node.dataset.kind !== (forces ? "forces" : "tracks");
+  options(form.method, METHODS, forces ? ["gauss_newton", "genetic", "cma_es"] : ["genetic", "cma_es", "gauss_newton"]);
+  options(form.mode, MODES, forces ? ["local", "joint"] : ["staged", "joint", "local"]);
+  suitMethod(form);
+  if (!forces) return;
+  const recorded = new Set(dataset.recordings.flatMap((recording) => recording.channels.map((name) => name.replace("force_", ""))));
+  $("axes").replaceChildren(...[...recorded].map((axis) => tick(axis, axis, axis === "x" || recorded.size === 1)));
+  try {
+    models ??= await get("models");
+  } catch (error) {
+    showErrors(form, $("submit-errors"), error);
+    return;
+  }
+  options(form.preset, PRESETS, models.presets.map((preset) => preset.name));
+  suitPreset(form);
 }
+
+function suitMethod(form) {
+  for (const node of form.querySelectorAll("[data-search]")) node.hidden = !searches(form);
+}
+
+function suitPreset(form) {
+  const preset = models.presets.find((one) => one.name === form.preset.value);
+  $("preset-about").textContent = `${preset.description}. ${preset.source}.`;
+  const terms = preset.terms.map((name) => models.terms.find((term) => term.name === name));
+  $("terms").replaceChildren(...terms.map((term) => tick(term.name, spoken(term.name), true, `${term.description} (${term.equation})`)));
+}
+
+function options(select, words, values) {
+  select.replaceChildren(...values.map((value) => new Option(words[value] ?? spoken(value), value)));
+}
+
+const tick = (value, text, checked, title = "") =>
+  el("label", { className: "tick", title }, el("input", { type: "checkbox", value, checked }), ` ${text}`);
 
 async function upload(file, onUploaded) {
   if (!file) return;

@@ -1,12 +1,15 @@
 // Tables of a run: numbers at the top, misfit by recording, genes.
 
 import { $, el, mm, plural, significant } from "./format.js";
+import { isForces, misfit, mn } from "./words.js";
 
 export function drawNumbers(run, result) {
   const cell = (label, value, unit = "", main = false) =>
     el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
-  const cells = result ? outcome(result, cell) : [
-    cell("best so far, mean distance per marker", mm(run.best_mm), "mm", true),
+  const { value, unit } = misfit(run);
+  const what = isForces(run) ? "best so far, RMS difference" : "best so far, mean distance per marker";
+  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result, cell) : [
+    cell(what, value, unit, true),
     cell("stage", run.stage ?? "–"),
     cell("generations", String(run.generations)),
     cell("evaluations", run.evaluations.toLocaleString("en")),
@@ -27,6 +30,18 @@ function outcome(result, cell) {
   if (result.noise_mm) {
     cells.push(cell("floor: tracking noise alone", mm(result.noise_mm), "mm"));
     cells.push(cell("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
+  }
+  return cells;
+}
+
+function forceOutcome(result, cell) {
+  const cells = [
+    cell("before, RMS of the fitted forces", mn(result.before_mn), "mN"),
+    cell("after, RMS of the fitted forces", mn(result.after_mn), "mN", true),
+  ];
+  if (result.held_out_after_mn !== null) {
+    cells.push(cell("before, held out", mn(result.held_out_before_mn), "mN"));
+    cells.push(cell("after, held out, predicted", mn(result.held_out_after_mn), "mN", true));
   }
   return cells;
 }
@@ -63,9 +78,12 @@ export function drawMisfit(result) {
     + result.remarks.map((remark) => ` Note: ${remark}.`).join("");
 }
 
-export function drawGenes(genome) {
+// ``means``: of a run on forces that has ended, whose genes stand as the means of its estimates.
+export function drawGenes(genome, means = false) {
   $("genes-section").hidden = !genome;
   if (!genome) return;
+  $("genes-title").textContent = means ? "All genes of the model" : "Best genome";
+  $("genes-best").textContent = means ? "Mean of the estimates" : "Best";
   $("genes").tBodies[0].replaceChildren(...genome.genes.map(geneRow));
   const searched = genome.genes.filter((gene) => gene.searched);
   const known = searched.filter((gene) => gene.identifiable);

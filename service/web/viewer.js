@@ -46,6 +46,13 @@ export function showWing(next, dataset) {
   if (changed || ended || stale || key() !== asked) load({ quiet: !changed });
 }
 
+export function hideWing() {
+  stop();
+  request += 1;
+  [run, tracks] = [null, null];
+  clearLoads();
+}
+
 export function redrawWing() {
   if (tracks) draw();
 }

@@ -20,10 +20,12 @@ from service.app import create_app
 from service.client import Client
 from service.commands.simulate import solved
 from service.database import FILE_NAME
-from service.engine import WingEngine
+from service.engine import ModelEngine
 from service.remedies import FLUTTER, with_remedy
-from service.schemas import COARSEST_MM, FINEST_MM, ComparisonOut, NumericsOut
+from service.schemas import ComparisonOut, NumericsOut
 from service.settings import Settings
+from service.spec_schemas import COARSEST_MM, FINEST_MM
+from service.spec_views import spec_out
 from sim.flexible_wing import FlexibleWing
 from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing, tunnel, vacuum
@@ -66,8 +68,9 @@ def test_the_limits_are_published(client: httpx.Client) -> None:
 
 
 def test_what_is_not_said_is_what_the_library_does() -> None:
-    assert views.spec(CalibrationSpec()).accuracy_mm == 0.1
-    assert CalibrationSpec().accuracy == Numerics().accuracy == 1e-4
+    usual = CalibrationSpec(mode="staged", method="genetic")
+    assert spec_out(usual).accuracy_mm == 0.1
+    assert usual.accuracy == Numerics().accuracy == 1e-4
 
 
 def test_a_run_shows_and_uses_its_accuracy(api: Api) -> None:
@@ -170,7 +173,7 @@ def dataset() -> Dataset:
 
 
 def test_the_real_engine_solves_as_well_as_asked(dataset: Dataset) -> None:
-    engine = WingEngine()
+    engine = ModelEngine()
     rough, fine = (CalibrationSpec(division="4", accuracy=accuracy) for accuracy in (1e-3, 2e-5))
     genome = engine.genome(rough, dataset, {})
     found = [engine.compare(spec, dataset, genome, "still") for spec in (rough, fine, fine)]
@@ -191,7 +194,7 @@ def test_the_real_loads_are_given_the_accuracy_too(dataset: Dataset, monkeypatch
     """It is what they fall back on where their own, which is finer, cannot be had."""
     given: list[float] = []
     monkeypatch.setattr("service.engine.simulate_outputs", lambda model, *_: given.append(model.numerics.accuracy))
-    engine, spec = WingEngine(), CalibrationSpec(division="4", accuracy=3e-4)
+    engine, spec = ModelEngine(), CalibrationSpec(division="4", accuracy=3e-4)
     engine.loads(spec, dataset, engine.genome(spec, dataset, {}), dataset.recordings[0])
     assert given == [3e-4]
 

@@ -72,9 +72,26 @@ COMMANDS = dict(_commands(typer.main.get_command(cli.app)))
 
 
 def test_the_commands_are_those_promised() -> None:
-    steer = ["list", "submit", "show", "watch", "cancel", "pause", "resume", "delete", "genome", "result"]
+    steer = [
+        "list",
+        "submit",
+        "show",
+        "watch",
+        "cancel",
+        "pause",
+        "resume",
+        "delete",
+        "genome",
+        "result",
+        "forces",
+        "predict",
+    ]
     data = ["list", "upload", "show", "download", "delete", "check"]
-    expected = {"serve", "campaign", "simulate"} | {f"runs {c}" for c in steer} | {f"datasets {c}" for c in data}
+    expected = (
+        {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models"}
+        | {f"runs {c}" for c in steer}
+        | {f"datasets {c}" for c in data}
+    )
     assert set(COMMANDS) == expected
 
 

@@ -170,6 +170,7 @@ def test_results(client: Client, dataset_id: str) -> None:
     run_id = client.submit_run(dataset_id, max_generations=3)["id"]
     client.wait(run_id)
     result = client.result(run_id)
+    assert result["kind"] == "tracks"
     assert result["before_mm"] == pytest.approx(2.0)
     assert client.genome(run_id) == {"genes": result["genes"], "final": True}
     best = client.comparison(run_id)

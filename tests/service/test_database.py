@@ -11,8 +11,13 @@ from alembic.migration import MigrationContext
 from sqlalchemy import create_engine, text
 from sqlalchemy.exc import IntegrityError, OperationalError
 
-from service.database import FILE_NAME, Database, DatabaseClosedError, DataFolderError
+from service.app import create_app
+from service.database import FILE_NAME, Database, DatabaseClosedError, DataFolderError, migrate
+from service.schemas import DatasetOut, ResultOut, RunOut
+from service.settings import Settings
 from service.tables import ArchiveRow, Table
+from tests.service import toy
+from tests.service.conftest import Api, serving
 
 
 def test_migrations_from_nothing_give_the_tables_that_the_code_means(tmp_path: Path) -> None:
@@ -21,7 +26,7 @@ def test_migrations_from_nothing_give_the_tables_that_the_code_means(tmp_path: P
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, Table.metadata) == []
-        assert context.get_current_revision() == "0001"
+        assert context.get_current_revision() == "0002"
     engine.dispose()
 
 
@@ -111,3 +116,27 @@ def test_the_folder_has_one_owner(tmp_path: Path) -> None:
     with pytest.raises(DatabaseClosedError), database.write():
         pass
     Database(tmp_path).close()
+
+
+def test_what_the_first_schema_stored_is_all_there(tmp_path: Path) -> None:
+    """A database of the first release, with a finished run on tracks and one half-way, is migrated and served."""
+    engine = create_engine(f"sqlite:///{tmp_path / FILE_NAME}")
+    migrate(engine, "0001")
+    engine.dispose()
+    with sqlite3.connect(tmp_path / FILE_NAME) as connection:
+        connection.executescript((Path(__file__).parent / "first_release.sql").read_text())
+    connection.close()
+    app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        api = Api(client)
+        dataset = DatasetOut.model_validate(api.get("/v1/datasets/ds_1"))
+        assert (dataset.kind, dataset.markers, dataset.recordings[0].channels) == ("tracks", 2, [])
+        done = RunOut.model_validate(api.run("run_1"))
+        assert (done.kind, done.best_mm, done.best_mn) == ("tracks", 1.5, None)
+        assert (done.spec.mode, done.spec.method, done.spec.finish, done.spec.seed) == ("staged", "genetic", False, 4)
+        result = ResultOut.model_validate(api.get("/v1/runs/run_1/result"))
+        assert (result.kind, result.after_mm) == ("tracks", 1.5)
+        (item,) = api.history("run_1")
+        assert (item["best_mm"], item["best_mn"]) == (1.5, None)
+        went_on = api.finish("run_2")
+        assert (went_on["state"], went_on["generations"]) == ("SUCCEEDED", 10)

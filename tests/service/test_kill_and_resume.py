@@ -1,4 +1,4 @@
-"""A real calibration of the example campaign, killed in mid-run, ends with the numbers of an undisturbed one."""
+"""Real calibrations, of tracks and of forces, killed in mid-run, end with the numbers of undisturbed ones."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from tests.service import force_data
 from tests.service.conftest import FINAL, Api
 from tests.service.processes import ROOT, ServerProcess
 
@@ -18,10 +19,6 @@ PATIENCE = 300.0
 
 Json = dict[str, Any]
 
-pytestmark = pytest.mark.skipif(
-    not (EXAMPLE / "dataset.yaml").exists(), reason=f"the example campaign {EXAMPLE.name} is not there"
-)
-
 
 def server(data: Path, evaluator: str) -> ServerProcess:
     env = {"WINGFIT_EVALUATOR": evaluator}
@@ -30,6 +27,7 @@ def server(data: Path, evaluator: str) -> ServerProcess:
     return ServerProcess(data, ("service.server",), env)
 
 
+@pytest.mark.skipif(not (EXAMPLE / "dataset.yaml").exists(), reason=f"the example campaign {EXAMPLE.name} is not there")
 def test_killed_in_mid_run_and_resumed_equals_undisturbed(tmp_path: Path) -> None:
     with server(tmp_path / "undisturbed", "in_process") as one:
         run = _submit(one.api)
@@ -46,6 +44,39 @@ def test_killed_in_mid_run_and_resumed_equals_undisturbed(tmp_path: Path) -> Non
         outcome = _outcome(second.api, run)
         assert second.api.history(run)[: len(before)] == before
     assert outcome == expected
+
+
+def test_a_run_on_forces_killed_in_search_and_in_gauss_newton_equals_undisturbed(tmp_path: Path) -> None:
+    with server(tmp_path / "undisturbed", "in_process") as one:
+        expected = _outcome(one.api, _submit_forces(one.api))
+    data, before = tmp_path / "killed", []
+    with server(data, "processes") as first:
+        run = _submit_forces(first.api)
+        first.api.until(run, lambda r: r["generations"] >= 2, PATIENCE)
+        first.kill()
+    with server(data, "in_process") as second:
+        state = second.api.until(run, lambda r: _in_newton(r["stage"]) or r["state"] in FINAL, PATIENCE)
+        before = second.api.history(run)
+        second.kill()
+        assert state["state"] == "RUNNING", "the kill came too late to test anything"
+    with server(data, "processes") as third:
+        outcome = _outcome(third.api, run)
+        assert third.api.history(run)[: len(before)] == before
+    assert outcome == expected
+    assert {_in_newton(item["stage"]) for item in outcome[0]} == {True, False}
+
+
+def _in_newton(stage: str | None) -> bool:
+    return stage is not None and stage.endswith(", Gauss-Newton")
+
+
+def _submit_forces(api: Api) -> str:
+    answer = api.client.post("/v1/datasets", files={"file": ("delfly.zip", force_data.archive())})
+    assert answer.status_code == 201, answer.text
+    search = {"method": "cma_es", "finish": True, "population": 12, "max_generations": 12, "stall": 12, "seed": 3}
+    answer = api.client.post("/v1/runs", json=search | {"dataset_id": answer.json()["id"], "axes": ["x", "z"]})
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["id"])
 
 
 def _submit(api: Api) -> str:

@@ -19,7 +19,7 @@ from records import Condition, Dataset
 from service import cli, load_views
 from service.answers import CONDITION
 from service.client import Client, WingfitError
-from service.engine import WingEngine
+from service.engine import ModelEngine
 from service.load_schemas import OUTPUT_NAMES, ConditionIn, LoadsOut, OutputsOut
 from sim.rig import blank_recording, robird_wing, tunnel
 from tests.service.conftest import Api, Gate
@@ -265,7 +265,7 @@ def test_the_real_engine() -> None:
     wing = robird_wing()
     recording = blank_recording(wing, tunnel(0.05, 3.0, 6.0), "windy")
     dataset = Dataset("robird", wing, (recording,))
-    engine, spec = WingEngine(), CalibrationSpec(division="4", bounds_factor=100.0)
+    engine, spec = ModelEngine(), CalibrationSpec(division="4", bounds_factor=100.0)
     found = engine.loads(spec, dataset, engine.genome(spec, dataset, {}), recording)
     answer = load_views.outputs(found, load_views.wanted(True))
     valid = OutputsOut.model_validate(json.loads(json.dumps(answer)))

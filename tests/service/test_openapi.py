@@ -10,7 +10,7 @@ import httpx
 import pytest
 from pydantic import BaseModel
 
-from service import schemas
+from service import force_schemas, schemas, spec_schemas
 
 DOCS = Path(__file__).parents[2] / "docs" / "api.md"
 Specification = dict[str, Any]
@@ -67,7 +67,16 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
 
 
 @pytest.mark.parametrize(
-    "model", [schemas.RunIn, schemas.RunOut, schemas.DatasetOut, schemas.SimulationIn, schemas.ProblemOut]
+    "model",
+    [
+        spec_schemas.RunIn,
+        schemas.RunOut,
+        schemas.DatasetOut,
+        schemas.SimulationIn,
+        schemas.LoadsIn,
+        schemas.ProblemOut,
+        force_schemas.PredictionIn,
+    ],
 )
 def test_examples_are_valid(model: type[BaseModel]) -> None:
     extra = model.model_config["json_schema_extra"]
@@ -89,4 +98,5 @@ def test_the_page_to_read_needs_no_other_origin(client: httpx.Client, specificat
 def test_the_schema_of_datasets_is_published(client: httpx.Client) -> None:
     schema = client.get("/v1/schemas/dataset").json()
     assert schema["$schema"].startswith("https://json-schema.org/")
-    assert schema["properties"]
+    kinds = [schema["$defs"][part["$ref"].rpartition("/")[2]]["properties"] for part in schema["anyOf"]]
+    assert ["wing" in kinds[0], "vehicle" in kinds[1]] == [True, True]

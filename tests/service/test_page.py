@@ -5,82 +5,24 @@ from __future__ import annotations
 import json
 import os
 import shlex
-import shutil
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tests.service import toy
+from tests.service.browsing import DRAWN, Seen, chromium
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, ConsoleMessage, Page
-
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-ARGUMENTS = (
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-)
-GENERATIONS = 10
+    from playwright.sync_api import Browser
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="install playwright: pip install -e '.[dev]'")
-    path = next((found for name in NAMES if (found := shutil.which(name))), None)
-    if path is None:
-        pytest.skip("no chromium to drive; install it, e.g. apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+    with chromium() as browser:
         yield browser
-        browser.close()
-
-
-@dataclass
-class Seen:
-    """A page and what it said and asked for."""
-
-    page: Page
-    base: str
-    errors: list[str] = field(default_factory=list)
-    foreign: list[str] = field(default_factory=list)
-
-    def open(self, run_id: str | None = None) -> None:
-        self.page.goto(f"{self.base}/" + (f"#run={run_id}" if run_id else ""))
-
-    def data(self, figure: str, trace: int, name: str) -> list[Any]:
-        """A coordinate of a trace, as Plotly draws it."""
-        script = f"Array.from(document.getElementById('{figure}').data?.[{trace}]?.{name} ?? [])"
-        return list(self.page.evaluate(script))
-
-    def wait(self, condition: str, seconds: float = 15.0) -> None:
-        # Polled from here: Playwright's own polling needs eval in the page, which the content policy rightly forbids.
-        deadline = time.monotonic() + seconds
-        while not self.page.evaluate(condition):
-            assert time.monotonic() < deadline, f"not within {seconds:g} s: {condition}; errors: {self.errors}"
-            self.page.wait_for_timeout(50)
-
-
-def _seen(page: Page, base: str) -> Seen:
-    seen = Seen(page, base)
-
-    def note(message: ConsoleMessage) -> None:
-        if message.type == "error":
-            seen.errors.append(message.text)
-
-    page.on("console", note)
-    page.on("pageerror", lambda error: seen.errors.append(str(error)))
-    own = (base, "data:", "blob:")
-    page.on("request", lambda request: None if request.url.startswith(own) else seen.foreign.append(request.url))
-    return seen
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +37,7 @@ def seen(browser: Browser, server: ServerProcess) -> Iterator[Seen]:
     base = f"http://127.0.0.1:{server.port}"
     context = browser.new_context(viewport={"width": 1300, "height": 900})
     context.grant_permissions(["clipboard-read", "clipboard-write"], origin=base)
-    yield _seen(context.new_page(), base)
+    yield Seen.watched(context.new_page(), base)
     context.close()
 
 
@@ -108,9 +50,6 @@ def _finished(server: ServerProcess, dataset_id: str) -> str:
     run_id = str(server.api.submit(dataset_id, name="finished")["id"])
     assert server.api.finish(run_id)["state"] == "SUCCEEDED"
     return run_id
-
-
-DRAWN = "document.getElementById('{}').data?.length > {}"
 
 
 def test_an_empty_page_says_what_to_do(seen: Seen) -> None:
@@ -273,7 +212,7 @@ def test_a_phone_needs_no_sideways_scrolling(
     browser: Browser, server: ServerProcess, dataset: dict[str, Any], scheme: Any
 ) -> None:
     context = browser.new_context(viewport={"width": 360, "height": 740}, color_scheme=scheme)
-    seen = _seen(context.new_page(), f"http://127.0.0.1:{server.port}")
+    seen = Seen.watched(context.new_page(), f"http://127.0.0.1:{server.port}")
     seen.open(_finished(server, dataset["id"]))
     seen.wait(DRAWN.format("wing", 2))
     seen.wait("!document.getElementById('genes-section').hidden")
@@ -286,7 +225,7 @@ def test_a_phone_needs_no_sideways_scrolling(
 def test_the_page_outlives_the_server(browser: Browser, tmp_path: Path) -> None:
     with ServerProcess(tmp_path / "data", ("tests.service.toy_server", "0.05")) as server:
         context = browser.new_context()
-        seen = _seen(context.new_page(), f"http://127.0.0.1:{server.port}")
+        seen = Seen.watched(context.new_page(), f"http://127.0.0.1:{server.port}")
         run_id = server.api.submit(server.api.upload()["id"], max_generations=40)["id"]
         seen.open(run_id)
         seen.wait(DRAWN.format("history", 1))

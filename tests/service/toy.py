@@ -16,10 +16,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from calibration.estimation import Prediction
 from calibration.evaluator import Evaluator
+from calibration.force_result import Agreement, ForceComparison, GlobalModel, Source
 from calibration.problem import Evaluation, Problem
 from calibration.result import Comparison, GeneResult, RecordingResult, Result
-from calibration.search import CalibrationSpec, Generation
+from calibration.search import CalibrationSpec, Generation, resolved
 from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
 from sim.model import Solution
 from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
@@ -80,9 +82,10 @@ class ToyEngine:
             raise ArchiveError(Fault(f"{filename}, line 1", data[:20].hex(), f"not a toy archive: {error}")) from None
         return Dataset(plain["name"], _wing(), tuple(_recording(name) for name in names), held_out)
 
-    def check(self, spec: CalibrationSpec, dataset: Dataset) -> None:
+    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
         if spec.recordings and set(spec.recordings) <= set(dataset.held_out):
             raise ValueError("only held-out recordings are named; name one that may be fitted")
+        return resolved(spec, dataset)
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
         if spec.division not in ("4", "11", "24", "3,3,2"):
@@ -137,13 +140,17 @@ class ToyEngine:
             with self._lock:
                 self.at_once -= 1
 
+    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+        return {STAGES[0]: checkpoint["genome"]}
+
     def summarise(
         self,
         spec: CalibrationSpec,
         dataset: Dataset,
         evaluator: Evaluator,
-        genome: Mapping[str, float],
+        checkpoint: dict[str, Any],
     ) -> Result:
+        genome = checkpoint["genome"]
         records = tuple(
             RecordingResult(r.name, r.name in dataset.held_out, "structural", 8, 2e-3, misfit(genome))
             for r in dataset.recordings
@@ -178,6 +185,19 @@ class ToyEngine:
         if genome["stiffness"] > 9:
             raise ValueError("the simulation diverged at 0.1 s")
         return _loads(genome["stiffness"] * recording.condition.flap_frequency / 3.0)
+
+    def forces(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
+    ) -> ForceComparison:
+        raise AssertionError("the toy is a wing")
+
+    def agreements(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> tuple[Agreement, ...]:
+        raise AssertionError("the toy is a wing")
+
+    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
+        raise AssertionError("the toy is a wing")
 
 
 def _loads(size: float, n: int = 16) -> Outputs:

@@ -1,0 +1,58 @@
+"""Uncertainty of forces from beat to beat: what one beat says about a gene differs from what the next one says.
+
+The scatter of measured forces grows and falls with the forces themselves, since the flow separates anew in every beat.
+Such noise is not stationary within the beat. A formula that takes its correlations as those of a stationary one
+(:mod:`calibration.coloured`) gives too small an error to a gene that acts where the scatter is large, and too large a
+one to a gene that acts elsewhere. From beat to beat it is stationary. So the scores S^T R^-1 v are summed over each
+whole beat, and the covariance of their sum is estimated from the series of beats with a flat-topped taper (Politis and
+Romano 1995; for scores: Newey and West 1987).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Recording
+
+Array = npt.NDArray[np.float64]
+
+ENOUGH = 24  # beats from which their series is taken at its word
+FEWEST = 8  # beats below which it says too little to be looked at
+TAPER = np.array([1.0, 1.0, 1.0, 0.5])  # of lags 0, 1, 2, 3 beats
+LEAST_FREEDOM = 4.0
+WHOLE = 0.9  # of the samples that most beats have: what a beat must have to count
+
+
+def beat_scores(record: Recording, white: Array, sensitivity: Array) -> tuple[Array, float]:
+    """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], zero where not seen.
+
+    Also the share of all samples seen that lies in whole beats.
+    """
+    beat = np.floor(record.times * record.condition.flap_frequency + 1e-6).astype(np.int64)
+    beat -= beat[0]
+    scores = np.zeros((int(beat[-1]) + 1, sensitivity.shape[2]))
+    np.add.at(scores, beat, np.einsum("tcp,tc->tp", sensitivity, white))
+    count = np.bincount(beat, weights=(white != 0.0).any(axis=1))
+    whole = count >= WHOLE * np.median(count[count > 0])
+    return scores[whole], float(count[whole].sum() / count.sum())
+
+
+def beat_score_covariance(scores: Array, samples_used: float) -> Array:
+    """Covariance [F, F] of the sum of all scores, from those of B whole beats [B, F].
+
+    The fit makes the scores add up to zero, as if their mean had been taken off; of what the taper sums, this loses the
+    share sum_k taper_k (B - |k|) / B^2. ``samples_used`` is the share of all samples that lies in whole beats. B beats
+    tell a covariance with about nu = B / sum_k taper_k^2 degrees of freedom; what is estimated by it then follows
+    Student's t, whose variance is nu / (nu - 2).
+    """
+    beats = len(scores)
+    total, pairs = TAPER[0] * scores.T @ scores, TAPER[0] * beats
+    for lag, weight in enumerate(TAPER[1:], 1):
+        product = scores[lag:].T @ scores[:-lag]
+        total += weight * (product + product.T)
+        pairs += 2 * weight * (beats - lag)
+    freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())
+    spread = freedom / (freedom - 2.0) if freedom > LEAST_FREEDOM else LEAST_FREEDOM / (LEAST_FREEDOM - 2.0)
+    value, axes = np.linalg.eigh(total * spread / (1.0 - pairs / beats**2) / samples_used)
+    return np.asarray((axes * np.maximum(value, 0.0)) @ axes.T)

@@ -1,0 +1,23 @@
+"""Forces: the kind of a dataset and of a run, and misfits in mN beside those in mm."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0002"
+down_revision = "0001"
+
+
+def upgrade() -> None:
+    """Add the columns; whatever is there is of tracks."""
+    for table in ("dataset", "run"):
+        op.add_column(table, sa.Column("kind", sa.String, nullable=False, server_default="tracks"))
+    for table in ("run", "generation"):
+        op.add_column(table, sa.Column("best_mn", sa.Double))
+
+
+def downgrade() -> None:
+    """Drop the columns."""
+    for table, column in (("dataset", "kind"), ("run", "kind"), ("run", "best_mn"), ("generation", "best_mn")):
+        op.drop_column(table, column)

@@ -1,0 +1,66 @@
+"""What a run on forces has found: forces over the beat, and predictions; the models that there are."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query
+from starlette.responses import JSONResponse, Response
+
+from service import force_views, http, sources, store
+from service.force_schemas import ForcesOut, ModelsOut, PredictionIn, PredictionOut, Source
+from service.problems import conflict
+from service.routes.outcomes import check_recording, failed, run_row
+from service.state import ServiceDep
+
+router = APIRouter(prefix="/v1", tags=["forces"])
+
+
+@router.get("/models", responses=http.errors(), summary="Models of vehicles")
+def models() -> ModelsOut:
+    """List the blade-element models that there are, and the terms they are made of, with their sources."""
+    return force_views.models()
+
+
+@router.get(
+    "/runs/{run_id}/forces", response_model=ForcesOut, responses=http.errors(404, 409), summary="Forces over the beat"
+)
+def forces(
+    service: ServiceDep,
+    run_id: str,
+    recording: Annotated[str | None, Query(max_length=200, description="default: the first of the dataset")] = None,
+    source: Annotated[
+        Source | None, Query(description="of the coefficients; default: the run's best for that recording")
+    ] = None,
+) -> Response:
+    """Return modelled beside recorded forces over the beat, and their spectra, of one recording."""
+    row = run_row(service, run_id)
+    if row.kind != "forces":
+        raise conflict(f"run {run_id} is on tracks; /v1/runs/{run_id}/comparison has them")
+    dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
+    wanted = dataset.recordings[0].name if recording is None else recording
+    check_recording(dataset, wanted, "query.recording")
+    try:
+        chosen = sources.chosen(service, row, dataset, wanted, source)
+        found = service.engine.forces(spec, dataset, chosen.genome, wanted, chosen.source)
+    except ValueError as error:
+        raise failed(error) from None
+    answer = force_views.forces(found)
+    return JSONResponse(answer | {"remarks": [*chosen.remarks, *answer["remarks"]]})
+
+
+@router.post(
+    "/runs/{run_id}/predictions",
+    response_model=PredictionOut,
+    responses=http.errors(404, 409),
+    summary="Predict forces under any condition",
+)
+def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
+    """Return the forces over a beat that the run's global model predicts; nothing is stored."""
+    row = run_row(service, run_id)
+    law = sources.law(row, dataset := service.datasets.get(row.dataset_id))
+    try:
+        found = service.engine.predict(store.spec(row), dataset, law, force_views.condition(body))
+    except ValueError as error:
+        raise failed(error) from None
+    return JSONResponse(force_views.prediction(found))

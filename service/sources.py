@@ -1,0 +1,88 @@
+"""Which coefficients a run on forces offers for a recording: those found on it, on all, or by a law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from calibration.force_result import GlobalModel, Source
+from records import Dataset
+from service import force_views, store
+from service.problems import conflict
+from service.state import Service
+from service.tables import RunRow
+from workers.jobs import State
+
+# What stands for a run where nothing is asked for: what was fitted to the recording first, then what predicts it.
+PREFERENCE: tuple[Source, ...] = ("local", "joint", "global", "average", "nominal")
+
+
+# Coefficients and what must be known about them.
+Give = Callable[[], tuple[Mapping[str, float], tuple[str, ...]]]
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A source, its full genome by name, and what must be known about it."""
+
+    source: Source
+    genome: Mapping[str, float]
+    remarks: tuple[str, ...] = ()
+
+
+def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, asked: Source | None) -> Chosen:
+    """The genome of the source that is ``asked`` for, or of the best one; a 409 where the run does not have it."""
+    spec = store.spec(row)
+    offered = _offered(service, row, dataset, recording)
+    source = asked or next(name for name in PREFERENCE if name in offered)
+    if source not in offered:
+        there_are = ", ".join(name for name in PREFERENCE if name in offered)
+        later = "" if row.result else "; more when the run has SUCCEEDED"
+        raise conflict(
+            f"run {row.id} has no {source} coefficients for recording {recording!r}; it has: {there_are}{later}",
+            state=row.state,
+        )
+    values, remarks = offered[source]()
+    return Chosen(source, service.engine.genome(spec, dataset, {}) | dict(values), remarks)
+
+
+def law(row: RunRow, dataset: Dataset) -> GlobalModel:
+    """The run's global model; a 409 that says why there is none."""
+    if row.kind != "forces":
+        raise conflict(f"run {row.id} is on tracks; only runs on forces predict")
+    if row.result is None:
+        ended = row.state in (State.FAILED, State.CANCELLED)
+        raise conflict(
+            f"run {row.id} is {row.state} and has no result" + ("" if ended else " yet; wait until it has SUCCEEDED"),
+            state=row.state,
+        )
+    stored = row.result["global_model"]
+    if stored is None:
+        why = next((remark for remark in row.result["remarks"] if "global model" in remark), None)
+        raise conflict(why or "the run has no global model: only mode 'local' gives one, one estimate per recording")
+    return force_views.law(stored, dataset)
+
+
+def _offered(service: Service, row: RunRow, dataset: Dataset, recording: str) -> dict[Source, Give]:
+    """What gives the coefficients of each source that there is, with remarks."""
+    spec = store.spec(row)
+    with service.database.read() as session:
+        checkpoint = store.checkpoint(session, row.id)
+    found = service.engine.found(spec, dataset, checkpoint) if checkpoint else {}
+
+    def by_law() -> tuple[Mapping[str, float], tuple[str, ...]]:
+        predicted = service.engine.predict(spec, dataset, law(row, dataset), dataset.recording(recording).condition)
+        return predicted.values, predicted.remarks
+
+    offered: dict[Source, Give] = {"nominal": lambda: ({}, ())}
+    fitted: Source
+    fitted, stage = ("joint", "joint") if spec.mode == "joint" else ("local", recording)
+    if stage in found:
+        offered[fitted] = lambda: (found[stage], ())
+    if row.result is not None and spec.mode == "local":
+        # The average of the estimates is what the result calls best.
+        average = {gene["name"]: gene["best"] for gene in row.result["genes"]}
+        offered["average"] = lambda: (average, ())
+        if row.result["global_model"] is not None:
+            offered["global"] = by_law
+    return offered

@@ -1,0 +1,30 @@
+"""Units of people at the edge; numbers that do not exist become null."""
+
+from __future__ import annotations
+
+import math
+
+MM = 1e3
+MN = 1e3
+PASCAL_PER_MBAR = 100.0
+ZERO_CELSIUS = 273.15
+
+
+def mm(value: float | None) -> float | None:
+    """Metres to millimetres."""
+    return None if value is None else finite(value * MM)
+
+
+def mn(value: float | None) -> float | None:
+    """Newtons to millinewtons."""
+    return None if value is None else finite(value * MN)
+
+
+def tidy_mm(stated: float) -> float:
+    """A distance (m) that somebody stated, in mm as they wrote it: 0.07, not 0.07000000000000001."""
+    return round(stated * MM, 9)
+
+
+def finite(value: float) -> float | None:
+    """``value``, or None where JSON has no number for it."""
+    return float(value) if math.isfinite(value) else None

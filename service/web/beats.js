@@ -1,0 +1,92 @@
+// Forces over the beat, recorded and modelled, and their power spectra.
+
+import { $, significant } from "./format.js";
+import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "./plots.js";
+import { mn, QUANTITIES, SOURCES } from "./words.js";
+
+const HARMONICS = 8;
+const DECADES = 6;
+
+// Draw the quantities ``names`` (at most two); the answer is a note on what is seen.
+export async function drawBeats(forces, names, about) {
+  const Plotly = await plotly();
+  const look = theme();
+  for (const k of [0, 1]) {
+    for (const figure of ["beat", "spectrum"]) $(`${figure}-${k}`).parentElement.hidden = !names[k];
+    if (!names[k]) continue;
+    $(`beat-${k}-title`).textContent = `${QUANTITIES[names[k]]}: mean beat`;
+    $(`spectrum-${k}-title`).textContent = `${QUANTITIES[names[k]]}: power spectrum`;
+    drawBeat(Plotly, $(`beat-${k}`), look, forces, names[k]);
+    drawSpectrum(Plotly, $(`spectrum-${k}`), look, forces, names[k], about.flap_frequency_hz);
+  }
+  const off = names.map((name) => `${name} ${mn(meanBeatDifference(forces, name))} mN`).join(", ");
+  const wide = forces.spread_n[names[0]] ? " The band is one standard deviation between beats." : "";
+  return [
+    `${forces.recording}: ${significant(about.flap_frequency_hz)} Hz, body pitch ${significant(about.angle_of_attack_deg)}°, `
+      + `${significant(about.airspeed_m_s)} m/s. RMS difference of the mean beats with the ${SOURCES[forces.source].toLowerCase()} model: ${off}.${wide}`,
+    ...forces.remarks.map((remark) => `Note: ${remark}.`),
+  ].join(" ");
+}
+
+function meanBeatDifference(forces, name) {
+  const [recorded, modelled] = [forces.recorded_n[name], forces.modelled_n[name]];
+  return 1e3 * Math.sqrt(recorded.reduce((sum, value, i) => sum + (value - modelled[i]) ** 2, 0) / recorded.length);
+}
+
+// A beat has no last instant: its end is the start of the next.
+const closed = (values) => [...values, values[0]];
+
+function drawBeat(Plotly, node, look, forces, name) {
+  const x = [...forces.phase, forces.phase[0] + 1];
+  const recorded = closed(forces.recorded_n[name]);
+  const spread = forces.spread_n[name] && closed(forces.spread_n[name]);
+  const edge = (sign, extra) => ({
+    x, y: recorded.map((value, i) => value + sign * spread[i]), type: "scatter", mode: "lines", line: { width: 0 },
+    hoverinfo: "skip", showlegend: false, ...extra,
+  });
+  const curve = (label, y, line) => ({
+    x, y, name: label, type: "scatter", mode: "lines", line: { simplify: false, ...line }, hovertemplate: `%{y:.3f} N<extra>${label}</extra>`,
+  });
+  const traces = [
+    ...(spread ? [edge(-1, {}), edge(1, { fill: "tonexty", fillcolor: `${look.faint}59` })] : []),
+    curve(SOURCES[forces.source].toLowerCase(), closed(forces.modelled_n[name]), { color: look.accent, width: 3.5 }),
+    curve("recorded", recorded, { color: look.ink, width: 1.25 }),
+  ];
+  return Plotly.react(node, traces, layout(look, {
+    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", ...legend(look),
+    xaxis: axis(look, { title: { text: "t*, beats; 0: wings closest", standoff: 6 }, showgrid: false, ...PHASE }),
+    yaxis: axis(look, { title: { text: "N", standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
+  }), CONFIG);
+}
+
+// The model repeats beat by beat, so all its power is at harmonics: dots there, not a line through nothing.
+function drawSpectrum(Plotly, node, look, forces, name, frequency) {
+  const recorded = forces.recorded_spectrum_n2_hz[name];
+  node.parentElement.hidden = !recorded;
+  if (!recorded) return null;
+  const modelled = forces.modelled_spectrum_n2_hz[name];
+  const seen = forces.frequency_hz.map((hz, i) => i).filter((i) => forces.frequency_hz[i] > 0 && forces.frequency_hz[i] <= (HARMONICS + 0.5) * frequency);
+  const highest = Math.max(...seen.map((i) => Math.max(recorded[i], modelled[i])));
+  const floor = highest / 10 ** DECADES;
+  const width = forces.frequency_hz[1] - forces.frequency_hz[0];
+  const offHarmonic = (i) => Math.abs(forces.frequency_hz[i] - frequency * Math.round(forces.frequency_hz[i] / frequency));
+  const series = (density, keep) => {
+    const some = seen.filter(keep);
+    return { x: some.map((i) => forces.frequency_hz[i]), y: some.map((i) => density[i]), type: "scatter" };
+  };
+  const label = SOURCES[forces.source].toLowerCase();
+  const text = (who) => `%{x:.1f} Hz: %{y:.2e} N²/Hz<extra>${who}</extra>`;
+  const traces = [
+    { ...series(recorded, (i) => recorded[i] > 0), name: "recorded", mode: "lines", line: { color: look.ink, width: 1.5 }, hovertemplate: text("recorded") },
+    { ...series(modelled, (i) => modelled[i] > floor && offHarmonic(i) <= width / 2), name: label, mode: "markers",
+      marker: { color: look.accent, size: 8 }, hovertemplate: text(label) },
+  ];
+  const top = Math.log10(highest);
+  return Plotly.react(node, traces, layout(look, {
+    margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
+    xaxis: axis(look, { title: { text: "Hz", standoff: 6 }, showgrid: false, range: [0, (HARMONICS + 0.5) * frequency] }),
+    yaxis: axis(look, {
+      title: { text: "N²/Hz", standoff: 6 }, type: "log", range: [top - DECADES, top + 0.3], dtick: 2, exponentformat: "power",
+    }),
+  }), CONFIG);
+}

@@ -1,0 +1,24 @@
+// The server's words: about an input, at the fields that they are about; and remarks on an outcome.
+
+import { el } from "./format.js";
+
+// "body.axes.0" is about the field axes.
+const fieldOf = (where) => where.split(".").filter((name) => !/^\d+$/.test(name)).at(-1);
+
+export function showErrors(form, box, error) {
+  box.hidden = !error;
+  for (const field of form.elements) field.removeAttribute("aria-invalid");
+  if (!error) return;
+  const items = (error.errors ?? []).map((item) => {
+    const field = fieldOf(item.where);
+    form.elements.namedItem(field)?.setAttribute?.("aria-invalid", "true");
+    const about = field === "body" ? "" : `${field}: `; // what is wrong with the whole needs no name
+    return el("li", {}, `${about}${item.message}${item.value === null ? "" : ` (it is ${JSON.stringify(item.value)})`}`);
+  });
+  box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));
+}
+
+export function showRemarks(list, remarks) {
+  list.hidden = !remarks.length;
+  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${remark[0].toUpperCase()}${remark.slice(1)}.`)));
+}

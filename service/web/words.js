@@ -1,0 +1,49 @@
+// What differs between runs on tracked markers and runs on forces, and the words for what a run can be set to.
+
+import { mm, significant } from "./format.js";
+
+export const isForces = (thing) => thing?.kind === "forces";
+
+export const METHODS = { genetic: "genetic", cma_es: "CMA-ES", gauss_newton: "Gauss-Newton" };
+export const MODES = {
+  staged: "staged, vacuum first", joint: "joint, all recordings together", local: "local, each recording by itself",
+};
+export const PRESETS = { proposed: "Proposed, with clap-and-peel", berman_wang: "Berman and Wang", dickinson: "Dickinson" };
+const SHORT = { proposed: "proposed model", berman_wang: "Berman-Wang model", dickinson: "Dickinson model" };
+
+// In the order in which they stand in tables; "left out" is the global model fitted without the recording.
+export const SOURCES = {
+  local: "Local", joint: "Joint", global: "Global", left_out: "Left out", average: "Average", nominal: "Nominal",
+};
+export const QUANTITIES = { lift: "Lift", drag: "Drag", x: "Force along x", z: "Force along z" };
+
+export const spoken = (name) => name.replaceAll("_", " ");
+
+export const modelOf = (run) => (isForces(run)
+  ? SHORT[run.spec.preset] ?? spoken(run.spec.preset)
+  : `${run.spec.division} bodies`);
+
+// The misfit of a run as the lists and the head of the page show it: a number and its unit.
+export function misfit(run) {
+  return isForces(run) ? { value: mn(run.best_mn), unit: "mN" } : { value: mm(run.best_mm), unit: "mm" };
+}
+
+export const mn = mm;
+
+export function setup(run) {
+  const { spec } = run;
+  const method = METHODS[spec.method] ?? spec.method ?? "genetic";
+  const search = spec.method === "gauss_newton" ? null : `population ${spec.population}, seed ${spec.seed}`;
+  const how = `${spec.mode}, ${method}${spec.finish && search ? " finished by Gauss-Newton" : ""}`;
+  return [modelOf(run), ...(isForces(run) ? forceSetup(spec) : []), how, search,
+    isForces(run) ? null : `solved to ${spec.accuracy_mm} mm`].filter(Boolean);
+}
+
+function forceSetup(spec) {
+  const cut = spec.low_pass_hz;
+  return [
+    spec.without.length ? `without ${spec.without.map(spoken).join(", ")}` : null,
+    `fitted to ${spec.axes.join(" and ")}`,
+    cut === 0 ? "no low-pass" : `low-pass at ${cut === null ? "3.2 × flap frequency" : `${significant(cut)} Hz`}`,
+  ];
+}

@@ -1,0 +1,86 @@
+"""A page in a browser, and what it said and asked for."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Self
+
+import pytest
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, ConsoleMessage, Page
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+)
+DRAWN = "document.getElementById('{}').data?.length > {}"
+
+
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A browser; the test is skipped where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="install playwright: pip install -e '.[dev]'")
+    path = next((found for name in NAMES if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.skip("no chromium to drive; install it, e.g. apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=list(ARGUMENTS))
+        yield browser
+        browser.close()
+
+
+@dataclass
+class Seen:
+    """A page and what it said and asked for."""
+
+    page: Page
+    base: str
+    errors: list[str] = field(default_factory=list)
+    foreign: list[str] = field(default_factory=list)
+
+    @classmethod
+    def watched(cls, page: Page, base: str) -> Self:
+        """Note the page's errors and its requests to other origins from now on."""
+        seen = cls(page, base)
+
+        def note(message: ConsoleMessage) -> None:
+            if message.type == "error":
+                seen.errors.append(message.text)
+
+        page.on("console", note)
+        page.on("pageerror", lambda error: seen.errors.append(str(error)))
+        own = (base, "data:", "blob:")
+        page.on("request", lambda request: None if request.url.startswith(own) else seen.foreign.append(request.url))
+        return seen
+
+    def open(self, run_id: str | None = None) -> None:
+        self.page.goto(f"{self.base}/" + (f"#run={run_id}" if run_id else ""))
+
+    def data(self, figure: str, trace: int, name: str) -> list[Any]:
+        """A coordinate of a trace, as Plotly draws it."""
+        script = f"Array.from(document.getElementById('{figure}').data?.[{trace}]?.{name} ?? [])"
+        return list(self.page.evaluate(script))
+
+    def rows(self, table: str) -> list[list[str]]:
+        """The texts of the cells of a table's body."""
+        script = (
+            f"[...document.querySelectorAll('#{table} tbody tr')].map((r) => [...r.cells].map((c) => c.textContent))"
+        )
+        return list(self.page.evaluate(script))
+
+    def wait(self, condition: str, seconds: float = 15.0) -> None:
+        # Polled from here: Playwright's own polling needs eval in the page, which the content policy rightly forbids.
+        deadline = time.monotonic() + seconds
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < deadline, f"not within {seconds:g} s: {condition}; errors: {self.errors}"
+            self.page.wait_for_timeout(50)

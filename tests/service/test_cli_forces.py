@@ -1,0 +1,176 @@
+"""Forces on the command line and in the Python client, against a running server, as a user types it."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from records import load_dataset
+from service.client import Client, WingfitError
+from sim.balance import TRIALS, read_truth
+from tests.service import force_data
+from tests.service.processes import ServerProcess
+from tests.service.test_cli import wingfit
+
+Wingfit = Callable[..., tuple[int, str, str]]
+
+__all__ = ["wingfit"]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
+    data = tmp_path_factory.mktemp("cli") / "data"
+    with ServerProcess(data, ("service.server",), {"WINGFIT_EVALUATOR": "in_process"}) as process:
+        yield process
+
+
+@pytest.fixture(scope="module")
+def client(server: ServerProcess) -> Iterator[Client]:
+    with Client(f"http://127.0.0.1:{server.port}") as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def dataset_id(client: Client, tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("data") / "delfly.zip"
+    path.write_bytes(force_data.archive())
+    return client.upload_dataset(path)["id"]
+
+
+@pytest.fixture(scope="module")
+def run_id(client: Client, dataset_id: str) -> str:
+    run = client.submit_run(dataset_id)
+    assert client.wait(run["id"])["state"] == "SUCCEEDED"
+    return run["id"]
+
+
+def test_submit_with_every_option(wingfit: Wingfit, client: Client, dataset_id: str) -> None:
+    words = ["--method", "cma_es", "--mode", "joint", "--finish", "--preset", "berman_wang", "--without", "inertial"]
+    words += ["--axis", "x", "--axis", "z", "--low-pass-hz", "0", "--peel-width", "0.02", "--max-generations", "3"]
+    code, out, err = wingfit("runs", "submit", dataset_id, *words, "--population", "4", "--watch", "--json")
+    assert code == 0, err
+    assert " mN" in err
+    spec = client.run(json.loads(out)["id"])["spec"]
+    assert (spec["method"], spec["mode"], spec["finish"], spec["preset"]) == ("cma_es", "joint", True, "berman_wang")
+    assert (spec["without"], spec["axes"], spec["low_pass_hz"]) == (["inertial"], ["x", "z"], 0)
+    assert spec["peel_width_beats"] == 0.02
+
+
+def test_what_is_left_out_is_decided_by_the_server(wingfit: Wingfit, run_id: str, dataset_id: str) -> None:
+    shown = wingfit("runs", "show", run_id)[1]
+    assert "method gauss_newton" in shown
+    assert " mN RMS" in shown
+    assert " mN" in wingfit("runs", "list", "--dataset", dataset_id)[1]
+    assert "body pitch" in wingfit("datasets", "show", dataset_id)[1]
+
+
+def test_the_result_as_tables(wingfit: Wingfit, client: Client, run_id: str) -> None:
+    code, out, err = wingfit("runs", "result", run_id)
+    assert code == 0
+    result = client.result(run_id)
+    assert result["kind"] == "forces"
+    one = result["estimates"][0]["coefficients"][0]
+    assert f"[{one['low_90']:.4g}, {one['high_90']:.4g}]" in out
+    lines = out.splitlines()
+    (head,) = (line for line in lines if line.startswith("RMS difference, mN"))
+    assert head.split()[-6:] == ["global", "average", "nominal", "global,", "left", "out"]
+    held = next(line for line in lines if line.startswith("test-7 (held out)"))
+    said = {
+        a["source"]: a["rmse_n"]
+        for a in result["agreements"]
+        if (a["recording"], a["quantity"]) == (force_data.HELD_OUT, "lift")
+    }
+    assert held.split()[4] == "–", "nothing was estimated on a recording that was held out"
+    assert held.split()[5] == f"{1e3 * (said['global'] or 0):.2f}"
+    assert "fitted from 10.3 to 13.3 Hz" in out
+    assert err.count("scatter cannot be told") == 1
+    assert json.loads(wingfit("runs", "result", run_id, "--json")[1]) == result
+
+
+def test_forces_as_table_csv_and_page(wingfit: Wingfit, client: Client, run_id: str, tmp_path: Path) -> None:
+    beat, page = tmp_path / "beat.csv", tmp_path / "beat.html"
+    words = ["runs", "forces", run_id, "--recording", "test-4", "--source", "average", "-o", str(beat)]
+    code, out, _ = wingfit(*words, "--plot", str(page))
+    assert code == 0
+    assert "recording test-4, coefficients: average" in out
+    answer = client.forces(run_id, "test-4", "average")
+    rows = list(csv.DictReader(beat.open()))
+    assert [float(row["modelled_lift_n"]) for row in rows] == answer["modelled_n"]["lift"]
+    assert [float(row["phase"]) for row in rows] == answer["phase"]
+    assert {"recorded_x_n", "spread_z_n"} <= set(rows[0])
+    text = page.read_text()
+    assert "lift, spectrum" in text
+    assert "<script src=" not in text
+    assert json.loads(wingfit("runs", "forces", run_id, "--json")[1]) == client.forces(run_id)
+    assert wingfit("runs", "forces", run_id, "--source", "best")[0] == 2
+    assert wingfit("runs", "forces", run_id, "--plot", "x.png")[0] == 2
+    code, _, err = wingfit("runs", "forces", run_id, "--source", "joint")
+    assert (code, "it has: local, global" in err) == (1, True)
+
+
+def test_predict(wingfit: Wingfit, client: Client, run_id: str, tmp_path: Path) -> None:
+    beat = tmp_path / "beat.csv"
+    words = ["--flap-frequency-hz", "14", "--body-pitch-deg", "72", "--airspeed-m-s", "0.6", "--pressure-mbar", "900"]
+    code, out, err = wingfit("runs", "predict", run_id, *words, "-o", str(beat))
+    assert code == 0
+    found = client.predict(run_id, flap_frequency_hz=14.0, body_pitch_deg=72.0, airspeed_m_s=0.6, pressure_mbar=900.0)
+    assert f"warning: {found['warnings'][0]}" in err
+    assert f"{1e3 * found['averages_n']['lift']:.2f}" in out
+    assert [float(row["drag_n"]) for row in csv.DictReader(beat.open())] == found["drag_n"]
+    thinner = client.predict(
+        run_id, flap_frequency_hz=14.0, body_pitch_deg=72.0, airspeed_m_s=0.6, pressure_mbar=900.0, temperature_c=60.0
+    )
+    assert abs(thinner["averages_n"]["lift"]) < abs(found["averages_n"]["lift"])
+
+
+def test_models(wingfit: Wingfit, client: Client) -> None:
+    out = wingfit("models")[1]
+    assert "proposed: with clap-and-peel" in out
+    assert "Eqs. 2, 3, 8" in out
+    assert json.loads(wingfit("models", "--json")[1]) == client.models()
+
+
+def test_simulate_a_vehicle(wingfit: Wingfit, client: Client, dataset_id: str, tmp_path: Path) -> None:
+    truth, beat = tmp_path / "truth.json", tmp_path / "beat.csv"
+    truth.write_text(json.dumps(next(t.coefficients for t in TRIALS if t.name == "test-4")))
+    words = ["simulate", "--dataset", dataset_id, "--recording", "test-4", "--genome", str(truth)]
+    code, out, _ = wingfit(*words, "-o", str(beat))
+    assert code == 0
+    assert "X (forward)" in out
+    true = client.simulate_forces(dataset_id, "test-4", genome=json.loads(truth.read_text()))
+    assert [float(row["modelled_x_n"]) for row in csv.DictReader(beat.open())] == true["modelled_n"]["x"]
+    words = ["simulate", "--dataset", dataset_id, "--recording", "test-4", "--genome", "C_l=1.24", "--json"]
+    words += ["--low-pass-hz", "60", "--without", "clap_and_peel", "--peel-width", "0.01"]
+    bare = json.loads(wingfit(*words)[1])
+    assert bare == client.simulate_forces(
+        dataset_id, "test-4", genome={"C_l": 1.24}, without=["clap_and_peel"], low_pass_hz=60.0, peel_width_beats=0.01
+    )
+    assert bare["modelled_n"] != true["modelled_n"]
+
+
+@pytest.mark.parametrize("words", [("--division", "4"), ("--loads", "x.csv"), ("--at", "airspeed_m_s=6")])
+def test_options_of_a_wing_are_refused_for_a_vehicle(wingfit: Wingfit, dataset_id: str, words: tuple[str, ...]) -> None:
+    code, _, err = wingfit("simulate", "--dataset", dataset_id, *words)
+    assert (code, "vehicle" in err, words[0] in err) == (2, True, True)
+
+
+def test_the_client_passes_on_what_the_server_says(client: Client, dataset_id: str) -> None:
+    with pytest.raises(WingfitError) as error:
+        client.submit_run(dataset_id, genes=["C_x"])
+    assert error.value.errors[0]["where"] == "body.genes.0"
+    assert "known are C_l, C_r, C_F" in error.value.errors[0]["message"]
+
+
+def test_a_balance_campaign_is_written_with_its_truth(wingfit: Wingfit, tmp_path: Path) -> None:
+    code, out, _ = wingfit("balance", str(tmp_path / "mine"), "--seed", "4")
+    assert code == 0
+    assert "next: wingfit datasets upload" in out
+    assert "seed 4" in load_dataset(tmp_path / "mine").description
+    assert read_truth(tmp_path / "mine.truth.json")["test-1"]["C_l"] == 0.89
+    code, out, _ = wingfit("datasets", "check", str(tmp_path / "mine"))
+    assert (code, "vehicle 'delfly'" in out) == (0, True)
+    assert wingfit("balance", str(tmp_path / "mine"))[0] == 1

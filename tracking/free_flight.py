@@ -1,0 +1,357 @@
+"""Forces on a freely flying body from its tracked markers: F = m (a - g), with the noise carried through exactly.
+
+The tracking frame stands still with z up; body axes are x forward, y right, z down. The vehicle counts as one rigid
+body (single rigid body kinematics, as in Armanini et al. 2016, Fig. 10a), so the forces hold what the wings' own
+inertia and the tail add.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy import interpolate
+
+from records import Condition, LowPass, Recording
+from records.dataset import STANDARD_GRAVITY
+from tracking.rigid_body import Poses, poses, quaternions
+from tracking.zero_phase import Kernels, kernels
+
+Array = npt.NDArray[np.float64]
+_UNEVEN = 0.02
+_CHUNK = 512
+_LAGS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """The rigid body: ``markers`` [M, 3] and ``centre`` [3] of mass in body axes (m), mass (kg).
+
+    ``inertia`` [3, 3] about the centre of mass in body axes, kg m^2, where moments are wanted.
+    """
+
+    markers: Array
+    centre: Array
+    mass: float
+    inertia: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MarkerNoise:
+    """Noise of one coordinate of one marker, m, found in how far the markers are from rigid.
+
+    ``correlation`` [L] is that of samples 0, 1, ... frames apart. ``common`` is the factor by which the centre of mass
+    scatters more above the cut-off than independent markers explain, at least 1; it is in the standard deviations.
+    """
+
+    deviation: float
+    correlation: Array
+    common: float
+
+
+@dataclass(frozen=True, eq=False)
+class FreeFlight:
+    """What the body did and what acted on it, [T] frames; NaN near ends and gaps.
+
+    ``force`` and ``moment`` [T, 3] in body axes (N, N m; moment None without inertia), with their standard deviations
+    from marker noise at every instant; ``position``, ``velocity`` [T, 3] of the centre of mass in tracking axes;
+    ``rotation`` [T, 3, 3] body to tracking axes, smoothed; ``rate`` [T, 3] turn rate in body axes, rad/s.
+    """
+
+    times: Array
+    force: Array
+    force_deviation: Array
+    moment: Array | None
+    moment_deviation: Array | None
+    position: Array
+    velocity: Array
+    rotation: Array
+    rate: Array
+    noise: MarkerNoise
+    low_pass: LowPass
+    mass: float
+    poses: Poses
+    remarks: tuple[str, ...]
+
+    @property
+    def pitch(self) -> Array:
+        """Body pitch theta_b [T], rad: the nose above the horizontal."""
+        return np.asarray(np.arcsin(np.clip(self.rotation[:, 2, 0], -1, 1)))
+
+
+def free_flight(
+    times: Array, tracks: Array, body: Body, low_pass: LowPass, gravity: float = STANDARD_GRAVITY
+) -> FreeFlight:
+    """Forces on ``body`` from ``tracks`` [T, M, 3] (m, tracking axes, NaN where not seen) at even ``times`` [T] in s.
+
+    Gaps of the pose no longer than a quarter period of the cut-off are bridged by cubics; longer ones, and the ends,
+    cost the reach of the filter on either side. ValueError where nothing is left.
+    """
+    step = _even_step(times)
+    windows = kernels(low_pass, 1 / step)
+    found = poses(tracks, body.markers)
+    remarks = _about(found)
+    centre = found.position + found.rotation @ body.centre
+    q = quaternions(found.rotation)
+    longest = int(0.25 / (low_pass.cutoff * step))
+    state = np.column_stack([centre, q])
+    bridges = _bridges(np.isfinite(state[:, 0]), longest)
+    filled = state.copy()
+    for bridge in bridges:
+        filled[bridge.frame] = bridge.weights @ state[bridge.near]
+    if bridges:
+        remarks.append(f"{len(bridges)} frames without a pose were bridged (gaps of at most {longest} frames)")
+    smooth = [windows.apply(filled, d) for d in range(3)]
+    if not np.isfinite(smooth[2]).any():
+        needed = 2 * windows.reach + 1
+        raise ValueError(
+            f"{len(times)} frames hold no stretch of {needed} in which a pose is known throughout; "
+            "a cut-off higher than this, a longer recording or markers seen more often would help"
+        )
+    R, rate, turning = _attitude(smooth)
+    weight = np.array([0.0, 0.0, gravity])
+    force = body.mass * np.einsum("tji,tj->ti", R, smooth[2][:, :3] + weight)
+    noise = _noise(found, centre, body, step, low_pass)
+    if noise.common > 1.2:
+        remarks.append(
+            f"the centre of mass scatters {noise.common:.1f} times more above the cut-off than the markers' own noise "
+            "explains (cameras, or motion beyond the cut-off); the standard deviations are raised accordingly"
+        )
+    force_sd = _deviation(found, R, body, windows, bridges, noise, force, None)
+    moment = moment_sd = None
+    if body.inertia is not None:
+        spin = rate @ body.inertia.T
+        moment = turning @ body.inertia.T + np.cross(rate, spin)
+        moment_sd = _deviation(found, R, body, windows, bridges, noise, force, body.inertia)
+    return FreeFlight(
+        times, force, force_sd, moment, moment_sd, smooth[0][:, :3], smooth[1][:, :3], R, rate, noise, low_pass,
+        body.mass, found, tuple(remarks),
+    )  # fmt: skip
+
+
+def recording(
+    flight: FreeFlight, name: str, flap_frequency: float, beat_start: float, pressure: float, temperature: float
+) -> Recording:
+    """Forces x and z of ``flight`` as a recording in level flight.
+
+    ``beat_start`` is a time (s, clock of the tracks) at which a beat starts; times count from the last start before the
+    first force. Airspeed and body pitch are the means over the flight, in still air. The standard deviation is the RMS
+    over the instants.
+    """
+    known = np.isfinite(flight.force).all(axis=1)
+    first, last = np.flatnonzero(known)[[0, -1]]
+    rows = slice(first, last + 1)
+    beats = np.floor((flight.times[first] - beat_start) * flap_frequency)
+    speed = float(np.linalg.norm(np.nanmean(flight.velocity, axis=0)))
+    condition = Condition(
+        flap_frequency, 0.0, pressure, temperature, airspeed=speed, angle_of_attack=float(np.nanmean(flight.pitch))
+    )
+    return Recording(
+        name,
+        "free_flight",
+        condition,
+        flight.times[rows] - beat_start - beats / flap_frequency,
+        (),
+        flight.force[rows][:, [0, 2]],
+        np.sqrt(np.nanmean(flight.force_deviation[:, [0, 2]] ** 2, axis=0)),
+        forces=("x", "z"),
+        low_pass=flight.low_pass,
+        mass=flight.mass,
+    )
+
+
+def _even_step(times: Array) -> float:
+    if len(times) < 3:
+        raise ValueError(f"{len(times)} frames; forces need at least 3, and the reach of the filter beyond")
+    step = float(np.median(np.diff(times)))
+    worst = float(np.max(np.abs(np.diff(times) - step)))
+    if worst > _UNEVEN * step:
+        raise ValueError(
+            f"steps differ by up to {worst:.3g} s from {step:.3g} s; frames must be even within 2 %: "
+            "give every frame a row, with empty cells where a marker was not seen"
+        )
+    return float((times[-1] - times[0]) / (len(times) - 1))
+
+
+def _about(found: Poses) -> list[str]:
+    """Remarks on frames without a pose and on outliers."""
+    remarks, missing = [], int(np.isnan(found.position[:, 0]).sum())
+    if missing:
+        remarks.append(f"{missing} of {len(found.position)} frames show fewer than 3 markers off a line: no pose there")
+    if found.rejected:
+        remarks.append(f"{found.rejected} samples were left out: far off the rigid body (swapped or loose markers?)")
+    return remarks
+
+
+@dataclass(frozen=True, eq=False)
+class _Bridge:
+    """A frame without a pose, put together from frames ``near`` with ``weights``."""
+
+    frame: int
+    near: npt.NDArray[np.int64]
+    weights: Array
+
+
+def _bridges(known: npt.NDArray[np.bool_], longest: int) -> list[_Bridge]:
+    """Cubic interpolation over gaps of at most ``longest`` frames."""
+    rows, found = np.flatnonzero(known), []
+    for before, after in pairwise(rows.tolist()):
+        if 1 < after - before <= longest + 1:
+            near = rows[np.abs(rows - before) <= 4 * (longest + 1)]
+            if len(near) < 4:
+                continue
+            spline = interpolate.CubicSpline(near, np.eye(len(near)))
+            found += [_Bridge(int(frame), near, spline(frame)) for frame in range(before + 1, after)]
+    return found
+
+
+def _spread_over(taps: Array, rows: npt.NDArray[np.int64], bridges: list[_Bridge]) -> Array:
+    """Taps [rows, 2 n + 1] on frames that have a pose: those on bridged frames go to the frames behind them."""
+    n, spread = len(taps) // 2, np.tile(taps, (len(rows), 1))
+    for bridge in bridges:
+        place = bridge.frame - rows + n
+        for i in np.flatnonzero((place >= 0) & (place <= 2 * n)):
+            share, target = spread[i, place[i]], bridge.near - rows[i] + n
+            inside = (target >= 0) & (target <= 2 * n)
+            spread[i, target[inside]] += share * bridge.weights[inside]
+            spread[i, place[i]] = 0.0
+    return spread
+
+
+def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
+    """Rotation [T, 3, 3], turn rate and its derivative [T, 3] in body axes from smoothed quaternions."""
+    size = np.linalg.norm(smooth[0][:, 3:], axis=1, keepdims=True)
+    q, dq, ddq = (s[:, 3:] / size for s in smooth)
+    w, v = q[:, :1], q[:, 1:]
+    x, y, z = v.T
+    a = w[:, 0]
+    R = np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - a * z), 2 * (x * z + a * y)], axis=-1),
+            np.stack([2 * (x * y + a * z), 1 - 2 * (x * x + z * z), 2 * (y * z - a * x)], axis=-1),
+            np.stack([2 * (x * z - a * y), 2 * (y * z + a * x), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=-2,
+    )
+    # omega = 2 conj(q) dq/dt; the derivative of conj(q) adds only to the scalar part.
+    rate, turning = (2 * (w * d[:, 1:] - d[:, :1] * v - np.cross(v, d[:, 1:])) for d in (dq, ddq))
+    return R, rate, turning
+
+
+def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPass) -> MarkerNoise:
+    """Noise per marker from the rigidity residuals; the common part from the centre of mass above the cut-off."""
+    used = np.isfinite(found.position[:, 0])
+    free = 3 * found.seen[used].sum() - 6 * used.sum()
+    deviation = float(np.sqrt(np.nansum(found.residuals[used] ** 2) / free))
+    correlation = _correlation(found.residuals, min(_LAGS, len(centre) // 4))
+    # Between cut-off and Nyquist the body hardly moves: what is there is noise.
+    high = kernels(LowPass(min(1.6 * low_pass.cutoff, 0.45 / step), 8), 1 / step)
+    rest = centre - high.apply(centre, 0)
+    taps = -high.taps[0]
+    taps[high.reach] += 1
+    expected = deviation**2 * float(taps @ _toeplitz(correlation, len(taps)) @ taps) * _centre_gain(found, body)
+    if not np.isfinite(rest).any():
+        return MarkerNoise(deviation, correlation, 1.0)
+    common = float(np.sqrt(np.nanmean(rest**2) / max(expected, 1e-30)))
+    return MarkerNoise(deviation, correlation, max(1.0, common))
+
+
+def _centre_gain(found: Poses, body: Body) -> float:
+    """Variance of a coordinate of the centre of mass per variance of a marker's, mean over axes and frames."""
+    G = _of_centre(found, body)[np.isfinite(found.position[:, 0])]
+    return float(np.mean(np.sum(G[:, :3] ** 2, axis=2)))
+
+
+def _of_centre(found: Poses, body: Body) -> Array:
+    """Sensitivity [T, 6, 3 M] of displacement of the centre of mass, and of rotation, in body axes."""
+    G = found.sensitivity
+    moved = G.copy()
+    c = body.centre
+    cross = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
+    moved[:, :3] -= cross @ G[:, 3:]
+    return moved
+
+
+def _correlation(residuals: Array, lags: int) -> Array:
+    """Correlation [lags] of the residuals in time, cut at its first value within chance of zero."""
+    r = residuals.reshape(len(residuals), -1)
+    r = r - np.nanmean(r, axis=0)
+    variance = float(np.nanmean(r**2))
+    values = [1.0]
+    for lag in range(1, lags):
+        products = r[lag:] * r[:-lag]
+        value = float(np.nanmean(products)) / max(variance, 1e-30)
+        if abs(value) < 2.0 / np.sqrt(max(int(np.isfinite(products).sum()), 1)):
+            break
+        values.append(value)
+    return _admissible(np.array(values))
+
+
+def _admissible(values: Array) -> Array:
+    """The nearest sequence that is a correlation: its spectrum must not be negative."""
+    size = 4 * len(values) + 4
+    wrapped = np.zeros(size)
+    wrapped[: len(values)] = values
+    wrapped[-len(values) + 1 :] = values[:0:-1] if len(values) > 1 else wrapped[-len(values) + 1 :]
+    spectrum = np.maximum(np.fft.rfft(wrapped).real, 0)
+    cleaned = np.fft.irfft(spectrum, size)
+    return np.asarray(cleaned[: size // 2] / cleaned[0])
+
+
+def _toeplitz(correlation: Array, size: int) -> Array:
+    lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
+    padded = np.zeros(max(size, len(correlation)))
+    padded[: len(correlation)] = correlation
+    return np.asarray(padded[lags])
+
+
+def _deviation(
+    found: Poses,
+    R: Array,
+    body: Body,
+    windows: Kernels,
+    bridges: list[_Bridge],
+    noise: MarkerNoise,
+    force: Array,
+    inertia: Array | None,
+) -> Array:
+    """Standard deviation [T, 3] of force (or of moment, with ``inertia``) from the noise of the markers.
+
+    To first order in the noise, exact in the filter: the error is a weighted sum over the window's frames and all
+    markers, whose variance follows from the weights and the noise's correlation in time.
+    """
+    n, result = windows.reach, np.full(force.shape, np.nan)
+    fitted = np.isfinite(found.position[:, 0])
+    G = np.where(fitted[:, None, None], _of_centre(found, body), 0.0)
+    turns = np.where(fitted[:, None, None], found.rotation, 0.0)
+    correlation = _toeplitz(noise.correlation, 2 * n + 1)
+    known = np.flatnonzero(np.isfinite(force[:, 0]))
+    for rows in _chunks(known):
+        frames = rows[:, None] + np.arange(-n, n + 1)
+        back = np.einsum("tji,tkjl->tkil", R[rows], turns[frames])  # from body axes then to body axes now
+        rotated = back @ G[frames][:, :, 3:]
+        value, _, bend = (_spread_over(taps, rows, bridges)[..., None, None] for taps in windows.taps)
+        if inertia is None:
+            moved = body.mass * bend * (back @ G[frames][:, :, :3])
+            turned = value * (_crosses(force[rows])[:, None] @ rotated)
+            weights = moved + turned
+        else:
+            weights = bend * (inertia @ rotated)
+        spread = np.einsum("tkic,kl->tlic", weights, correlation, optimize=True)
+        result[rows] = np.sqrt(np.maximum(np.sum(spread * weights, axis=(1, 3)), 0))
+    return result * noise.deviation * noise.common
+
+
+def _chunks(rows: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
+    for start in range(0, len(rows), _CHUNK):
+        yield rows[start : start + _CHUNK]
+
+
+def _crosses(v: Array) -> Array:
+    """[T, 3, 3] with ``_crosses(f) @ phi`` equal to f x phi."""
+    o = np.zeros(len(v))
+    x, y, z = v.T
+    return np.stack([np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=-2)

@@ -1,0 +1,137 @@
+"""Pose of a rigid body from its markers, frame by frame, with the pose's sensitivity to every marker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+_FLAT = 0.02
+"""Markers whose second extent is below this share of their first lie on a line: no attitude about it."""
+_OUTLIER = 8.0
+_PASSES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Pose per frame; NaN where too few markers were seen.
+
+    Attributes:
+        rotation: [T, 3, 3] from body to tracking axes.
+        position: [T, 3] of the body's origin in tracking axes, m.
+        seen: [T, M] markers used.
+        residuals: [T, M, 3] measured minus fitted place of each marker in body axes, m; NaN where not used.
+        shape: [M, 3] places of the markers in body axes, m, refined from the tracks.
+        rejected: number of samples left out as outliers.
+    """
+
+    rotation: Array
+    position: Array
+    seen: Mask
+    residuals: Array
+    shape: Array
+    rejected: int = 0
+
+    @property
+    def sensitivity(self) -> Array:
+        """[T, 6, 3 M] change of the pose by each marker's displacement, all in body axes.
+
+        Rows: displacement of the body's origin (m), then small rotation (rad). The linearised least-squares fit.
+        """
+        M = len(self.shape)
+        J = np.zeros((M, 3, 6))
+        J[:, :, :3] = np.eye(3)
+        J[:, :, 3:] = -_cross(self.shape)
+        weighted = np.where(self.seen[:, :, None, None], J, 0.0).reshape(len(self.seen), 3 * M, 6)
+        normal = np.swapaxes(weighted, 1, 2) @ weighted
+        fitted = np.isfinite(self.position[:, 0])
+        result = np.full((len(self.seen), 6, 3 * M), np.nan)
+        result[fitted] = np.linalg.solve(normal[fitted], np.swapaxes(weighted[fitted], 1, 2))
+        return result
+
+
+def poses(tracks: Array, shape: Array) -> Poses:
+    """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3] in m, NaN for not seen.
+
+    ``shape`` [M, 3] are the markers' places in body axes, m. It is refined to the mean place seen, keeping the body
+    axes where they are in least squares, so that a measuring error of the shape does not make the pose jump when a
+    marker vanishes. Samples far off the rigid body (swapped markers) are left out.
+    """
+    if np.linalg.matrix_rank(shape - shape.mean(axis=0), tol=_FLAT * float(np.ptp(shape, axis=0).max())) < 2:
+        raise ValueError(f"the {len(shape)} markers lie on one line; a pose needs 3 that do not")
+    seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
+    rejected = 0
+    for _ in range(_PASSES):
+        found = _refined(tracks, shape, seen)
+        outlying = _outlying(found)
+        if not outlying.any():
+            break
+        seen, rejected = np.asarray(seen & ~outlying), rejected + int(outlying.sum())
+    else:
+        found = _refined(tracks, shape, seen)
+    return Poses(found.rotation, found.position, found.seen, found.residuals, found.shape, rejected)
+
+
+def _refined(tracks: Array, shape: Array, seen: Mask) -> Poses:
+    found = _fit(tracks, shape, seen)
+    count = np.isfinite(found.residuals).sum(axis=0)
+    mean = np.nansum(found.residuals, axis=0) / np.maximum(count, 1)
+    rotation, position = _align(shape[None], (shape + mean)[None], np.ones((1, len(shape)), dtype=bool))
+    return _fit(tracks, (shape + mean - position[0]) @ rotation[0], seen)
+
+
+def _fit(tracks: Array, shape: Array, seen: Mask) -> Poses:
+    R, p = _align(np.broadcast_to(shape, tracks.shape), tracks, seen)
+    back = np.einsum("tji,tmj->tmi", R, tracks - p[:, None, :])
+    residuals = np.where(seen[..., None], back - shape, np.nan)
+    return Poses(R, p, seen, residuals, shape)
+
+
+def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
+    """Rotation [T, 3, 3] and origin [T, 3] that carry ``body`` to ``world`` [T, M, 3] best over the markers seen."""
+    w = seen[..., None].astype(np.float64)
+    count = np.maximum(w.sum(axis=1), 1.0)
+    world = np.where(seen[..., None], world, 0.0)
+    b0, p0 = (w * body).sum(axis=1) / count, world.sum(axis=1) / count
+    b = w * (body - b0[:, None])
+    U, _, Vt = np.linalg.svd(np.swapaxes(b, 1, 2) @ (world - p0[:, None]))
+    mirrored = np.linalg.det(U) * np.linalg.det(Vt)
+    U[:, :, 2] *= mirrored[:, None]
+    R = np.swapaxes(U @ Vt, 1, 2)
+    extent = np.linalg.svd(b, compute_uv=False)
+    short = (seen.sum(axis=1) < 3) | (extent[:, 1] < _FLAT * extent[:, 0])
+    R[short] = np.nan
+    return R, p0 - np.einsum("tij,tj->ti", R, b0)
+
+
+def _outlying(found: Poses) -> Mask:
+    """The worst marker of each frame where it is far beyond the common scatter; a fourth marker must remain."""
+    size = np.linalg.norm(found.residuals, axis=-1)
+    usual = float(np.nanmedian(size)) if np.isfinite(size).any() else 0.0
+    worst = np.where(np.isfinite(size), size, -1.0)
+    far = (worst == worst.max(axis=1, keepdims=True)) & (worst > max(_OUTLIER * usual, 1e-9))
+    return np.asarray(far & (found.seen.sum(axis=1) > 4)[:, None])
+
+
+def _cross(v: Array) -> Array:
+    """Matrices [..., 3, 3] with ``_cross(a) @ b`` equal to a x b."""
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    o = np.zeros_like(x)
+    rows = [np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))]
+    return np.stack(rows, axis=-2)
+
+
+def quaternions(rotation: Array) -> Array:
+    """Unit quaternions [T, 4] (w, x, y, z) of ``rotation`` [T, 3, 3], of one sign along the time; NaN kept."""
+    from scipy.spatial.transform import Rotation
+
+    q = np.full((len(rotation), 4), np.nan)
+    fitted = np.isfinite(rotation[:, 0, 0])
+    if fitted.any():
+        found = Rotation.from_matrix(rotation[fitted]).as_quat()[:, [3, 0, 1, 2]]
+        flips = np.cumprod(np.sign(np.append(1.0, np.sum(found[1:] * found[:-1], axis=1))))
+        q[fitted] = found * flips[:, None]
+    return q

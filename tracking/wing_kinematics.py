@@ -1,0 +1,293 @@
+"""The prescribed motion of a wing from what cameras saw: flap angle zeta(t*) and wing pitch theta_w(t*).
+
+Geometry (Armanini et al. 2016, Eqs. 15, 17-19; docs/tracking.md), in body axes x forward, y right, z down. The wing
+turns about an axis along x. Closed, it stands ``dihedral`` above the horizontal; zeta is the angle from there, positive
+as it opens: an upper wing towards -z, a lower one towards +z. With n the direction in which the leading edge moves as
+the wing opens, the chord from trailing to leading edge is sin(theta_w) x + cos(theta_w) n; pi/2 is a chord along x.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import optimize
+
+from records import FourierFlap, FourierPitch, PassivePitch, WingMotion
+from tracking.noise import least_squares, products
+from tracking.smoothing import PeriodicFit, basis, fit_periodic
+
+Array = npt.NDArray[np.float64]
+PitchKind = Literal["fourier", "passive"]
+_FEWEST_BEATS = 1.5
+
+
+@dataclass(frozen=True)
+class WingPlace:
+    """Which wing the markers sit on: ``upper`` or lower, ``right`` or left; ``dihedral`` in rad where known."""
+
+    upper: bool
+    right: bool = True
+    dihedral: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Angles:
+    """Flap angle and wing pitch (rad) [N] at increasing ``times`` [N] in s; NaN where not seen. ``pitch`` may lack."""
+
+    times: Array
+    flap: Array
+    pitch: Array | None = None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Frequency:
+    """Flap frequency and its standard error, Hz (error None where the user gave the frequency)."""
+
+    hertz: float
+    error: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PitchLaw:
+    """Eq. 17 fitted to wing pitch: ``errors`` [4] and ``correlation`` [4, 4] in the order of PassivePitch's fields.
+
+    ``misfit`` is the RMS difference in rad from the pitch as measured.
+    """
+
+    pitch: PassivePitch
+    errors: Array
+    correlation: Array
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
+class WingKinematics:
+    """What was found: the motion, the series behind it with their errors, and what to know about them.
+
+    ``angles`` are those fitted, the flap angle from the closed position.
+    ``start`` is a time (s, clock of the recording) at which a beat starts; ``start_error`` its standard error.
+    """
+
+    motion: WingMotion
+    angles: Angles
+    flap: PeriodicFit
+    pitch: PeriodicFit
+    law: PitchLaw | None
+    frequency: Frequency
+    start: float
+    start_error: float
+    remarks: tuple[str, ...]
+
+
+def from_markers(
+    times: Array, leading_edge: Array, chord: Array | None, place: WingPlace, hinge: tuple[float, float] | None = None
+) -> Angles:
+    """Angles of a wing from its markers in body axes, m.
+
+    Args:
+        times: [T] s.
+        leading_edge: [T, M, 3] markers on the leading edge from root to tip; two, or one with ``hinge``.
+        chord: [T, K, 3] markers at the span station of the pitch, from leading to trailing edge, at least two.
+        place: of the wing.
+        hinge: y and z (m) of the flapping axis, where known.
+
+    Only frames that show every marker asked for count, so that none jumps as a marker comes and goes. Without a
+    dihedral the flap angle has an unknown constant, which :func:`wing_motion` settles.
+    """
+    points = leading_edge[..., 1:]
+    if hinge is not None:
+        points = np.concatenate([np.broadcast_to(hinge, (len(times), 1, 2)), points], axis=1)
+    if points.shape[1] < 2:
+        raise ValueError("1 marker on the leading edge; name 2 or more, or give the place of the flapping axis (hinge)")
+    side = 1.0 if place.right else -1.0
+    along = _direction(points)
+    rise = np.arctan2(-along[:, 1], side * along[:, 0])  # above the horizontal
+    opening = 1.0 if place.upper else -1.0
+    flap = opening * (rise - (place.dihedral or 0.0))
+    if chord is None:
+        return Angles(times, flap)
+    if chord.shape[1] < 2:
+        raise ValueError("1 marker along the chord; pitch needs 2 or more, from leading to trailing edge")
+    across = -opening * (side * np.sin(rise)[:, None] * chord[..., 1] + np.cos(rise)[:, None] * chord[..., 2])
+    towards = -_direction(np.stack([chord[..., 0], across], axis=-1))
+    pitch = _unwrapped(np.arctan2(towards[:, 0], towards[:, 1]))
+    return Angles(times, flap, pitch)
+
+
+def wing_motion(
+    angles: Angles,
+    frequency: float | None = None,
+    harmonics: int | None = None,
+    pitch: PitchKind = "fourier",
+    pitch_station: float = 0.7,
+    root_pitch: float = np.pi / 2,
+    peel_end: float = 0.17,
+    start: float | None = None,
+    closed: float | None = 0.0,
+) -> WingKinematics:
+    """Motion of the wing over its beat, from ``angles``.
+
+    Args:
+        angles: flap angle and pitch; without pitch, none can be modelled and ValueError says so.
+        frequency: of the beat, Hz; found in the flap angle if left out.
+        harmonics: of both series; chosen by cross-validation if left out.
+        pitch: a Fourier series, or the law of Eq. 17.
+        pitch_station: span fraction of the pitch.
+        root_pitch: wing pitch at the flapping axis, rad.
+        peel_end: t* at which the whole chord has come apart.
+        start: a time at which a beat starts, s; where the wings are closest if left out.
+        closed: flap angle of the closed wing as measured, rad; None: the smallest found, where the zero is unknown.
+    """
+    if angles.pitch is None:
+        raise ValueError("no wing pitch; give a column wing_pitch_deg, or markers along the chord")
+    found = Frequency(frequency) if frequency else flap_frequency(angles.times, angles.flap)
+    begin = start if start is not None else float(angles.times[0])
+    flap = fit_periodic(angles.times, angles.flap, found.hertz, harmonics, begin)
+    phase, error = closest(flap)
+    remarks = [*angles.remarks, *(f"flap angle: {r}" for r in flap.remarks)]
+    if start is None:
+        flap = flap.shifted(phase)
+    elif min(phase, 1 - phase) > 0.01 + 3 * error:
+        at = f"t* = {phase:.3f} +/- {error:.3f}"
+        remarks.append(f"the wings are closest at {at}, not at the start given; are the times those of the beat?")
+    if closed is None:
+        closed = float(flap.at(np.array(closest(flap)[0])))
+        remarks.append("the zero of the flap angle was set where the wings are closest; give the dihedral if known")
+    flap = _lowered(flap, closed)
+    twist = fit_periodic(angles.times, angles.pitch, found.hertz, harmonics, flap.start)
+    remarks += [f"wing pitch: {r}" for r in twist.remarks]
+    law = pitch_law(angles.times, angles.pitch, flap) if pitch == "passive" else None
+    if law is not None and law.misfit > 2 * twist.noise.deviation:
+        ratio = law.misfit / twist.noise.deviation
+        remarks.append(f"Eq. 17 misses the pitch by {ratio:.1f} times its noise: the law lacks something")
+    motion = WingMotion(
+        FourierFlap(*flap.series),
+        law.pitch if law else FourierPitch(*twist.series),
+        root_pitch=root_pitch,
+        pitch_station=pitch_station,
+        peel_end=peel_end,
+    )
+    fitted = replace(angles, flap=angles.flap - closed)
+    return WingKinematics(motion, fitted, flap, twist, law, found, flap.start, error / found.hertz, tuple(remarks))
+
+
+def flap_frequency(times: Array, flap: Array) -> Frequency:
+    """Flap frequency from the flap angle [N]: strongest period, then least squares of a series over the frequency.
+
+    The standard error is that of the frequency fitted together with the series, under the noise found.
+    """
+    seen = np.isfinite(flap)
+    t, y = times[seen], flap[seen]
+    if len(t) < 9:
+        raise ValueError(f"{len(t)} samples of the flap angle; at least 9 are needed to find the flap frequency")
+    span, step = float(t[-1] - t[0]), float(np.median(np.diff(t)))
+    first = _strongest(t, y)
+    if span * first < _FEWEST_BEATS:
+        message = f"the recording spans {span * first:.1f} beats; {_FEWEST_BEATS} are needed to find the flap frequency"
+        raise ValueError(f"{message}: give it, or record longer")
+    orders = max(1, min(4, int(0.4 / (step * first)), (len(t) - 4) // 6))
+    middle = float(t.mean())
+
+    def left(frequency: float) -> float:
+        X = basis((t - middle) * frequency, orders)
+        return -float(right(X) @ np.linalg.solve(products(X, X), right(X)))
+
+    def right(X: Array) -> Array:
+        return np.asarray(np.sum(X * y[:, None], axis=0))
+
+    width = 0.5 / span
+    best = optimize.minimize_scalar(
+        left, bounds=(first - width, first + width), method="bounded", options={"xatol": 1e-9 * first}
+    )
+    hertz = float(best.x)
+    phase = (t - middle) * hertz
+    B = basis(phase, orders)
+    slope = np.sum(basis(phase, orders, 1) * np.linalg.solve(products(B, B), right(B)), axis=1)
+    joint = least_squares(t, np.column_stack([B, slope * (t - middle)]), y)
+    return Frequency(hertz, float(np.sqrt(joint.covariance[-1, -1])))
+
+
+def _strongest(times: Array, values: Array) -> float:
+    """Frequency, Hz, of the largest amplitude, to about a tenth of the resolution; bridges gaps by straight lines."""
+    step = float(np.median(np.diff(times)))
+    count = int((times[-1] - times[0]) / step) + 1
+    even = np.interp(times[0] + step * np.arange(count), times, values - values.mean())
+    size = 8 * count
+    whole = size // count  # bins below one period of the record
+    amplitude = np.abs(np.fft.rfft(even, size))
+    return float((whole + np.argmax(amplitude[whole:])) / (size * step))
+
+
+def closest(flap: PeriodicFit) -> tuple[float, float]:
+    """Phase t* in [0, 1) at which the wings are closest and begin to open, and its standard error in beats.
+
+    The error holds the noise of the rate there and what the series cuts off of the rate.
+    """
+    grid = np.arange(720) / 720
+    guess = float(grid[int(np.argmin(flap.at(grid)))])
+
+    def rate(phase: float) -> float:
+        return float(flap.at(np.array(phase), 1))
+
+    near = (guess - 1 / 720, guess + 1 / 720)
+    phase = float(optimize.brentq(rate, *near)) if rate(near[0]) < 0 < rate(near[1]) else guess
+    bend = float(flap.at(np.array(phase), 2))
+    error = float(np.hypot(flap.error_at(np.array(phase), 1), flap.lost[1]))
+    return phase % 1.0, error * flap.frequency / max(bend, 1e-12)
+
+
+def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
+    """Fit Eq. 17, theta_w = pi/2 + c + c_zeta zeta + c_rate zeta' + c_square zeta'^2, to ``pitch`` [N] in rad.
+
+    The errors hold the noise of the pitch, coloured, and to first order that of the flap angle.
+    """
+    seen = np.isfinite(pitch)
+    t, y = times[seen], pitch[seen] - np.pi / 2
+    phase = (t - flap.start) * flap.frequency
+    zeta, rate = flap.at(phase), flap.at(phase, 1)
+    X = np.column_stack([np.ones_like(zeta), zeta, rate, rate**2])
+    scale = np.maximum(np.abs(X).max(axis=0), 1e-12)  # rates are a hundred times larger than angles
+    linear = least_squares(t, X / scale, y)
+    c = linear.coefficients / scale
+    B0, B1 = basis(phase, flap.harmonics), basis(phase, flap.harmonics, 1, flap.frequency)
+    moving = c[1] * B0 + (c[2] + 2 * c[3] * rate)[:, None] * B1
+    moved = np.linalg.solve(products(X / scale, X / scale), products(X / scale, moving))
+    covariance = (linear.covariance + moved @ flap.covariance @ moved.T) / np.outer(scale, scale)
+    errors = np.sqrt(np.diag(covariance))
+    misfit = float(np.sqrt(np.mean(linear.residuals**2)))
+    return PitchLaw(PassivePitch(*c.tolist()), errors, covariance / np.outer(errors, errors), misfit)
+
+
+def beats_of(t_star: Array) -> Array:
+    """Phase counted on over beats, from phases [N] that may start again at every beat."""
+    if not np.isfinite(t_star).all():
+        raise ValueError("t_star has empty cells; give every row its phase")
+    return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))
+
+
+def _lowered(flap: PeriodicFit, by: float) -> PeriodicFit:
+    coefficients = flap.coefficients.copy()
+    coefficients[0] -= by
+    return replace(flap, coefficients=coefficients)
+
+
+def _direction(points: Array) -> Array:
+    """Unit vectors [T, 2] of the lines that fit ``points`` [T, M, 2] best, from the first point to the last."""
+    d = points - points.mean(axis=1, keepdims=True)
+    xx, yy, xy = (np.sum(d[..., i] * d[..., j], axis=1) for i, j in ((0, 0), (1, 1), (0, 1)))
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy)
+    line = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    sense = np.sum(line * (points[:, -1] - points[:, 0]), axis=1)
+    return np.asarray(line * np.where(sense < 0, -1.0, 1.0)[:, None])
+
+
+def _unwrapped(angles: Array) -> Array:
+    """Angles without jumps of a turn, over gaps."""
+    unwrapped = angles.copy()
+    seen = np.isfinite(angles)
+    unwrapped[seen] = np.unwrap(angles[seen])
+    return unwrapped

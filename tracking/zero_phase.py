@@ -1,0 +1,70 @@
+"""Smoothing and differentiating in one linear step: kernels of a zero-phase Butterworth filter and its derivatives.
+
+The filter is the digital Butterworth low-pass run forwards and backwards that :class:`records.LowPass` names; the
+derivative is exact in frequency, so that a derivative is that of the filtered signal and loses nothing more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import signal
+
+from records import LowPass
+
+Array = npt.NDArray[np.float64]
+_LENGTH = 8192
+_TAIL = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Kernels:
+    """Symmetric windows of 2 n + 1 samples: row d of ``taps`` [3, 2 n + 1] gives the d-th derivative (per s^d).
+
+    ``taps[d] @ x[i - n : i + n + 1]`` is the derivative at sample i.
+    """
+
+    taps: Array
+
+    @property
+    def reach(self) -> int:
+        """n: samples lost at each end and beside each gap."""
+        return int(self.taps.shape[1]) // 2
+
+    def apply(self, values: Array, derivative: int) -> Array:
+        """Derivative of ``values`` [T, ...]; NaN within ``reach`` of an end or of a missing sample."""
+        n = self.reach
+        result = np.full(values.shape, np.nan)
+        if len(values) > 2 * n:
+            windows = np.lib.stride_tricks.sliding_window_view(values, 2 * n + 1, axis=0)
+            result[n:-n] = windows @ self.taps[derivative]
+        return result
+
+
+def kernels(low_pass: LowPass, rate: float) -> Kernels:
+    """Kernels for samples at ``rate`` Hz; ValueError for a cut-off that they cannot carry.
+
+    Cut where they have fallen to ``1e-4`` of their largest value, then corrected by the least change that makes them
+    exact for polynomials up to the third degree.
+    """
+    if not 0 < low_pass.cutoff <= 0.45 * rate:
+        limit = 0.45 * rate
+        raise ValueError(
+            f"cut-off {low_pass.cutoff:g} Hz; samples at {rate:g} Hz carry more than 0 and at most {limit:g} Hz: "
+            "choose a lower cut-off or record faster"
+        )
+    frequency = np.fft.rfftfreq(_LENGTH, 1 / rate)
+    sections = signal.butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos")
+    gain = np.abs(signal.sosfreqz(sections, frequency, fs=rate)[1]) ** 2
+    full = np.stack([np.fft.irfft(gain * (2j * np.pi * frequency) ** d, _LENGTH) for d in range(3)])
+    full = np.fft.fftshift(full[:, (-np.arange(_LENGTH)) % _LENGTH], axes=1)  # as weights of x[i + j]
+    middle = _LENGTH // 2
+    beyond = np.abs(full[:, middle:]) > _TAIL * np.abs(full).max(axis=1, keepdims=True)
+    n = int(np.max(np.nonzero(beyond)[1]))
+    taps = full[:, middle - n : middle + n + 1]
+    powers = np.vander(np.arange(-n, n + 1) / rate, 4, increasing=True)
+    wanted = np.diag([1.0, 1.0, 2.0])  # d-th derivative of t^k at 0
+    target = np.hstack([wanted, np.zeros((3, 1))])
+    return Kernels(taps + np.linalg.lstsq(powers.T, (target - taps @ powers).T, rcond=None)[0].T)
