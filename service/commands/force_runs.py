@@ -184,18 +184,28 @@ def _coefficients(estimates: Sequence[f.Estimate]) -> None:
 
 
 def _agreements(answer: f.ForceResult) -> None:
-    """A row for each recording and force, the models side by side: RMS difference in mN, and in % of the range."""
+    """Models side by side: RMS difference of each force, in mN and % of its range; mean and correlation of the lift."""
     shown = [source for source in PREFERENCE if _has(answer["agreements"], source)]
+    heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["left_out"] else [])
     cells = {(a["recording"], a["quantity"], a["source"]): a for a in answer["agreements"]}
     left_out = {(a["recording"], a["quantity"]): a for a in answer["left_out"]}
-    rows = []
+    rms, means = [], []
     for recording, quantity in dict.fromkeys((a["recording"], a["quantity"]) for a in answer["agreements"]):
-        held = " (held out)" if recording in answer["held_out"] else ""
-        rms = [_rms(cells.get((recording, quantity, source))) for source in shown]
-        unseen = [_rms(left_out.get((recording, quantity)))] if left_out else []
-        rows.append([f"{recording}{held}", quantity, *rms, *unseen])
-    heads = [f">{source}" for source in shown] + ([">global, left out"] if left_out else [])
-    table(["RMS difference, mN (% of range)", "force", *heads], rows)
+        name = f"{recording} (held out)" if recording in answer["held_out"] else recording
+        models = [cells.get((recording, quantity, source)) for source in shown]
+        models += [left_out.get((recording, quantity))] if left_out else []
+        rms.append([name, quantity, *(_rms(model) for model in models)])
+        if quantity == answer["agreements"][0]["quantity"]:
+            recorded = next(model["mean_recorded_n"] for model in models if model)
+            means.append([name, mn(recorded), *(_mean_and_correlation(model) for model in models)])
+    table(["RMS difference, mN (% of range)", "force", *heads], rms)
+    say("")
+    quantity = answer["agreements"][0]["quantity"]
+    table([f"mean {quantity} over a beat, mN (correlation)", ">recorded", *heads], means)
+
+
+def _mean_and_correlation(agreement: f.Agreement | None) -> str:
+    return "–" if agreement is None else f"{mn(agreement['mean_modelled_n'])} ({number(agreement['correlation'], 4)})"
 
 
 def _global(law: f.GlobalModel) -> None:

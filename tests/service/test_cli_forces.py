@@ -86,6 +86,11 @@ def test_the_result_as_tables(wingfit: Wingfit, client: Client, run_id: str) -> 
     }
     assert held.split()[4] == "–", "nothing was estimated on a recording that was held out"
     assert held.split()[5] == f"{1e3 * (said['global'] or 0):.2f}"
+    lift = next(a for a in result["agreements"] if (a["quantity"], a["source"]) == ("lift", "local"))
+    means = lines[next(k for k, line in enumerate(lines) if line.startswith("mean lift over a beat")) :]
+    row = next(line for line in means if line.startswith(lift["recording"]))
+    assert row.split()[1] == f"{1e3 * (lift['mean_recorded_n'] or 0):.2f}"
+    assert f"{1e3 * (lift['mean_modelled_n'] or 0):.2f} ({lift['correlation']:.4g})" in row
     assert "fitted from 10.3 to 13.3 Hz" in out
     assert err.count("scatter cannot be told") == 1
     assert json.loads(wingfit("runs", "result", run_id, "--json")[1]) == result
