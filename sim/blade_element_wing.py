@@ -104,8 +104,7 @@ class BladeElementWing:
         batch = genome_batch(self.genes, genomes)
         weights, out = self._weights(batch), np.empty((len(batch), 2, self.instants))
         for start in range(0, len(batch), LANES):  # blocks that stay in the cache
-            block = slice(start, start + LANES)
-            for k, rows in enumerate(self._rows(batch[block], recording), start):
+            for k, rows in enumerate(self._remembered(batch[start : start + LANES], recording), start):
                 out[k] = _sum(weights[k], rows)
         return out.transpose(0, 2, 1)
 
@@ -125,10 +124,9 @@ class BladeElementWing:
         batch = genome_batch(self.genes, genomes)
         basis, wanted = self._basis(recording)
         axes = ["xz".index(axis) for axis in recording.forces]
+        series = self._series(self.beat(batch, recording)[:, :, axes].transpose(0, 2, 1), recording)
         channels = np.empty((len(batch), len(recording.times), len(axes)))
-        pairs = zip(self._weights(batch), self._series(batch, recording), strict=True)
-        series = np.stack([_sum(weights, rows) for weights, rows in pairs])
-        synthesise(basis, np.ascontiguousarray(series[:, axes][:, :, wanted]), channels)
+        synthesise(basis, np.ascontiguousarray(series[:, :, wanted]), channels)
         good = [bool(np.isfinite(forces).all()) for forces in channels]
         return Observation(channels, tuple(None if fine else "the forces are not finite" for fine in good))
 
@@ -171,35 +169,30 @@ class BladeElementWing:
         names = {gene.name for gene in motion_genes(self.vehicle.motion)}
         return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
 
-    def _series(self, batch: Array, recording: Recording) -> list[Array]:
-        """Of each individual the rows' series [rows, 2, 2 K + 1]; those of the last few motions are remembered.
-
-        Mean, then cosine and sine coefficients of each harmonic, filtered like the recording.
-        """
+    def _remembered(self, batch: Array, recording: Recording) -> list[Array]:
+        """Forces of each active row [rows, 2, n] of every individual; those of the last few motions are remembered."""
         kept = self._memory.setdefault(recording, OrderedDict())
         motions = np.stack(list(self._moving(batch).values()) or [np.zeros(len(batch))], axis=1)
         keys = [motion.tobytes() for motion in motions]
         new = {key: row for row, key in enumerate(keys) if key not in kept}
-        rows = (
-            self._rows(batch[list(new.values())], recording)
-            if new
-            else np.empty((0, len(self._active), 2, self.instants))
-        )
-        found = dict(zip(new, self._filtered(rows, recording), strict=True))
+        found = dict(zip(new, self._rows(batch[list(new.values())], recording), strict=True)) if new else {}
         answer = [found[key] if key in found else kept[key] for key in keys]
         kept.update(found)
         while len(kept) > _KEPT:
             kept.popitem(last=False)
         return answer
 
-    def _filtered(self, rows: Array, recording: Recording) -> Array:
-        """Series of ``rows`` [B, rows, 2, n]."""
-        spectrum = np.fft.rfft(rows, axis=3)[..., : self._harmonics + 1] / self.instants
+    def _series(self, forces: Array, recording: Recording) -> Array:
+        """Series [..., 2 K + 1] of periodic ``forces`` [..., n], filtered like the recording.
+
+        Mean, then cosine and sine coefficients of each harmonic.
+        """
+        spectrum = np.fft.rfft(forces)[..., : self._harmonics + 1] / self.instants
         if recording.low_pass:
             frequency = np.arange(self._harmonics + 1) * recording.condition.flap_frequency
             spectrum = spectrum * gain(recording.low_pass, sampling_rate(recording), frequency)
         spectrum[..., 1:] *= 2
-        return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=3)
+        return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
 
     def _rows(self, batch: Array, recording: Recording) -> Array:
         """Forces of each active row [B, rows, 2, n] of all wings, for the motions that ``batch`` [B, G] prescribes."""
