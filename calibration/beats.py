@@ -20,7 +20,6 @@ Array = npt.NDArray[np.float64]
 ENOUGH = 24  # beats from which their series is taken at its word
 FEWEST = 8  # beats below which it says too little to be looked at
 TAPER = np.array([1.0, 1.0, 1.0, 0.5])  # of lags 0, 1, 2, 3 beats
-LEAST_FREEDOM = 4.0
 WHOLE = 0.9  # of the samples that most beats have: what a beat must have to count
 
 
@@ -42,9 +41,7 @@ def beat_score_covariance(scores: Array, samples_used: float) -> Array:
     """Covariance [F, F] of the sum of all scores, from those of B whole beats [B, F].
 
     The fit makes the scores add up to zero, as if their mean had been taken off; of what the taper sums, this loses the
-    share sum_k taper_k (B - |k|) / B^2. ``samples_used`` is the share of all samples that lies in whole beats. B beats
-    tell a covariance with about nu = B / sum_k taper_k^2 degrees of freedom; what is estimated by it then follows
-    Student's t, whose variance is nu / (nu - 2).
+    share sum_k taper_k (B - |k|) / B^2. ``samples_used`` is the share of all samples that lies in whole beats.
     """
     beats = len(scores)
     total, pairs = TAPER[0] * scores.T @ scores, TAPER[0] * beats
@@ -52,7 +49,14 @@ def beat_score_covariance(scores: Array, samples_used: float) -> Array:
         product = scores[lag:].T @ scores[:-lag]
         total += weight * (product + product.T)
         pairs += 2 * weight * (beats - lag)
-    freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())
-    spread = freedom / (freedom - 2.0) if freedom > LEAST_FREEDOM else LEAST_FREEDOM / (LEAST_FREEDOM - 2.0)
-    value, axes = np.linalg.eigh(total * spread / (1.0 - pairs / beats**2) / samples_used)
+    value, axes = np.linalg.eigh(total / (1.0 - pairs / beats**2) / samples_used)
     return np.asarray((axes * np.maximum(value, 0.0)) @ axes.T)
+
+
+def widening(beats: float) -> float:
+    """How much wider than normal the distribution is of what a covariance from so few beats goes with: a variance ratio.
+
+    They tell it with about nu = B / sum_k taper_k^2 degrees of freedom; Student's t has the variance nu / (nu - 2).
+    """
+    freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())
+    return freedom / (freedom - 2.0)

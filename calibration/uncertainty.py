@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from calibration.beats import ENOUGH, FEWEST, beat_score_covariance, beat_scores
+from calibration.beats import ENOUGH, FEWEST, beat_score_covariance, beat_scores, widening
 from calibration.coloured import Block, score_covariance
 from calibration.covariance import Noise, whitened_sensitivity
 from calibration.evaluator import Evaluator
@@ -132,10 +132,10 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
     prior = np.eye(size) / PRIOR**2
     bread = np.asarray(np.linalg.inv(information + prior), float)
     beats = np.asarray(bread @ (by_beats + prior) @ bread)
-    if fewest >= ENOUGH:
-        return beats
+    if ENOUGH <= fewest < np.inf:
+        return beats * widening(fewest)
     samples = np.asarray(bread @ (score_covariance(blocks, bread) + prior) @ bread)
-    if fewest < FEWEST:
+    if not FEWEST <= fewest < np.inf:
         return samples
     # Few beats tell their own scatter badly: whichever error is larger, with the correlations of the samples.
     larger = np.sqrt(np.maximum(np.diag(beats) / np.diag(samples), 1.0))

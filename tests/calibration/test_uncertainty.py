@@ -65,6 +65,27 @@ def test_intervals_of_forces_cover_what_they_say(noise: Noise, samples: int, axe
     assert covered.mean(axis=0).min() > 0.8
 
 
+def by_beat(beats: int, samples: int, rng: np.random.Generator) -> Array:
+    """Noise [beats * samples, 1] that scales each beat, so that it is large where the force is, and a little more."""
+    scale = 0.02 * np.repeat(remembering(beats, 1, rng, 0.3), samples, axis=0)
+    t = np.arange(beats * samples) % samples / samples
+    return np.asarray(scale * np.sin(np.pi * t)[:, None] ** 4 + 0.005 * rng.normal(size=scale.shape))
+
+
+def test_noise_that_follows_the_force_is_judged_from_beat_to_beat() -> None:
+    """Formulas for stationary noise would cover 61, 100 and 100 %."""
+    rng, off, errors = np.random.default_rng(7), [], []
+    for _ in range(200):
+        given = problem(recorded(by_beat(40, 80, rng)))  # 80 ms at 1 kHz
+        *_, last = iterate(given, HERE, {})
+        known = uncertainty(replace(given, base=given.base.replace(last.values)), HERE)
+        off.append([last.values[name] - TRUTH[name] for name in TRUTH])
+        errors.append(list(known.standard_errors.values()))
+    covered = np.abs(off) <= NINETY * np.array(errors)
+    assert 0.85 <= covered.mean() <= 0.95
+    assert covered.mean(axis=0).min() > 0.8
+
+
 def test_intervals_of_tracks_cover_what_they_say() -> None:
     """Tracks with gaps, each axis with noise of another size and a long memory."""
     rng, off, errors = np.random.default_rng(6), [], []
@@ -87,7 +108,7 @@ def test_intervals_of_tracks_cover_what_they_say() -> None:
 
 
 def test_white_noise_gives_the_textbook_covariance() -> None:
-    record = recorded(0.03 * np.random.default_rng(2).normal(size=(5000, 1)))
+    record = recorded(0.03 * np.random.default_rng(2).normal(size=(5000, 1)), rate=50_000.0)  # of about one beat
     found = estimate(problem(record), HERE, {})
     shapes = Linear().shapes(record)[:, 0]
     expected = 0.03**2 * np.linalg.inv(shapes.T @ shapes)
