@@ -136,21 +136,20 @@ def grid(times: Array, longest: int) -> npt.NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(np.minimum(apart, longest + 1))])
 
 
-def score_covariance(blocks: list[Block], inverse: Array) -> Array:
-    """Covariance [F, F] of the scores of all blocks, with M^-1 = ``inverse``, by the iteration of the module's text."""
+def score_covariances(blocks: list[Block], inverse: Array) -> list[Array]:
+    """Covariance [F, F] of each block's scores, with M^-1 = ``inverse``, by the iteration of the module's text."""
     lost = [np.zeros_like(block.raw) for block in blocks]
-    total = np.zeros_like(inverse)
+    each, total = [np.zeros_like(inverse)] * len(blocks), np.zeros_like(inverse)
     for _ in range(ROUNDS):
-        before, total, images = total, np.zeros_like(inverse), []
-        for block, missing in zip(blocks, lost, strict=True):
-            correlation = block.correlation(missing)
-            images.append(block.through(block.spectrum(correlation, last_lag(correlation))))
-            total = total + block.scores(images[-1])
+        correlations = [block.correlation(missing) for block, missing in zip(blocks, lost, strict=True)]
+        images = [b.through(b.spectrum(rho, last_lag(rho))) for b, rho in zip(blocks, correlations, strict=True)]
+        each = [block.scores(image) for block, image in zip(blocks, images, strict=True)]
+        before, total = total, np.asarray(sum(each), float)
         if np.abs(total - before).max() <= SETTLED * np.abs(total).max():
             break
         covariance = inverse @ total @ inverse
         lost = [block.lost(image, inverse, covariance) for block, image in zip(blocks, images, strict=True)]
-    return total
+    return each
 
 
 def last_lag(correlation: Array) -> int:

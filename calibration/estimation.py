@@ -20,7 +20,7 @@ from calibration.force_result import (
     Quantity,
     Source,
 )
-from calibration.global_model import GlobalValues, at, average, fit_global
+from calibration.global_model import at, average, fit_global
 from calibration.likelihood import STEP, at_bounds, iterate
 from calibration.linearised import free_genes
 from calibration.plan import Stage, plan, prepared
@@ -88,10 +88,11 @@ def summarise_forces(
     nominal = base_genome(model, spec.fixed)
     everywhere = []
     for recording in dataset.recordings:
-        genomes, warnings = _sources(spec, nominal, judged, law, recording)
+        genomes, warnings = _sources(spec, model, nominal, judged, law, recording)
         everywhere.append(_compare(model, prepared(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
     names = {name for one in judged for name in one.estimate.recordings}
+    left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]
     held_out = [one for one in everywhere if one.recording.name in dataset.held_out]
     return ForceResult(
@@ -99,13 +100,13 @@ def summarise_forces(
         estimates=tuple(one.estimate for one in judged),
         global_model=law,
         agreements=tuple(agreement for one in everywhere for agreement in one.agreements),
-        left_out=_left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else (),
+        left_out=left_out,
         held_out=dataset.held_out,
         before=_mean_rms(fitted, ("nominal",)),
         after=_mean_rms(fitted, ("local", "joint")),
         held_out_before=_mean_rms(held_out, ("nominal",)) if held_out else None,
         held_out_after=_mean_rms(held_out, ("global", "joint", "average")) if held_out else None,
-        remarks=remarks,
+        remarks=tuple(dict.fromkeys((*remarks, *warnings))),
     )
 
 
@@ -123,8 +124,8 @@ def predict(
 ) -> Prediction:
     """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it."""
     spec = resolved(spec, dataset)
-    model, law_values = vehicle_model(dataset, spec), at(law, condition)
-    values, remarks = _held(model, law_values)
+    model = vehicle_model(dataset, spec)
+    values, remarks = _by_law(model, law, condition)
     times = np.arange(points) / (points * condition.flap_frequency)
     blank = Recording(
         "prediction", "wind_tunnel", condition, times, (), np.full((points, 2), np.nan), forces=("x", "z")
@@ -134,8 +135,14 @@ def predict(
     return Prediction(phase, quantities(blank, forces), values, remarks)
 
 
-def _held(model: BladeElementWing, found: GlobalValues) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Coefficients within their genes' boxes, and remarks on those that the law takes out of them."""
+def _by_law(
+    model: BladeElementWing, law: GlobalModel, condition: Condition
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Coefficients that the law gives under ``condition``, within their genes' boxes, and what must be known of them.
+
+    One that the law takes out of its box is held at its edge, with a remark.
+    """
+    found = at(law, condition)
     values, remarks = dict(found.values), list(found.remarks)
     for gene in model.genes:
         if gene.name in values and not gene.lower <= values[gene.name] <= gene.upper:
@@ -192,7 +199,12 @@ def _global(
 
 
 def _sources(
-    spec: CalibrationSpec, nominal: Genome, judged: list[_Judged], law: GlobalModel | None, recording: Recording
+    spec: CalibrationSpec,
+    model: BladeElementWing,
+    nominal: Genome,
+    judged: list[_Judged],
+    law: GlobalModel | None,
+    recording: Recording,
 ) -> tuple[dict[Source, Genome], tuple[str, ...]]:
     """Genomes to compare with ``recording``, and warnings about them."""
     found: dict[Source, Genome] = {"nominal": nominal}
@@ -203,21 +215,12 @@ def _sources(
         elif recording.name in one.estimate.recordings:
             found["local"] = one.genome
     if law is not None:
-        genome, warnings = _by_law(nominal, law, recording)
-        found |= {"global": genome} if genome else {}
+        values, said = _by_law(model, law, recording.condition)
+        found["global"] = nominal.replace(values)
+        warnings = tuple(f"recording {recording.name!r}: {remark}" for remark in said)
     if spec.mode == "local":
         found["average"] = nominal.replace(average([one.estimate for one in judged]))
     return found, warnings
-
-
-def _by_law(nominal: Genome, law: GlobalModel, recording: Recording) -> tuple[Genome | None, tuple[str, ...]]:
-    """Genome that the law gives under the recording's condition, None where it leaves the box; remarks on both."""
-    found = at(law, recording.condition)
-    warnings = tuple(f"recording {recording.name!r}: {remark}" for remark in found.remarks)
-    try:
-        return nominal.replace(found.values), warnings
-    except ValueError as error:
-        return None, (*warnings, f"recording {recording.name!r}: the global model cannot be used there: {error}")
 
 
 def _compare(
@@ -244,18 +247,20 @@ def _left_out(
     dataset: Dataset,
     nominal: Genome,
     estimates: list[LocalEstimate],
-) -> tuple[Agreement, ...]:
-    """Agreements with each fitted recording of the law fitted without it; none where the rest is too little."""
+) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
+    """Agreements with each fitted recording of the law fitted without it; none where the rest is too little. Remarks."""
     found: list[Agreement] = []
+    remarks: list[str] = []
     for one in estimates:
-        law, _ = _global(spec, dataset, [other for other in estimates if other is not one])
+        law, said = _global(spec, dataset, [other for other in estimates if other is not one])
+        remarks += [f"with a recording left out: {remark}" for remark in said]
         if law is None:
             continue
         recording = prepared(spec, dataset.recording(one.recordings[0]))
-        genome, _ = _by_law(nominal, law, recording)
-        if genome is not None:
-            found += agreements(recording, _observed(model, recording, [genome])[0], "global")
-    return tuple(found)
+        values, said = _by_law(model, law, recording.condition)
+        remarks += [f"recording {recording.name!r} left out: {remark}" for remark in said]
+        found += agreements(recording, _observed(model, recording, [nominal.replace(values)])[0], "global")
+    return tuple(found), tuple(remarks)
 
 
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged]) -> tuple[GeneResult, ...]:

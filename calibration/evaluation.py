@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.signal import periodogram
 
+from calibration.cutting import Cut, pieces
 from calibration.evaluator import Evaluator
 from calibration.force_result import Agreement, ForceComparison, Quantity, Source
 from calibration.linearised import free_genes, linearise, unit_at
@@ -34,7 +35,7 @@ beat, counts as misfit too; with less, the interval shrinks to the core of the e
 SIGNIFICANCE = 0.01
 FEWEST_BEATS = 5  # for the scatter between beats to say what noise explains
 FLIPS = 999
-EDGE = 1e-6  # beats by which a sample may miss the start of a beat and still be its first
+CONSTANT = 1e-9  # of the largest force of a recording: what varies less is constant, but for rounding
 
 
 @dataclass(frozen=True)
@@ -81,13 +82,7 @@ def whole_beats(recording: Recording, forces: Array | None = None, points: int =
 
     Beats in which the recording misses a sample are left out; ValueError when no beat is left.
     """
-    cut = _Cut.of(recording)
-    if not len(cut.gapless):
-        times, f = recording.times, recording.condition.flap_frequency
-        raise ValueError(
-            f"recording {recording.name!r} holds no whole beat without a gap: it lasts {times[-1] - times[0]:.4g} s, "
-            f"a beat {1 / f:.4g} s; record at least one beat, better ten"
-        )
+    cut = Cut.of(recording)
     phase = np.arange(points) / points
     values = recording.values if forces is None else forces
     seen = recording.valid.all(axis=1)
@@ -101,19 +96,21 @@ def agreements(recording: Recording, modelled: Array, source: Source) -> tuple[A
     """How ``modelled`` [T, C], in N, agrees with the recording, one entry per quantity.
 
     Differences and correlation over all samples of the whole beats; percentages of the range of the recorded mean beat.
+    Neither percentages nor correlation (NaN) of a force that is constant.
     """
     beats, model_beats = whole_beats(recording).mean, whole_beats(recording, modelled).mean
-    cut = _Cut.of(recording)
+    cut = Cut.of(recording)
     kept = np.isin(cut.beat, cut.gapless)
     recorded, model = quantities(recording, recording.values[kept]), quantities(recording, modelled[kept])
+    least = CONSTANT * max(float(np.abs(recording.values[kept]).max()), float(np.abs(modelled[kept]).max()))
     return tuple(
         Agreement(
             recording=recording.name,
             source=source,
             quantity=name,
             rmse=(rmse := float(np.sqrt(np.mean((model[name] - recorded[name]) ** 2)))),
-            rmse_percent=100 * rmse / float(np.ptp(beats[name])),
-            correlation=_correlation(model[name], recorded[name]),
+            rmse_percent=_percent(rmse, beats[name], least),
+            correlation=_correlation(model[name], recorded[name], least),
             mean_recorded=float(beats[name].mean()),
             mean_modelled=float(model_beats[name].mean()),
         )
@@ -126,7 +123,6 @@ def comparison(recording: Recording, modelled: Array, source: Source) -> ForceCo
     recorded, model = whole_beats(recording), whole_beats(recording, modelled)
     frequency, spectra = spectrum(recording, recording.values)
     _, model_spectra = spectrum(recording, modelled)
-    remarks = () if spectra else ("no spectra: every piece of the recording long enough for one has a gap",)
     return ForceComparison(
         recording=recording.name,
         source=source,
@@ -137,24 +133,23 @@ def comparison(recording: Recording, modelled: Array, source: Source) -> ForceCo
         frequency=frequency,
         recorded_spectrum=spectra,
         modelled_spectrum=model_spectra,
-        remarks=remarks,
     )
 
 
 def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity, Array]]:
     """One-sided power spectral densities of ``forces`` [T, C]: frequencies [m] in Hz, and [m] in N^2/Hz per quantity.
 
-    Mean of the periodograms of pieces of SEGMENT_BEATS whole beats without overlap or window (harmonics of the beat
-    then stay in one line), each less its mean: the sum times the width of a line is the mean variance of a piece
-    (Parseval). Pieces with gaps are left out; without any piece both are empty.
+    Mean of the periodograms of pieces of SEGMENT_BEATS beats without overlap or window (harmonics of the beat then stay
+    in one line), each less its mean: the sum times the width of a line is the mean variance of a piece (Parseval).
+    Pieces lie between the gaps; where no beat fits, both are empty.
     """
-    pieces = _pieces(recording)
-    if not len(pieces):
+    samples = pieces(recording, SEGMENT_BEATS)
+    if not len(samples):
         return np.empty(0), {}
     rate = (len(recording.times) - 1) / (recording.times[-1] - recording.times[0])
     frequency, density = np.empty(0), {}
     for name, values in quantities(recording, forces).items():
-        frequency, power = periodogram(values[pieces], fs=rate, detrend="constant", axis=1)
+        frequency, power = periodogram(values[samples], fs=rate, detrend="constant", axis=1)
         density[name] = power.mean(axis=0)
     return frequency, density
 
@@ -243,47 +238,15 @@ def _left(products: Array) -> Array:
     return np.asarray(square - np.einsum("kp,kp->k", cross, solved))
 
 
-@dataclass(frozen=True)
-class _Cut:
-    """A recording cut into beats: ``beat`` [T] number of the beat of each sample; numbers of the whole beats.
-
-    A filter knows nothing beyond the ends of a recording and guesses. Beats that come within one period of the cutoff
-    of an end do not count, unless there are no others.
-    """
-
-    beat: Array
-    whole: Array
-    gapless: Array
-
-    @classmethod
-    def of(cls, recording: Recording) -> _Cut:
-        f, times = recording.condition.flap_frequency, recording.times
-        step = float(np.median(np.diff(times)))
-        beat = np.floor(f * times + EDGE)
-        first, last = f * times[0] - EDGE, f * (times[-1] + step) + EDGE
-        whole = np.arange(np.ceil(first), np.floor(last))
-        if recording.low_pass is not None:
-            margin = f / recording.low_pass.cutoff
-            inner = whole[(whole >= first + margin) & (whole + 1 <= last - margin)]
-            whole = inner if len(inner) else whole
-        broken = beat[~recording.valid.all(axis=1)]
-        return cls(beat, whole, whole[~np.isin(whole, broken)])
+def _percent(rmse: float, beat: Array, least: float) -> float:
+    """``rmse`` in per cent of the range of ``beat``; NaN when that is constant: varies by no more than ``least``."""
+    span = float(np.ptp(beat))
+    return 100 * rmse / span if span > least else float("nan")
 
 
-def _pieces(recording: Recording) -> npt.NDArray[np.int64]:
-    """Samples of each gapless piece of whole beats, [pieces, length]."""
-    cut = _Cut.of(recording)
-    rows = np.flatnonzero(np.isin(cut.beat, cut.whole))
-    if not len(rows):
-        return np.empty((0, 0), np.int64)
-    beats = min(SEGMENT_BEATS, len(cut.whole))
-    length = min(len(rows), round(beats * len(rows) / len(cut.whole)))
-    pieces = rows[: len(rows) // length * length].reshape(-1, length)
-    return np.asarray(pieces[recording.valid[pieces].all(axis=(1, 2))])
-
-
-def _correlation(a: Array, b: Array) -> float:
-    """Pearson's correlation; NaN when one of them is constant."""
+def _correlation(a: Array, b: Array, least: float) -> float:
+    """Pearson's correlation; NaN when one of them is constant: varies by no more than ``least``."""
+    if min(np.ptp(a), np.ptp(b)) <= least:
+        return float("nan")
     a, b = a - a.mean(), b - b.mean()
-    scale = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / scale if scale > 0 else float("nan")
+    return float(a @ b / np.sqrt((a @ a) * (b @ b)))

@@ -13,6 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.result import GeneResult
+from records import Condition
+from sim.atmosphere import density
 
 Array = npt.NDArray[np.float64]
 Source = Literal["nominal", "local", "joint", "global", "average"]
@@ -64,23 +66,37 @@ class GlobalGene:
 class GlobalModel:
     """Coefficients as functions of flap frequency and body pitch, and the conditions to which they were fitted.
 
-    ``conditions`` are the flap frequency (Hz) and body pitch (rad) of each of the ``recordings``.
+    ``conditions`` are those of the ``recordings``.
     """
 
     genes: tuple[GlobalGene, ...]
     recordings: tuple[str, ...]
-    conditions: tuple[tuple[float, float], ...]
+    conditions: tuple[Condition, ...]
     remarks: tuple[str, ...] = ()
 
     @property
     def frequency_range(self) -> tuple[float, float]:
         """Smallest and largest flap frequency, Hz."""
-        return min(f for f, _ in self.conditions), max(f for f, _ in self.conditions)
+        return _range([c.flap_frequency for c in self.conditions])
 
     @property
     def pitch_range(self) -> tuple[float, float]:
         """Smallest and largest body pitch, rad."""
-        return min(pitch for _, pitch in self.conditions), max(pitch for _, pitch in self.conditions)
+        return _range([c.angle_of_attack for c in self.conditions])
+
+    @property
+    def airspeed_range(self) -> tuple[float, float]:
+        """Smallest and largest airspeed, m/s."""
+        return _range([c.airspeed for c in self.conditions])
+
+    @property
+    def density_range(self) -> tuple[float, float]:
+        """Smallest and largest density of the air, kg/m^3."""
+        return _range([density(c.pressure, c.temperature) for c in self.conditions])
+
+
+def _range(values: list[float]) -> tuple[float, float]:
+    return min(values), max(values)
 
 
 @dataclass(frozen=True)
@@ -88,7 +104,8 @@ class Agreement:
     """How one model agrees with one recording in one quantity.
 
     RMS difference and Pearson's correlation are over all samples of the whole beats; ``rmse_percent`` is relative to
-    the range (largest minus smallest) of the recorded mean beat; means are over whole beats.
+    the range (largest minus smallest) of the recorded mean beat; means are over whole beats. Of a constant force there
+    is neither percentage (NaN) nor correlation.
     """
 
     recording: str

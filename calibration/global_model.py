@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 
 from calibration.force_result import GlobalGene, GlobalModel, LocalEstimate
 from records import Condition
+from sim.atmosphere import density
 
 Array = npt.NDArray[np.float64]
 
@@ -23,6 +24,7 @@ AFFINE = ("C_l", "C_F")
 FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
 FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the law, for its own scatter to be estimated
 SMALL = 0.05  # of the root mean square of a coefficient: errors of smaller values are relative to this
+WEATHER = 0.05  # relative; the density of the air differs by as much from day to day, and warns of nothing
 COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be told apart
 
 
@@ -66,7 +68,7 @@ def fit_global(
     return GlobalModel(
         genes=tuple(_gene(name, estimates, whole if name in affine else whole[:, :1], weighted) for name in names),
         recordings=tuple(name for estimate in estimates for name in estimate.recordings),
-        conditions=tuple(zip(frequency.tolist(), pitch.tolist(), strict=True)),
+        conditions=tuple(conditions),
         remarks=_few(len(estimates)),
     )
 
@@ -75,7 +77,7 @@ def at(model: GlobalModel, condition: Condition) -> GlobalValues:
     """Evaluate the coefficients of ``model`` under ``condition``, with a warning where it extrapolates."""
     f, pitch = condition.flap_frequency, condition.angle_of_attack
     values = {gene.name: gene.constant + gene.per_hz * f + gene.per_rad * pitch for gene in model.genes}
-    return GlobalValues(values, _extrapolation(model, f, pitch))
+    return GlobalValues(values, _extrapolation(model, condition))
 
 
 def average(estimates: Sequence[LocalEstimate]) -> dict[str, float]:
@@ -188,35 +190,47 @@ def _independent(design: Array) -> bool:
     return not len(values) or bool(values[-1] > np.sqrt((1 - COLLINEAR) / 2) * values[0])
 
 
-def _extrapolation(model: GlobalModel, f: float, pitch: float) -> tuple[str, ...]:
-    """Say where (f, pitch) lies outside the conditions of ``model``: by one variable, or by their combination.
+def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
+    """Say where ``condition`` lies outside those of ``model``: by one variable, or by combining the law's two.
 
-    The combination is judged by the leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted bounds
-    an ellipse around them (hidden extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
+    Airspeed and density are not in the law, but the coefficients were found at theirs. The combination is judged by the
+    leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted bounds an ellipse around them (hidden
+    extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
     """
-    remarks = []
-    for name, unit, value, (low, high), scale in (
-        ("flap frequency", "Hz", f, model.frequency_range, 1.0),
-        ("body pitch", "deg", pitch, model.pitch_range, 180 / np.pi),
-    ):
-        if not low - 1e-9 <= value <= high + 1e-9:
-            remarks.append(
-                f"{name} {scale * value:.4g} {unit} is outside [{scale * low:.4g}, {scale * high:.4g}] {unit}, "
-                f"where the coefficients were fitted: an extrapolation"
-            )
+    f, pitch = condition.flap_frequency, condition.angle_of_attack
+    remarks = [
+        *_outside("flap frequency", "Hz", f, model.frequency_range),
+        *_outside("body pitch", "deg", pitch, model.pitch_range, scale=180 / np.pi),
+    ]
     if not remarks and _leverage(model, f, pitch) > 1 + 1e-9:
         remarks.append(
             f"flap frequency {f:.4g} Hz and body pitch {np.degrees(pitch):.4g} deg are each within what was fitted, "
             f"but no fitted condition combines them like that: an extrapolation"
         )
+    rho = density(condition.pressure, condition.temperature)
+    remarks += _outside("airspeed", "m/s", condition.airspeed, model.airspeed_range)
+    remarks += _outside("air density", "kg/m^3", rho, model.density_range, slack=WEATHER)
     return tuple(remarks)
+
+
+def _outside(
+    name: str, unit: str, value: float, fitted: tuple[float, float], *, scale: float = 1.0, slack: float = 0.0
+) -> list[str]:
+    """A remark when ``value`` (shown times ``scale``) is outside what was fitted by more than the share ``slack``."""
+    low, high = fitted
+    if low * (1 - slack) - 1e-9 <= value <= high * (1 + slack) + 1e-9:
+        return []
+    return [
+        f"{name} {scale * value:.4g} {unit} is outside [{scale * low:.4g}, {scale * high:.4g}] {unit}, "
+        f"where the coefficients were fitted: an extrapolation"
+    ]
 
 
 def _leverage(model: GlobalModel, f: float, pitch: float) -> float:
     """Leverage of a condition over the largest leverage of those fitted."""
-    centre = np.mean(model.conditions, axis=0)
-    spread = np.std(model.conditions, axis=0)
-    fitted = (np.array(model.conditions) - centre) / spread
+    conditions = np.array([[c.flap_frequency, c.angle_of_attack] for c in model.conditions])
+    centre, spread = conditions.mean(axis=0), conditions.std(axis=0)
+    fitted = (conditions - centre) / spread
     inner = np.linalg.inv(fitted.T @ fitted)
     x = (np.array([f, pitch]) - centre) / spread
     largest = float(np.einsum("ni,ij,nj->n", fitted, inner, fitted).max())

@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 
 from calibration.covariance import Noise, whitened_sensitivity
 from calibration.evaluator import Evaluator
-from calibration.linearised import free_genes, linearise, residuals_of, unit_at, values_at
+from calibration.linearised import free_genes, linearise, residuals_of, stopped, unit_at, values_at
 from calibration.problem import Problem
 from calibration.uncertainty import Uncertainty, uncertainty
 from records import Gene
@@ -165,12 +165,12 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
 
 def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
     """Remarks on genes that the box stopped."""
-    stopped = [(gene, float(gene.to_unit(values[gene.name]))) for gene in genes]
+    found = np.array([values[gene.name] for gene in genes])
     return tuple(
-        f"{gene.name} is at its {'lower' if u < 0.5 else 'upper'} bound {values[gene.name]:.4g}: "
-        "the best value may lie beyond, and its error is not to be relied on"
-        for gene, u in stopped
-        if not 1e-6 < u < 1 - 1e-6
+        f"{gene.name} is at its {'lower' if value <= gene.lower else 'upper'} bound {value:.4g}: the best value may "
+        "lie beyond; the errors of the others take it as known"
+        for gene, value, at_bound in zip(genes, found, stopped(genes, found), strict=True)
+        if at_bound
     )
 
 

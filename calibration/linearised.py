@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 # millimetre that differs from one neighbour to the next; much smaller steps would measure it, larger ones the
 # curvature (docs/estimation.md has the figures).
 STEP = 0.003
+AT_BOUND = 1e-6  # in unit coordinates
 SHORTER = 0.125  # of the step, where both neighbours fail
 
 
@@ -60,6 +61,12 @@ def values_at(genes: list[Gene], unit: Array) -> Array:
 def unit_at(genes: list[Gene], values: Array) -> Array:
     """Unit coordinates [F] of values [F], inside the box."""
     return np.clip([float(gene.to_unit(value)) for gene, value in zip(genes, values, strict=True)], 0.0, 1.0)
+
+
+def stopped(genes: list[Gene], values: Array) -> npt.NDArray[np.bool_]:
+    """[F], True where a value lies at a bound of its gene."""
+    unit = unit_at(genes, values)
+    return np.asarray((unit < AT_BOUND) | (unit > 1 - AT_BOUND))
 
 
 def residuals_of(evaluation: Evaluation) -> list[Array]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calibration.cutting import Cut
 from calibration.problem import base_genome, compared
 from calibration.spec import CalibrationSpec, model_for, resolved
 from records import Dataset, LowPass, Recording
@@ -96,7 +97,7 @@ def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recordi
                 f"recording {recording.name!r} has no instant with all of the fitted force axes "
                 f"({', '.join(spec.axes)}); there is nothing to compare: leave the recording out of the dataset"
             )
-        prepared(spec, recording)
+        Cut.of(prepared(spec, recording))
         return
     if not np.isfinite(recording.positions).all(axis=2).any():
         raise ValueError(

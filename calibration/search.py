@@ -153,7 +153,9 @@ class _Run:
     def iterations(self) -> Iterator[Generation]:
         """Gauss-Newton iterations, from where the search ended or from the base, to convergence."""
         start = self.state.found.get(self.stage.name, self.state.base)
-        limit = min(ITERATIONS, self.spec.max_generations)
+        limit = ITERATIONS
+        if self.spec.method == "gauss_newton":  # a finish goes to the end, however short the search before it was
+            limit = min(ITERATIONS, self.spec.max_generations)
         for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
             yield self._iteration(step, step.converged or step.index + 1 >= limit)
 

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from calibration.beats import ENOUGH, FEWEST, beat_score_covariance, beat_scores, widening
-from calibration.coloured import Block, score_covariance
+from calibration.beats import ENOUGH, FEWEST, beat_score_covariance, beat_scores, widening, without_mean_beat
+from calibration.coloured import Block, score_covariances
 from calibration.covariance import Noise, whitened_sensitivity
 from calibration.evaluator import Evaluator
-from calibration.linearised import Linearised, free_genes, linearise, unit_at
+from calibration.linearised import Linearised, free_genes, linearise, stopped, unit_at
 from calibration.problem import Problem
 from calibration.remarks import remarks
-from records import Gene, Genome
+from records import Gene, Genome, Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +40,8 @@ class Uncertainty:
         values: [F], at which this was evaluated.
         covariance: [F, F] of the values, Cramer-Rao bounds for coloured residuals, the gene box being a weak prior.
         relative: [F, F] covariance of the values relative to themselves, shares normalised.
-        told: [F], False for a gene whose neighbours cannot be simulated; its error is infinite.
+        told: [F], False for a gene that a bound stopped, or whose neighbours cannot be simulated: its error is
+            infinite, and those of the others are for its value as it is.
         noise: R of each recording, [C, C], m^2 or N^2.
         cost: Eq. 22 at the values, with that R.
         remarks: what the data cannot tell, in words.
@@ -91,8 +92,10 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     genes = free_genes(problem)
     values = np.array([problem.base[gene.name] for gene in genes])
     linear = linearise(problem, evaluator, unit_at(genes, values))
+    free = ~stopped(genes, values)
+    linear = replace(linear, told=linear.told & free)
     noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
-    unit = unit_covariance(problem, linear, noise)
+    unit, doubts = unit_covariance(problem, linear, noise)
     per_value, per_cent = _slopes(genes, values)
     to_shares = _share_map(genes, problem.base) * per_cent
     relative = to_shares @ unit @ to_shares.T
@@ -104,42 +107,98 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
         told=linear.told,
         noise=tuple(n.covariance for n in noise),
         cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
-        remarks=remarks(genes, relative, linear.told, IDENTIFIABLE),
+        remarks=(*doubts, *_remarks(genes, relative, linear.told, free)),
     )
 
 
-def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) -> Array:
-    """Covariance [F, F] of an estimate in unit coordinates.
+def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) -> tuple[Array, tuple[str, ...]]:
+    """Covariance [F, F] of an estimate in unit coordinates, and remarks on what it rests on.
 
-    The box is a weak prior, without which nothing would bound a gene that the data ignore.
+    The box is a weak prior, without which nothing would bound a gene that the data ignore; one that is not ``told`` has
+    nothing but this, and the others are judged as if it were known.
     """
-    size = len(problem.free)
-    information, blocks, by_beats = np.zeros((size, size)), [], np.zeros((size, size))
-    fewest = np.inf  # beats, of all recordings; no number for tracks
-    for record, n, residual, slope in zip(
-        problem.recordings, noise, linear.residuals, linear.sensitivities, strict=True
-    ):
+    told = np.flatnonzero(linear.told)
+    records = problem.recordings
+    parts = [
+        _Part.of(record, n, residual, slope[:, :, told])
+        for record, n, residual, slope in zip(records, noise, linear.residuals, linear.sensitivities, strict=True)
+    ]
+    prior = np.eye(len(told)) / PRIOR**2
+    bread = np.asarray(np.linalg.inv(sum(part.information for part in parts) + prior), float)
+    beats = sum(len(part.scores) for part in parts)
+    if beats >= ENOUGH and all(len(part.scores) >= FEWEST for part in parts):
+        meat = sum(part.from_beat_to_beat(bread) for part in parts) * widening(beats)
+    else:
+        meat = _from_samples(parts, bread)
+    covariance = np.eye(len(problem.free)) * PRIOR**2
+    covariance[np.ix_(told, told)] = bread @ (meat + prior) @ bread
+    few = [p for p in parts if p.record.kind == "forces" and len(p.scores) < FEWEST]
+    return covariance, tuple(
+        f"recording {part.record.name!r} has {len(part.scores)} whole beats, and fewer than {FEWEST} hardly tell how "
+        "much beats differ: standard errors may be too small"
+        for part in few
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One recording, whitened: residuals [T, C], sensitivities [T, C, F], and sums of scores [B, F] of whole beats."""
+
+    record: Recording
+    white: Array
+    sensitivity: Array
+    seen: npt.NDArray[np.bool_]
+    scores: Array
+    used: float
+
+    @classmethod
+    def of(cls, record: Recording, noise: Noise, residual: Array, slope: Array) -> _Part:
         seen = np.isfinite(residual)
         kept = seen.any(axis=0)
-        white, sensitivity = n.whitened(residual)[:, kept], whitened_sensitivity(n, slope)[:, kept]
-        information += np.einsum("tcp,tcq->pq", sensitivity, sensitivity, optimize=True)
-        grouped = record.kind == "forces"
-        blocks.append(Block.of(record.times, white, sensitivity, seen[:, kept], grouped=grouped))
-        scores, used = beat_scores(record, white, sensitivity) if grouped else (np.empty((0, size)), 1.0)
-        fewest = min(fewest, len(scores))
-        if len(scores) >= FEWEST:
-            by_beats += beat_score_covariance(scores, used)
-    prior = np.eye(size) / PRIOR**2
-    bread = np.asarray(np.linalg.inv(information + prior), float)
-    beats = np.asarray(bread @ (by_beats + prior) @ bread)
-    if ENOUGH <= fewest < np.inf:
-        return beats * widening(fewest)
-    samples = np.asarray(bread @ (score_covariance(blocks, bread) + prior) @ bread)
-    if not FEWEST <= fewest < np.inf:
-        return samples
-    # Few beats tell their own scatter badly: whichever error is larger, with the correlations of the samples.
-    larger = np.sqrt(np.maximum(np.diag(beats) / np.diag(samples), 1.0))
-    return samples * larger * larger[:, None]
+        white, sensitivity = noise.whitened(residual)[:, kept], whitened_sensitivity(noise, slope)[:, kept]
+        scores, used = np.empty((0, slope.shape[2])), 1.0
+        if record.kind == "forces":
+            scores, used = beat_scores(record, white, sensitivity)
+        return cls(record, white, sensitivity, seen[:, kept], scores, used)
+
+    @property
+    def information(self) -> Array:
+        return np.asarray(np.einsum("tcp,tcq->pq", self.sensitivity, self.sensitivity, optimize=True))
+
+    def from_beat_to_beat(self, bread: Array) -> Array:
+        """Covariance [F, F] of the sum of scores, from their series of beats."""
+        absorbed = float(np.trace(bread @ self.information)) / len(bread)
+        return beat_score_covariance(self.scores, self.used, absorbed)
+
+    def block(self) -> Block:
+        """For the correlations of samples."""
+        white, forces = self.white, self.record.kind == "forces"
+        if forces:
+            white = without_mean_beat(self.record, white, len(self.scores))
+        return Block.of(self.record.times, white, self.sensitivity, self.seen, grouped=forces)
+
+
+def _from_samples(parts: list[_Part], bread: Array) -> Array:
+    """Covariance [F, F] of the sum of scores, from the correlations of samples.
+
+    Beats too few to be taken at their word still warn: where they scatter more, their scatter is taken.
+    """
+    total = np.zeros_like(bread)
+    for part, meat in zip(parts, score_covariances([part.block() for part in parts], bread), strict=True):
+        larger = np.ones(len(bread))
+        if len(part.scores) >= FEWEST:
+            beats = np.diag(part.from_beat_to_beat(bread))
+            larger = np.sqrt(np.maximum(beats / np.maximum(np.diag(meat), 1e-300), 1.0))
+        total += meat * larger * larger[:, None]
+    return total
+
+
+def _remarks(
+    genes: list[Gene], relative: Array, told: npt.NDArray[np.bool_], free: npt.NDArray[np.bool_]
+) -> tuple[str, ...]:
+    """What the data cannot tell of the genes that no bound stopped."""
+    (kept,) = np.nonzero(free)
+    return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], told[kept], IDENTIFIABLE)
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:

@@ -52,6 +52,7 @@ class GlobalModel(TypedDict):
     recordings: list[str]
     frequency_range_hz: list[float]
     pitch_range_deg: list[float]
+    airspeed_range_m_s: list[float]
     remarks: list[str]
 
 

@@ -18,7 +18,10 @@ ByQuantity = dict[Quantity, Series]
 
 
 class CoefficientOut(BaseModel):
-    """A coefficient with its standard error (Cramer-Rao bound) and the interval that holds it in 90 of 100 cases."""
+    """A coefficient with its standard error (Cramer-Rao bound) and an interval that holds it in about 90 of 100 cases.
+
+    In as many only with beats enough, 24 or more: fewer tell their own scatter badly.
+    """
 
     name: str
     value: float
@@ -63,11 +66,15 @@ class GlobalModelOut(BaseModel):
     recordings: list[str]
     frequency_range_hz: Pair
     pitch_range_deg: Pair
+    airspeed_range_m_s: Pair
     remarks: list[str]
 
 
 class AgreementOut(BaseModel):
-    """How a model agrees with a recording in one quantity; per cent are of the range of the recorded mean beat."""
+    """How a model agrees with a recording in one quantity; per cent are of the range of the recorded mean beat.
+
+    Of a constant force there is neither a percentage nor a correlation.
+    """
 
     recording: str
     source: Literal["nominal", "local", "joint", "global", "average", "given"]

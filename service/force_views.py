@@ -85,7 +85,6 @@ def forces(found: ForceComparison, source: str | None = None) -> Json:
 
 def law(stored: Mapping[str, Any], dataset: Dataset) -> GlobalModel:
     """The global model of a stored result; its conditions are those of the recordings that it names."""
-    conditions = [dataset.recording(name).condition for name in stored["recordings"]]
     return GlobalModel(
         genes=tuple(
             GlobalGene(
@@ -100,7 +99,7 @@ def law(stored: Mapping[str, Any], dataset: Dataset) -> GlobalModel:
             for one in stored["genes"]
         ),
         recordings=tuple(stored["recordings"]),
-        conditions=tuple((c.flap_frequency, c.angle_of_attack) for c in conditions),
+        conditions=tuple(dataset.recording(name).condition for name in stored["recordings"]),
         remarks=tuple(stored["remarks"]),
     )
 
@@ -203,6 +202,7 @@ def _law_out(found: GlobalModel) -> schemas.GlobalModelOut:
         recordings=list(found.recordings),
         frequency_range_hz=list(found.frequency_range),
         pitch_range_deg=[math.degrees(limit) for limit in found.pitch_range],
+        airspeed_range_m_s=list(found.airspeed_range),
         remarks=list(found.remarks),
     )
 

@@ -111,7 +111,7 @@ class Balance:
     decimals: int = 5
 
 
-EXAMPLE = Balance(every=10, beats=8, decimals=4)
+EXAMPLE = Balance(every=10, beats=28, decimals=4)
 
 
 def delfly() -> Vehicle:

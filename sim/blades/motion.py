@@ -80,7 +80,7 @@ def angles(
     t_star = np.arange(instants) / instants
     peel, peeled = np.zeros((count, instants)), np.ones(instants)
     if claps:
-        peel = _peel(pitch[:, 1], t_star, max(peel_width, 1.0 / instants))
+        peel = _peel(pitch[:, 1], t_star, max(peel_width, 1.0 / instants), motion.peel_end)
         peeled = np.minimum(t_star / motion.peel_end, 1.0)
         peeled[0] = np.sqrt(0.5)  # the chord closes in an instant: the mean of the squares before and after
     return Angles(flap[:, :3], pitch, peel, peeled)
@@ -140,14 +140,17 @@ def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: fl
     return np.stack([value, first, second], axis=1)
 
 
-def _peel(pitch_rate: Array, t_star: Array, width: float) -> Array:
-    """1 from t* = 0 until the pitch rate [B, n] first reaches zero (Eq. 7: theta_fling' = -theta_w' >= 0), else 0.
+def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Array:
+    """1 while the wings peel, 0 after: t* >= 0 and theta_fling' = -theta_w' >= 0 (Eq. 7), ``pitch_rate`` being [B, n].
 
-    The end is a smooth step of ``width`` beats about the zero, which is found between instants: forces are smooth in
-    the genes, and with some width in time as well.
+    That is from the first instant at which the wing pitches so, which must come before t* = ``latest``, until it stops.
+    The end is a smooth step of ``width`` beats about the zero of the pitch rate, which is found between instants:
+    forces are smooth in the genes, and with some width in time as well.
     """
     n, rows = len(t_star), np.arange(len(pitch_rate))
-    ended = pitch_rate >= 0
+    fling = pitch_rate < 0
+    start = fling.argmax(axis=1)
+    ended = ~fling & (np.arange(n) > start[:, None])
     k = np.maximum(ended.argmax(axis=1), 1)
     after, before = pitch_rate[rows, k], pitch_rate[rows, k - 1]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -155,7 +158,8 @@ def _peel(pitch_rate: Array, t_star: Array, width: float) -> Array:
     weight = np.clip((end[:, None] - t_star) / width + 0.5, 0.0, 1.0)
     weight = weight * weight * (3.0 - 2.0 * weight)
     weight[~ended.any(axis=1)] = 1.0
-    weight[ended[:, 0]] = 0.0
+    weight[np.arange(n) < start[:, None]] = 0.0
+    weight[~fling.any(axis=1) | (t_star[start] >= latest)] = 0.0
     weight[:, 0] *= 0.5  # it starts in an instant
     return np.asarray(weight)
 

@@ -83,6 +83,8 @@ def test_peel_lasts_until_the_wing_stops_pitching() -> None:
 def test_wings_that_pitch_the_other_way_do_not_peel() -> None:
     motion = replace(DELFLY.motion, pitch=FourierPitch(1.5, (), (0.4,)))
     assert not angles(motion, {}, 12.5, 400, claps=True).peel.any()
+    still = replace(DELFLY.motion, pitch=FourierPitch(1.5, (0.4,), ()))  # begins to pitch at t* = 0, not before
+    assert np.nonzero(angles(still, {}, 12.5, 400, claps=True).peel[0])[0].tolist()[::199] == [1, 200]
     turned = replace(DELFLY.motion, pitch=FourierPitch(1.5, (), (-0.4,)))
     assert np.nonzero(angles(turned, {}, 12.5, 400, claps=True).peel[0])[0][-1] == pytest.approx(100, abs=1)
 
