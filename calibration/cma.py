@@ -66,11 +66,6 @@ class Distribution:
         return float(self.sigma * np.mean(np.sqrt(np.diag(np.array(self.covariance)))))
 
 
-def default_size(genes: int) -> int:
-    """Individuals per generation that DEAP, after Hansen, takes for so many genes."""
-    return int(4 + 3 * np.log(genes))
-
-
 def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
     """Unit coordinates [size, F] of the next generation; the first of all is the start itself."""
     generation = state.generation + 1

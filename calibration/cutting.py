@@ -31,11 +31,11 @@ class Cut:
         broken = beat[~recording.valid.all(axis=1)]
         gapless = whole[np.isin(whole, beat) & ~np.isin(whole, broken)]
         if not len(gapless):
+            lasts = times[-1] - times[0] + step
             why = (
-                f"each of its {len(whole)} whole beats lacks samples; fill the gaps, record longer"
+                f"each of its {len(whole)} whole beats lacks samples; fill the gaps of all force axes, record longer"
                 if len(whole)
-                else f"it lasts {times[-1] - times[0] + step:.4g} s, and no beat of {1 / f:.4g} s begins and ends in that; "
-                "record at least one beat, better ten"
+                else f"no beat of {1 / f:.4g} s begins and ends in its {lasts:.4g} s; record at least one, better ten"
             )
             raise ValueError(
                 f"recording {recording.name!r} holds no whole beat without a gap: {why}, or leave the recording out"

@@ -248,7 +248,10 @@ def _left_out(
     nominal: Genome,
     estimates: list[LocalEstimate],
 ) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
-    """Agreements with each fitted recording of the law fitted without it; none where the rest is too little. Remarks."""
+    """Agreements with each fitted recording of the law fitted without it, none where the rest is too little.
+
+    Also remarks on these laws.
+    """
     found: list[Agreement] = []
     remarks: list[str] = []
     for one in estimates:

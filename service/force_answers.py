@@ -11,7 +11,7 @@ ByQuantity = dict[str, list[float]]
 
 
 class Coefficient(TypedDict):
-    """A coefficient with its standard error and the interval that holds it in 90 of 100 cases."""
+    """A coefficient with its standard error and an interval that holds it in about 90 of 100 cases."""
 
     name: str
     value: float

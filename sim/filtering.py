@@ -9,13 +9,13 @@ import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt, sosfreqz
 
 from records import LowPass, Recording
+from records.limits import UNEVEN_STEPS
 
 Array = npt.NDArray[np.float64]
 
 CUTOFF_HARMONIC = 3.2  # the seed's 40 Hz at 12.5 beats per second: just above the third harmonic
 ENDS = 2.0  # periods of the cutoff that a filter needs to settle, at either end
 FEW_BEATS = 4
-UNEVEN = 0.01  # of a step: the largest departure from even sampling that a filter may take
 
 
 def default_cutoff(flap_frequency: float) -> float:
@@ -28,10 +28,10 @@ def sampling_rate(recording: Recording) -> float:
     steps = np.diff(recording.times)
     mean = float(steps.mean())
     worst = float(np.abs(steps - mean).max())
-    if worst > UNEVEN * mean:
+    if worst > UNEVEN_STEPS * mean:
         raise ValueError(
             f"recording {recording.name!r} is not sampled evenly: steps differ by up to {worst * 1e3:.3g} ms from "
-            f"their mean of {mean * 1e3:.4g} ms (limit {UNEVEN:.0%}); resample it, or calibrate without low-pass filter"
+            f"their mean of {mean * 1e3:.4g} ms (limit {100 * UNEVEN_STEPS:g} %); resample it, or calibrate without a low-pass"
         )
     return 1.0 / mean
 

@@ -17,11 +17,11 @@ from scipy import interpolate
 
 from records import Condition, LowPass, Recording
 from records.dataset import STANDARD_GRAVITY
+from records.limits import UNEVEN_STEPS
 from tracking.rigid_body import Poses, poses, quaternions
 from tracking.zero_phase import Kernels, kernels
 
 Array = npt.NDArray[np.float64]
-_UNEVEN = 0.02
 _CHUNK = 512
 _LAGS = 50
 
@@ -168,9 +168,9 @@ def _even_step(times: Array) -> float:
         raise ValueError(f"{len(times)} frames; forces need at least 3, and the reach of the filter beyond")
     step = float(np.median(np.diff(times)))
     worst = float(np.max(np.abs(np.diff(times) - step)))
-    if worst > _UNEVEN * step:
+    if worst > UNEVEN_STEPS * step:
         raise ValueError(
-            f"steps differ by up to {worst:.3g} s from {step:.3g} s; frames must be even within 2 %: "
+            f"steps differ by up to {worst:.3g} s from {step:.3g} s; frames must be even within {100 * UNEVEN_STEPS:g} %: "
             "give every frame a row, with empty cells where a marker was not seen"
         )
     return float((times[-1] - times[0]) / (len(times) - 1))

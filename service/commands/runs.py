@@ -84,7 +84,7 @@ def submit(
     low_pass_hz: Annotated[
         float | None, typer.Option(help="Vehicles: cut-off; 3.2 x flap frequency if left out, 0: none.")
     ] = None,
-    peel_width: Annotated[
+    peel_width_beats: Annotated[
         float | None, typer.Option(help="Vehicles: beats over which the end of the peel is smoothed.")
     ] = None,
     name: Annotated[str | None, typer.Option(help="A name to find the run by.")] = None,
@@ -116,7 +116,7 @@ def submit(
             without=without or None,
             axes=axis or None,
             low_pass_hz=low_pass_hz,
-            peel_width_beats=peel_width,
+            peel_width_beats=peel_width_beats,
             name=name,
         )
         if watch_it:

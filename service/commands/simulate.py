@@ -59,7 +59,7 @@ def simulate(
     low_pass_hz: Annotated[
         float | None, typer.Option(help="Vehicles: cut-off; 3.2 x flap frequency if left out, 0: none.")
     ] = None,
-    peel_width: Annotated[
+    peel_width_beats: Annotated[
         float | None, typer.Option(help="Vehicles: beats over which the end of the peel is smoothed.")
     ] = None,
     url: Url = DEFAULT_URL,
@@ -80,7 +80,12 @@ def simulate(
             "no tracks were recorded under another condition; leave out --output", param_hint="--at"
         )
     of_wings = {"--division": division, "--accuracy-mm": accuracy_mm, "--loads": loads, "--at": at}
-    of_vehicles = {"--preset": preset, "--without": without, "--low-pass-hz": low_pass_hz, "--peel-width": peel_width}
+    of_vehicles = {
+        "--preset": preset,
+        "--without": without,
+        "--low-pass-hz": low_pass_hz,
+        "--peel-width-beats": peel_width_beats,
+    }
     asked: dict[str, Any] = {"genome": read_genome(genome or [])}
     condition = read_condition(at or [])
     with Client(url) as client:
@@ -89,7 +94,7 @@ def simulate(
         if described["kind"] == "forces":
             _refuse(of_wings, "the dataset describes a vehicle, and this is for wings")
             asked |= {"preset": preset or "proposed", "without": without or (), "low_pass_hz": low_pass_hz}
-            found = client.simulate_forces(dataset, name, peel_width_beats=peel_width or 0.0, **asked)
+            found = client.simulate_forces(dataset, name, peel_width_beats=peel_width_beats or 0.0, **asked)
             write_files(found, output, plot)
             print_json(found) if as_json else given_forces(found)
             return
@@ -140,7 +145,7 @@ def _write_and_say(
 def _refuse(options: Mapping[str, object], why: str) -> None:
     """Refuse options that were given and cannot be meant."""
     for option, value in options.items():
-        if value:
+        if value not in (None, [], False):
             raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
 
 

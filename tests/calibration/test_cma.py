@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from deap import cma
 
-from calibration.cma import Distribution, default_size, drawn, learnt
+from calibration.cma import Distribution, drawn, learnt
 from calibration.genetic import FAILED, Individual
 
 
@@ -88,7 +88,3 @@ def test_failures_rank_last_and_a_failed_generation_only_narrows() -> None:
     assert none.centroid == now.centroid
     assert none.sigma == 0.5 * now.sigma
     assert none.stall == 1
-
-
-def test_the_default_size_is_hansens() -> None:
-    assert [default_size(n) for n in (3, 6, 18)] == [7, 9, 12]

@@ -1,16 +1,18 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from calibration.estimation import compare_forces, predict, summarise_forces
 from calibration.force_result import ForceResult
+from calibration.plan import plan
 from calibration.search import CalibrationSpec, calibrate
-from records import Dataset
-from sim.balance import DRAG, EXAMPLE, HELD_OUT, TRIALS, campaign, true_beat
+from records import Dataset, LowPass, Recording
+from sim.balance import DRAG, EXAMPLE, HELD_OUT, TRIALS, Balance, campaign, true_beat
 from workers import make_evaluator
 
 LOCAL = CalibrationSpec(mode="local")
@@ -107,6 +109,130 @@ def test_extrapolated_recordings_are_named(dataset: Dataset) -> None:
     assert any(
         r.startswith("recording 'test-8': flap frequency 10.3 Hz is outside [11.7, 13.3]") for r in result.remarks
     )
+
+
+def test_a_law_outside_its_box_is_held_at_it_for_recordings_as_for_predictions(dataset: Dataset) -> None:
+    fast = [
+        replace(r, condition=replace(r.condition, flap_frequency=20.0)) if r.name == "test-3" else r
+        for r in dataset.recordings
+    ]
+    _, result = run(LOCAL, replace(dataset, recordings=tuple(fast), held_out=("test-3",)))
+    unseen = {a.source: a for a in result.agreements if a.recording == "test-3" and a.quantity == "x"}
+    assert set(unseen) == {"nominal", "global", "average"}
+    assert result.held_out_after == pytest.approx(unseen["global"].rmse, rel=0.1)
+    assert result.held_out_after != pytest.approx(unseen["average"].rmse, rel=0.1)
+    assert any(r.startswith("recording 'test-3': the global model gives C_l = -") for r in result.remarks)
+    assert result.global_model is not None
+    found = predict(LOCAL, dataset, result.global_model, fast[2].condition)
+    assert {f"recording 'test-3': {remark}" for remark in found.remarks} <= set(result.remarks)
+
+
+def test_left_out_laws_say_where_they_extrapolate(local: ForceResult, dataset: Dataset) -> None:
+    said = [r for r in local.remarks if r.startswith("recording 'test-8' left out: ")]
+    assert [r.split(": ")[1].split(" is outside")[0] for r in said] == [
+        "flap frequency 10.3 Hz",
+        "body pitch 31 deg",
+        "airspeed 2 m/s",
+    ]
+    assert not any("'test-4' left out" in r for r in local.remarks)  # amid the others
+    five = tuple(e.name for e in local.estimates[:5])
+    _, few = run(replace(LOCAL, recordings=five), dataset)
+    assert sum("with a recording left out: 4 conditions" in r for r in few.remarks) == 1
+    assert len(set(few.remarks)) == len(few.remarks)
+
+
+BASE = campaign(1, Balance(every=20, beats=5), TRIALS[2:])
+
+
+def each(change: Callable[[Recording], Recording]) -> Dataset:
+    return replace(BASE, recordings=tuple(change(r) for r in BASE.recordings))
+
+
+def steady(value: float, axis: slice = slice(None)) -> Dataset:
+    def change(r: Recording) -> Recording:
+        values = r.values.copy()
+        values[:, axis] = value
+        return replace(r, values=values)
+
+    return each(change)
+
+
+def stretch(first: float, last: float, every: int = 1) -> Dataset:
+    """The samples between two instants, in beats."""
+
+    def change(r: Recording) -> Recording:
+        beats = r.times * r.condition.flap_frequency
+        kept = np.flatnonzero((beats >= first - 1e-9) & (beats < last - 1e-9))[::every]
+        return replace(r, times=r.times[kept], values=r.values[kept])
+
+    return each(change)
+
+
+def broken(every: int, axis: slice = slice(None)) -> Dataset:
+    def change(r: Recording) -> Recording:
+        values = r.values.copy()
+        values[every - 1 :: every, axis] = np.nan
+        return replace(r, values=values, low_pass=LowPass(40.0))
+
+    return each(change)
+
+
+def only(axis: Literal["x", "z"]) -> Dataset:
+    return each(lambda r: replace(r, forces=(axis,), values=r.values[:, ["xz".index(axis)]]))
+
+
+X, Z = slice(0, 1), slice(1, 2)
+RAW = replace(LOCAL, low_pass=0.0)
+BOTH = replace(LOCAL, axes=("x", "z"))
+NO_BEAT = "holds no whole beat without a gap"
+
+
+@pytest.mark.parametrize(
+    ("dataset", "spec", "refused"),
+    [
+        pytest.param(steady(0.0, Z), LOCAL, None, id="no z"),
+        pytest.param(steady(0.05, Z), BOTH, None, id="constant z, fitted"),
+        pytest.param(steady(0.05, Z), JOINT, None, id="constant z, joint"),
+        pytest.param(steady(0.0, X), LOCAL, None, id="no x"),
+        pytest.param(steady(0.0), BOTH, None, id="nothing"),
+        pytest.param(steady(0.03), LOCAL, None, id="constant"),
+        pytest.param(stretch(0, 1), LOCAL, None, id="one beat"),
+        pytest.param(stretch(0, 1), RAW, None, id="one beat, raw"),
+        pytest.param(stretch(0.5, 5), LOCAL, None, id="from the middle of a beat"),
+        pytest.param(stretch(0.5, 1.7), LOCAL, NO_BEAT, id="parts of beats"),
+        pytest.param(stretch(0, 5, every=13), RAW, None, id="four samples a beat"),
+        pytest.param(stretch(0, 5, every=80), RAW, None, id="less than one sample a beat"),
+        pytest.param(broken(120), LOCAL, None, id="some gaps"),
+        pytest.param(broken(7), LOCAL, NO_BEAT, id="gaps in every beat"),
+        pytest.param(broken(7, Z), LOCAL, NO_BEAT, id="gaps in z"),
+        pytest.param(broken(7), replace(LOCAL, recordings=("test-4",)), NO_BEAT, id="gaps in what is not fitted"),
+        pytest.param(replace(broken(7), held_out=("test-4",)), LOCAL, NO_BEAT, id="gaps in what is held out"),
+        pytest.param(only("x"), LOCAL, None, id="x only"),
+        pytest.param(only("z"), replace(LOCAL, axes=("z",)), None, id="z only"),
+        pytest.param(only("z"), LOCAL, "force axis 'x' is to be fitted", id="z only, x fitted"),
+        pytest.param(replace(BASE, recordings=BASE.recordings[:1]), LOCAL, None, id="one recording"),
+        pytest.param(
+            replace(BASE, recordings=(*BASE.recordings, *(replace(r, name=f"{r.name}b") for r in BASE.recordings))),
+            LOCAL,
+            None,
+            id="every condition twice",
+        ),
+        pytest.param(replace(steady(0.0, Z), held_out=("test-7",)), LOCAL, None, id="no z in what is held out"),
+    ],
+)
+def test_whatever_is_accepted_can_be_judged(dataset: Dataset, spec: CalibrationSpec, refused: str | None) -> None:
+    if refused is not None:
+        with pytest.raises(ValueError, match=refused):
+            plan(spec, dataset)
+        return
+    _, result = run(spec, dataset)
+    assert {a.recording for a in result.agreements} == {r.name for r in dataset.recordings}
+    assert np.isfinite([a.rmse for a in (*result.agreements, *result.left_out)]).all()
+    assert np.isfinite([result.before, result.after]).all()
+    name = dataset.recordings[0].name
+    shown = compare_forces(spec, dataset, name, "nominal", {})
+    assert all(np.isfinite(series).all() for series in shown.modelled.values())
+    assert len(shown.frequency) > 1
 
 
 def test_comparison_filters_both_alike(dataset: Dataset) -> None:

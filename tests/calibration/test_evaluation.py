@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calibration.cutting import pieces
 from calibration.evaluation import agreements, comparison, lacking, located, quantities, spectrum, whole_beats
 from calibration.likelihood import estimate
 from calibration.problem import Problem, base_genome
@@ -68,19 +69,40 @@ def test_beats_with_gaps_are_left_out() -> None:
     assert np.isfinite([a.rmse for a in agreements(recording(broken), waves().values, "local")]).all()
 
 
-def test_ends_of_a_filtered_recording_do_not_count() -> None:
-    raw = waves(noise=0.05)
-    low = low_passed(raw, LowPass(40.0))
+def test_ends_that_a_filter_spoils_do_not_count_and_those_uploaded_filtered_do() -> None:
+    low = low_passed(waves(noise=0.05), LowPass(40.0))
     assert len(whole_beats(low).samples["x"]) == 8
-    spoilt = low.values.copy()
-    spoilt[:60] += 1.0
-    assert whole_beats(replace(low, values=spoilt)).mean["x"][:150] == pytest.approx(whole_beats(low).mean["x"][:150])
+    uploaded = replace(waves(), low_pass=LowPass(40.0))
+    assert len(whole_beats(uploaded).samples["x"]) == 10
     assert len(whole_beats(low_passed(waves(beats=2), LowPass(40.0))).samples["x"]) == 2  # there are no others
 
 
 def test_recording_without_a_whole_beat_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"no whole beat.*a beat 0\.08 s.*at least one beat"):
+    with pytest.raises(
+        ValueError, match=r"no whole beat.*no beat of 0\.08 s begins and ends in its 0\.04 s.*at least one"
+    ):
         whole_beats(recording(np.zeros((40, 2))))
+    with pytest.raises(ValueError, match="no beat"):
+        whole_beats(recording(np.zeros((110, 2)), start=0.04))  # 1.4 beats, from the middle of one
+    broken = waves().values.copy()
+    broken[::70, 1] = np.nan
+    with pytest.raises(ValueError, match=r"each of its 10 whole beats lacks samples; fill the gaps"):
+        whole_beats(recording(broken))
+
+
+@pytest.mark.parametrize("level", [0.0, 0.05, -3e-7])
+def test_a_constant_force_has_neither_percentage_nor_correlation(level: float) -> None:
+    values = waves().values.copy()
+    values[:, 1] = level
+    for steady in (recording(values), low_passed(recording(values), LowPass(40.0))):
+        found = {a.quantity: a for a in agreements(steady, waves().values, "local")}
+        assert np.isnan([found["z"].rmse_percent, found["z"].correlation]).all()
+        assert np.isfinite([found[name].rmse_percent for name in ("x", "lift", "drag")]).all()
+        assert found["x"].correlation > 0.99
+        assert found["z"].mean_recorded == pytest.approx(level, abs=1e-12)
+    (_, _, _, z) = agreements(waves(), values, "local")
+    assert np.isnan(z.correlation)
+    assert z.rmse_percent > 10
 
 
 def test_agreement_in_numbers() -> None:
@@ -115,6 +137,34 @@ def test_spectrum_of_a_harmonic_is_one_line() -> None:
     assert frequency[density["z"].argmax()] == pytest.approx(2 * F)
     assert density["z"].max() * frequency[1] == pytest.approx(0.03**2 / 2, rel=1e-9)
     assert np.sort(density["z"])[-2] < 1e-9 * density["z"].max()
+
+
+@pytest.mark.parametrize("start", [0.0, 0.03, 0.04, 0.079])
+def test_spectrum_does_not_depend_on_where_the_recording_starts(start: float) -> None:
+    low = low_passed(waves(beats=8, start=start), LowPass(60.0))
+    frequency, density = spectrum(low, low.values)
+    assert frequency[density["x"].argmax()] == pytest.approx(F)
+    assert density["x"].max() * frequency[1] == pytest.approx(0.1**2 / 2, rel=1e-3)
+
+
+def test_spectrum_lies_between_the_gaps() -> None:
+    broken = waves(beats=12).values.copy()
+    broken[[330, 400]] = np.nan  # leaves 4.1, 0.9 and 7 beats
+    frequency, density = spectrum(recording(broken), broken)
+    assert frequency[1] == pytest.approx(F / 4)
+    assert density["z"].max() * frequency[1] == pytest.approx(0.03**2 / 2, rel=1e-9)
+    broken[::200] = np.nan  # now none of four beats
+    frequency, density = spectrum(recording(broken), broken)
+    assert frequency[1] == pytest.approx(F / 2)
+    assert density["z"].max() * frequency[1] == pytest.approx(0.03**2 / 2, rel=1e-9)
+
+
+def test_a_beat_need_not_be_a_whole_number_of_samples() -> None:
+    t = np.arange(94) / 1174.8  # 93.98 a beat
+    one = replace(recording(np.cos(2 * np.pi * F * t)[:, None]), times=t)
+    assert len(spectrum(one, one.values)[0]) == 48
+    short = replace(one, times=t[:93] + 0.08 - t[92] - 1e-5, values=one.values[:93])
+    assert len(pieces(short, 4)[0]) == 93
 
 
 def test_pieces_with_gaps_give_no_spectrum() -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -105,6 +106,25 @@ def test_extrapolation_is_said(frequency: float, pitch: float, word: str | None)
     if word is not None:
         with pytest.raises(ValueError, match=word):
             raise ValueError(remarks[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"airspeed": 30.0}, "airspeed 30 m/s is outside [0.3, 2] m/s"),
+        ({"airspeed": 0.0}, "airspeed 0 m/s is outside [0.3, 2] m/s"),
+        ({"airspeed": 2.0}, None),
+        ({"pressure": 70_000.0}, "air density 0.8319 kg/m^3 is outside [1.204, 1.204] kg/m^3"),
+        ({"temperature": 253.15}, "air density 1.394 kg/m^3 is outside"),
+        ({"pressure": 99_000.0, "temperature": 298.15}, None),  # weather
+    ],
+)
+def test_air_unlike_that_of_the_fit_is_said(change: dict[str, float], word: str | None) -> None:
+    model = fit_global(exact(), CONDITIONS)
+    assert model.airspeed_range == (0.3, 2.0)
+    remarks = at(model, replace(condition(12.5, 59.0), **change)).remarks
+    assert len(remarks) == (word is not None)
+    assert all(word is not None and remark.startswith(word) for remark in remarks)
 
 
 def test_fitted_conditions_are_no_extrapolation() -> None:

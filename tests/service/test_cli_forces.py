@@ -50,7 +50,18 @@ def run_id(client: Client, dataset_id: str) -> str:
 
 def test_submit_with_every_option(wingfit: Wingfit, client: Client, dataset_id: str) -> None:
     words = ["--method", "cma_es", "--mode", "joint", "--finish", "--preset", "berman_wang", "--without", "inertial"]
-    words += ["--axis", "x", "--axis", "z", "--low-pass-hz", "0", "--peel-width", "0.02", "--max-generations", "3"]
+    words += [
+        "--axis",
+        "x",
+        "--axis",
+        "z",
+        "--low-pass-hz",
+        "0",
+        "--peel-width-beats",
+        "0.02",
+        "--max-generations",
+        "3",
+    ]
     code, out, err = wingfit("runs", "submit", dataset_id, *words, "--population", "4", "--watch", "--json")
     assert code == 0, err
     assert " mN" in err
@@ -149,7 +160,7 @@ def test_simulate_a_vehicle(wingfit: Wingfit, client: Client, dataset_id: str, t
     true = client.simulate_forces(dataset_id, "test-4", genome=json.loads(truth.read_text()))
     assert [float(row["modelled_x_n"]) for row in csv.DictReader(beat.open())] == true["modelled_n"]["x"]
     words = ["simulate", "--dataset", dataset_id, "--recording", "test-4", "--genome", "C_l=1.24", "--json"]
-    words += ["--low-pass-hz", "60", "--without", "clap_and_peel", "--peel-width", "0.01"]
+    words += ["--low-pass-hz", "60", "--without", "clap_and_peel", "--peel-width-beats", "0.01"]
     bare = json.loads(wingfit(*words)[1])
     assert bare == client.simulate_forces(
         dataset_id, "test-4", genome={"C_l": 1.24}, without=["clap_and_peel"], low_pass_hz=60.0, peel_width_beats=0.01

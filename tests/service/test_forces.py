@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from records import LowPass, Recording
 from service.app import create_app
 from service.force_schemas import (
     ForceResultOut,
@@ -139,6 +141,7 @@ def test_the_global_model_is_in_hertz_and_degrees(result: Json) -> None:
     assert law["recordings"] == list(force_data.FITTED)
     assert law["frequency_range_hz"] == [10.3, 13.3]
     assert law["pitch_range_deg"] == pytest.approx([31.0, 71.0])
+    assert law["airspeed_range_m_s"] == [0.55, 2.0]
     genes = {gene["name"]: gene for gene in law["genes"]}
     assert set(genes) == {"C_l", "C_r", "C_F"}
     assert (genes["C_r"]["per_hz"], genes["C_r"]["per_deg"]) == (0.0, 0.0)
@@ -246,6 +249,10 @@ def test_a_prediction_far_away_warns_and_without_a_law_is_refused(api: Api, loca
     found = api.client.post(path, json=body | {"airspeed_m_s": 0.3})
     assert found.status_code == 200, found.text
     assert "is outside [10.3, 13.3] Hz" in found.json()["warnings"][0]
+    windy = api.client.post(path, json={"flap_frequency_hz": 12.5, "body_pitch_deg": 70.0, "airspeed_m_s": 30.0})
+    assert windy.json()["warnings"] == [
+        "airspeed 30 m/s is outside [0.55, 2] m/s, where the coefficients were fitted: an extrapolation"
+    ]
     beyond = api.client.post(path, json={"flap_frequency_hz": 50.0, "body_pitch_deg": 0.0, "airspeed_m_s": 0.0}).json()
     assert any("too far from those fitted to be believed" in warning for warning in beyond["warnings"])
     assert all(0 <= value <= 8 for value in beyond["coefficients"].values())
@@ -279,6 +286,36 @@ def test_too_few_conditions_give_no_global_model_and_say_why(api: Api) -> None:
     assert answer.status_code == 409
     assert "at least 4 conditions, got 2" in answer.json()["detail"]
     assert api.get(f"/v1/runs/{run['id']}/forces?recording={force_data.HELD_OUT}")["source"] == "average"
+
+
+def test_a_force_that_is_constant_has_no_percentage(api: Api) -> None:
+    def without_z(recording: Recording) -> Recording:
+        return replace(recording, values=recording.values * [1.0, 0.0])
+
+    given = force_data.dataset()
+    flat = replace(given, recordings=tuple(without_z(r) for r in given.recordings))
+    run = finished(api, upload(api, force_data.zipped(flat)))
+    found = ForceResultOut.model_validate(api.get(f"/v1/runs/{run['id']}/result"))
+    for a in (*found.agreements, *found.left_out):
+        assert ((a.rmse_percent, a.correlation) == (None, None)) is (a.quantity == "z")
+        assert a.rmse_n is not None
+    shown = ForcesOut.model_validate(api.get(f"/v1/runs/{run['id']}/forces"))
+    assert set(shown.recorded_n["z"]) == {0.0}
+
+
+def test_a_recording_without_a_whole_beat_is_refused_when_it_is_submitted(api: Api) -> None:
+    def broken(recording: Recording) -> Recording:
+        values = recording.values.copy()
+        values[20::60] = np.nan
+        return replace(recording, values=values, low_pass=LowPass(40.0))
+
+    given = force_data.dataset()
+    recordings = tuple(broken(r) if r.name == force_data.HELD_OUT else r for r in given.recordings)
+    dataset = upload(api, force_data.zipped(replace(given, recordings=recordings)))
+    answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]})
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert "recording 'test-7' holds no whole beat without a gap: each of its 4 whole beats" in error["message"]
 
 
 def test_a_simulation_of_a_genome_of_ones_own(api: Api, dataset: Json) -> None:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import httpx
 import pytest
 from pydantic import BaseModel
 
+from calibration.spec import CalibrationSpec, resolved
+from records import Dataset
 from service import force_schemas, schemas, spec_schemas
+from sim.balance import delfly
+from sim.rig import robird_wing
 
 DOCS = Path(__file__).parents[2] / "docs" / "api.md"
 Specification = dict[str, Any]
@@ -100,3 +104,25 @@ def test_the_schema_of_datasets_is_published(client: httpx.Client) -> None:
     assert schema["$schema"].startswith("https://json-schema.org/")
     kinds = [schema["$defs"][part["$ref"].rpartition("/")[2]]["properties"] for part in schema["anyOf"]]
     assert ["wing" in kinds[0], "vehicle" in kinds[1]] == [True, True]
+
+
+@pytest.mark.parametrize("which", ["wing", "vehicle"])
+def test_modes_and_methods_are_those_that_a_calibration_takes(which: str) -> None:
+    """The documented ones are accepted, the others refused, and the default is what is taken unasked."""
+    dataset = Dataset("d", robird_wing() if which == "wing" else delfly(), ())
+    rows = dict(re.findall(r"^\| `(mode|method)` \| (.*) \|$", DOCS.read_text(), re.MULTILINE))
+    (of_this,) = re.findall(rf"of a {which} ([^;]*)", rows["mode"])
+    accepted = {mode for mode in get_args(spec_schemas.Mode) if _accepts(CalibrationSpec(mode=mode), dataset)}
+    assert set(re.findall(r"`(\w+)`", of_this)) == accepted
+    assert set(re.findall(r"`(\w+)`", rows["method"])) == set(get_args(spec_schemas.Method))
+    unasked = resolved(CalibrationSpec(), dataset)
+    assert f"`{unasked.mode}` (default)" in of_this
+    assert f"`{unasked.method}` (default of a {which})" in rows["method"]
+
+
+def _accepts(spec: CalibrationSpec, dataset: Dataset) -> bool:
+    try:
+        resolved(spec, dataset)
+    except ValueError:
+        return False
+    return True

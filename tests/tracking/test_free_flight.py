@@ -213,7 +213,7 @@ def test_the_recording_counts_from_the_start_of_a_beat() -> None:
         ({"cutoff": 95.0}, ("95 Hz", "90 Hz")),
         ({"markers": 2}, ("2 markers", "3 that do not")),
         ({"line": True}, ("one line",)),
-        ({"uneven": True}, ("even within 2 %", "empty cells")),
+        ({"uneven": True}, ("even within 1 %", "empty cells")),
     ],
 )
 def test_tracks_that_cannot_give_forces_are_refused(change: dict[str, Any], words: tuple[str, ...]) -> None:
