@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.delfly_tables import closest_law_percent, fling_ends, lift_by_root_pitch, tables_law
 from benchmarks.estimators import estimators
 from benchmarks.machine import commit, cpu
 from calibration.evaluation import agreements, lacking
@@ -193,15 +194,6 @@ def mean_lift(fitted: list[Fitted]) -> tuple[float, float]:
     return float(np.mean([a.correlation for a in lift])), float(np.mean([a.rmse_percent for a in lift]))
 
 
-def tables_law() -> GlobalModel:
-    """Eq. 23 by plain least squares on the source's own Table 8."""
-    local = [
-        LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(COEFFICIENTS, 0.0), (), (), 0.0, True, ())
-        for t in TRIALS
-    ]
-    return fit_global(local, [trial.condition for trial in TRIALS], weighted=False)
-
-
 def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
     """From the earliest beginning to the latest end; None where one of them is not located."""
     known = [one for one in ranges if one is not None]
@@ -256,6 +248,8 @@ def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
         "global_error_percent_by_coefficient": global_errors(law),
         "global_error_percent_plain": global_errors(plain),
         "global_error_percent_of_printed_table": global_errors(tables_law()),
+        "closest_affine_law_percent_of_printed_table": {name: closest_law_percent(name) for name in ("C_l", "C_F")},
+        "global_scatter": {gene.name: gene.scatter for gene in law.genes},
         "global_left_out_error_percent": {
             gene.name: None if gene.left_out_error is None else 100 * gene.left_out_error for gene in law.genes
         },
@@ -297,6 +291,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
             "standard_error_percent": {
                 n: 100 * e / abs(one.estimate.values[n]) for n, e in one.local.standard_errors.items()
             },
+            "largest_correlation": float(np.abs(one.estimate.correlation - np.eye(len(COEFFICIENTS))).max()),
             "lift_rmse_n": one.agreement["lift"].rmse,
             "lift_rmse_percent": one.agreement["lift"].rmse_percent,
             "lift_correlation": one.agreement["lift"].correlation,
@@ -327,6 +322,7 @@ def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]
     fitted, finer = fits(seed, models, evaluator)
     figures = agreement_figures(fitted, finer) | global_figures(fitted["proposed"])
     figures |= repeated_figures(models["proposed"], repetitions, seed, evaluator)
+    figures |= {"mean_lift_n_by_root_pitch": lift_by_root_pitch(), "fling_ends_tstar": fling_ends(models["proposed"])}
     figures |= {"ms_per_individual": milliseconds(models["proposed"]), "conditions": rows(fitted)}
     return figures | {"seed": seed, "seconds": time.perf_counter() - start, "cpu": cpu(), "commit": commit()}
 

@@ -31,7 +31,8 @@ def sampling_rate(recording: Recording) -> float:
     if worst > UNEVEN_STEPS * mean:
         raise ValueError(
             f"recording {recording.name!r} is not sampled evenly: steps differ by up to {worst * 1e3:.3g} ms from "
-            f"their mean of {mean * 1e3:.4g} ms (limit {100 * UNEVEN_STEPS:g} %); resample it, or calibrate without a low-pass"
+            f"their mean of {mean * 1e3:.4g} ms (limit {100 * UNEVEN_STEPS:g} %); resample it, or calibrate "
+            "without a low-pass"
         )
     return 1.0 / mean
 

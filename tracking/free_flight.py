@@ -170,8 +170,8 @@ def _even_step(times: Array) -> float:
     worst = float(np.max(np.abs(np.diff(times) - step)))
     if worst > UNEVEN_STEPS * step:
         raise ValueError(
-            f"steps differ by up to {worst:.3g} s from {step:.3g} s; frames must be even within {100 * UNEVEN_STEPS:g} %: "
-            "give every frame a row, with empty cells where a marker was not seen"
+            f"steps differ by up to {worst:.3g} s from {step:.3g} s; frames must be even within "
+            f"{100 * UNEVEN_STEPS:g} %: give every frame a row, with empty cells where a marker was not seen"
         )
     return float((times[-1] - times[0]) / (len(times) - 1))
 
