@@ -1,4 +1,4 @@
-"""What follows from the source's printed tables alone, without any recording (Armanini et al. 2016, Tables 3-5 and 8)."""
+"""What the printed tables say without any recording (Armanini et al. 2016, Tables 3-5 and 8)."""
 
 from __future__ import annotations
 
