@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from calibration.beats import FEWEST_MEAN, without_mean_beat
+from calibration.cutting import Cut
 from calibration.evaluation import POINTS, agreements, comparison, quantities
 from calibration.evaluator import Evaluator
 from calibration.force_result import (
@@ -25,7 +27,7 @@ from calibration.likelihood import STEP, at_bounds, iterate
 from calibration.linearised import free_genes
 from calibration.plan import Stage, plan, prepared
 from calibration.problem import Problem, base_genome, compared
-from calibration.result import GeneResult
+from calibration.result import ADEQUATE, GeneResult
 from calibration.search import found as found_by_stage
 from calibration.spec import CalibrationSpec, resolved, vehicle_model
 from calibration.uncertainty import Uncertainty, uncertainty
@@ -61,12 +63,16 @@ class _Judged:
 
 @dataclass(frozen=True)
 class _Compared:
-    """One recording beside models: agreements, and the RMS difference (N) of the fitted axes by source."""
+    """One recording beside models: agreements, and the RMS difference (N) of the fitted axes by source.
+
+    ``scatter`` is the RMS of what does not repeat from beat to beat in these axes, the noise; None with too few beats.
+    """
 
     recording: Recording
     agreements: tuple[Agreement, ...]
     rms: Mapping[Source, float]
     samples: int
+    scatter: float | None
 
 
 def summarise_forces(
@@ -91,21 +97,23 @@ def summarise_forces(
         genomes, warnings = _sources(spec, model, nominal, judged, law, recording)
         everywhere.append(_compare(model, prepared(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
+    lacking = [_lacking(one, everywhere) for one in judged]
+    remarks = (*remarks, *(remark for remark in lacking if remark), *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}
     left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]
     held_out = [one for one in everywhere if one.recording.name in dataset.held_out]
     return ForceResult(
-        genes=_genes(model, nominal, judged),
+        genes=_genes(model, nominal, judged, not any(lacking)),
         estimates=tuple(one.estimate for one in judged),
         global_model=law,
         agreements=tuple(agreement for one in everywhere for agreement in one.agreements),
         left_out=left_out,
         held_out=dataset.held_out,
-        before=_mean_rms(fitted, ("nominal",)),
-        after=_mean_rms(fitted, ("local", "joint")),
-        held_out_before=_mean_rms(held_out, ("nominal",)) if held_out else None,
-        held_out_after=_mean_rms(held_out, ("global", "joint", "average")) if held_out else None,
+        before=_rms(fitted, ("nominal",)) or np.nan,
+        after=_rms(fitted, ("local", "joint")) or np.nan,
+        held_out_before=_rms(held_out, ("nominal",)),
+        held_out_after=_rms(held_out, ("global", "joint", "average")),
         remarks=tuple(dict.fromkeys((*remarks, *warnings))),
     )
 
@@ -227,18 +235,50 @@ def _compare(
     model: BladeElementWing, recording: Recording, genomes: dict[Source, Genome], axes: tuple[str, ...]
 ) -> _Compared:
     forces = dict(zip(genomes, _observed(model, recording, list(genomes.values())), strict=True))
-    fitted = compared(recording, axes)
-    rms: dict[Source, float] = {
-        source: float(np.sqrt(np.mean((found - recording.values)[fitted] ** 2))) for source, found in forces.items()
-    }
+    fitted = np.zeros(recording.values.shape, bool)
+    if set(axes) <= set(recording.forces):  # one that is only predicted may have others
+        fitted = compared(recording, axes)
+    differences = {source: (found - recording.values)[fitted] for source, found in forces.items()}
+    rms: dict[Source, float] = {s: float(np.sqrt(np.mean(d**2))) for s, d in differences.items() if d.size}
     found = tuple(a for source, modelled in forces.items() for a in agreements(recording, modelled, source))
-    return _Compared(recording, found, rms, int(fitted.sum()))
+    return _Compared(recording, found, rms, int(fitted.sum()), _scatter(recording, fitted))
 
 
-def _mean_rms(some: list[_Compared], order: tuple[Source, ...]) -> float:
-    """Mean over recordings, weighted by samples, of the RMS difference of the first source in ``order`` they have."""
-    rms = [next((one.rms[source] for source in order if source in one.rms), np.nan) for one in some]
-    return float(np.average(rms, weights=[one.samples for one in some]))
+def _scatter(recording: Recording, fitted: npt.NDArray[np.bool_]) -> float | None:
+    beats = len(Cut.of(recording).gapless)
+    if beats < FEWEST_MEAN or not fitted.any():
+        return None
+    noise = without_mean_beat(recording, np.where(fitted, recording.values, 0.0), beats)
+    return float(np.sqrt(np.mean(noise[fitted] ** 2)))
+
+
+def _lacking(judged: _Judged, everywhere: list[_Compared]) -> str | None:
+    """A remark where an estimate leaves more than noise explains."""
+    mine = [c for c in everywhere if c.recording.name in judged.estimate.recordings and c.scatter is not None]
+    left = _rms(mine, ("local", "joint"))
+    if left is None:
+        return None
+    noise = np.sqrt(np.average([(c.scatter or 0.0) ** 2 for c in mine], weights=[c.samples for c in mine]))
+    if left <= ADEQUATE * noise:
+        return None
+    beside = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
+    return (
+        f"{judged.estimate.name}: the best coefficients leave {left * 1e3:.3g} mN, {beside}: the model or its motion "
+        f"lacks something, or the search was cut short. Standard errors count on at most {ADEQUATE:g} times the "
+        f"scatter, so no coefficient is called told"
+    )
+
+
+def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
+    """RMS difference over all samples of the recordings, each beside the first source in ``order`` that it has.
+
+    None where no recording has the fitted axes.
+    """
+    told = [one for one in some if one.samples]
+    if not told:
+        return None
+    squares = [next((one.rms[s] for s in order if s in one.rms), np.nan) ** 2 * one.samples for one in told]
+    return float(np.sqrt(np.sum(squares) / sum(one.samples for one in told)))
 
 
 def _left_out(
@@ -256,8 +296,8 @@ def _left_out(
     remarks: list[str] = []
     for one in estimates:
         law, said = _global(spec, dataset, [other for other in estimates if other is not one])
-        remarks += [f"with a recording left out: {remark}" for remark in said]
         if law is None:
+            remarks += [f"with a recording left out: {remark}" for remark in said]
             continue
         recording = prepared(spec, dataset.recording(one.recordings[0]))
         values, said = _by_law(model, law, recording.condition)
@@ -266,7 +306,17 @@ def _left_out(
     return tuple(found), tuple(remarks)
 
 
-def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged]) -> tuple[GeneResult, ...]:
+def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+    """Remarks on recordings to which the low-pass that was asked for was not applied."""
+    return tuple(
+        f"recording {recording.name!r} says that it has been low-passed at {recording.low_pass.cutoff:g} Hz; "
+        f"{spec.low_pass:g} Hz was not applied to it"
+        for recording in dataset.recordings
+        if spec.low_pass and recording.low_pass is not None and recording.low_pass.cutoff != spec.low_pass
+    )
+
+
+def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
     """Genes with the mean of the estimates, the largest of their relative errors, and whether all can tell them."""
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
@@ -284,7 +334,7 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged]) -> t
                 gene.upper,
                 bool(standings),
                 max(s.standard_error for s in standings) if standings else None,
-                all(s.identifiable for s in standings) and all(free) if standings else None,
+                adequate and all(s.identifiable for s in standings) and all(free) if standings else None,
             )
         )
     return tuple(results)

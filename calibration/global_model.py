@@ -69,7 +69,7 @@ def fit_global(
         genes=tuple(_gene(name, estimates, whole if name in affine else whole[:, :1], weighted) for name in names),
         recordings=tuple(name for estimate in estimates for name in estimate.recordings),
         conditions=tuple(conditions),
-        remarks=_few(len(estimates)),
+        remarks=(*_few(len(estimates)), *_untold(names, estimates)),
     )
 
 
@@ -111,6 +111,15 @@ def _few(conditions: int) -> tuple[str, ...]:
     return (
         f"{conditions} conditions: the law's own scatter cannot be told, so every condition counts the same; "
         f"from {3 + FREE_FOR_SCATTER} on they are weighted by their standard errors",
+    )
+
+
+def _untold(names: Sequence[str], estimates: Sequence[LocalEstimate]) -> tuple[str, ...]:
+    """Remarks on coefficients that no condition tells even by their size."""
+    return tuple(
+        f"{name} is told under none of the conditions: its law says nothing"
+        for name in names
+        if all(e.standard_errors[name] >= abs(e.values[name]) for e in estimates)
     )
 
 

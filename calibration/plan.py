@@ -42,7 +42,7 @@ def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
             raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
     _refuse_repeated("recording", spec.recordings)
     for recording in dataset.recordings:  # all of them are judged in the end
-        _refuse_unusable(spec, dataset, recording)
+        _refuse_unusable(spec, dataset, recording, recording in recordings)
     wanted = spec.genes or model.searched
     free = tuple(name for name in known if name in wanted and name not in spec.fixed)
     if not free:
@@ -90,9 +90,9 @@ def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
             raise ValueError(f"{what} {name!r} is named {names.count(name)} times; name it once")
 
 
-def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recording) -> None:
+def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recording, fitted: bool) -> None:
     if dataset.kind == "forces":
-        if not compared(recording, spec.axes).any():
+        if fitted and not compared(recording, spec.axes).any():
             raise ValueError(
                 f"recording {recording.name!r} has no instant with all of the fitted force axes "
                 f"({', '.join(spec.axes)}); there is nothing to compare: leave the recording out of the dataset"

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Genome, Recording
+from records.dataset import Kind
 from sim.model import Model
 
 Array = npt.NDArray[np.float64]
@@ -63,6 +64,7 @@ class Misfit:
         reasons: per individual, why it failed, else None.
         residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless asked
             for.
+        kind: whether of tracks or of forces.
     """
 
     squares: Array
@@ -70,6 +72,7 @@ class Misfit:
     samples: int
     reasons: tuple[str | None, ...]
     residuals: Array | None = None
+    kind: Kind = "tracks"
 
 
 def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals: bool = False) -> Misfit:
@@ -92,7 +95,7 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
     squares = np.where(failed, np.inf, kept.sum(axis=1))
     mean = np.sqrt(kept.mean(axis=1)) if record.kind == "forces" else np.sqrt(kept).mean(axis=1)
     distance = np.where(failed, np.inf, mean)
-    return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None)
+    return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None, record.kind)
 
 
 def compared(recording: Recording, axes: tuple[str, ...] = ()) -> npt.NDArray[np.bool_]:
@@ -125,11 +128,12 @@ class Evaluation:
 
     @property
     def distance(self) -> Array:
-        """[B] mean of the recordings' distances, m or N, weighted by their samples."""
+        """[B] over all recordings: mean distance per marker and frame, m; of forces the RMS difference, N."""
         total = np.zeros_like(self.per_recording[0].distance)
         for part in self.per_recording:
-            total = total + part.distance * part.samples
-        return np.asarray(total / sum(part.samples for part in self.per_recording))
+            total = total + (part.squares if part.kind == "forces" else part.distance * part.samples)
+        mean = total / sum(part.samples for part in self.per_recording)
+        return np.asarray(np.sqrt(mean) if self.per_recording[0].kind == "forces" else mean)
 
     @property
     def reasons(self) -> tuple[str | None, ...]:
@@ -147,6 +151,7 @@ def concatenate(parts: Sequence[Misfit]) -> Misfit:
         parts[0].samples,
         tuple(reason for part in parts for reason in part.reasons),
         np.concatenate(residuals) if residuals else None,
+        parts[0].kind,
     )
 
 

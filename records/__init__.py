@@ -8,7 +8,7 @@ of a vehicle: x forward to the nose, z down.
 from records.dataset import Condition, Dataset, LowPass, Recording
 from records.drive import Drive, FourBarDrive, FourierDrive
 from records.errors import DatasetError, Fault
-from records.genes import Gene, Genome
+from records.genes import EstimateError, Gene, Genome
 from records.storage import load_archive, load_dataset, save_dataset
 from records.vehicle import (
     ChordStation,
@@ -29,6 +29,7 @@ __all__ = [
     "Dataset",
     "DatasetError",
     "Drive",
+    "EstimateError",
     "Fault",
     "Flap",
     "FourBarDrive",

@@ -13,6 +13,10 @@ import numpy.typing as npt
 Scale = Literal["log", "linear"]
 
 
+class EstimateError(ValueError):
+    """An estimate of the dataset that the model cannot take: for a gene it lacks, or outside the gene's bounds."""
+
+
 @dataclass(frozen=True)
 class Gene:
     """One parameter that a calibration may search.

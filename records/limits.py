@@ -54,11 +54,14 @@ IMPLAUSIBLE_SPANS = 1.5
 MAX_OPEN_AT_START = 0.1
 """How far wings that clap may be open where the beat starts, as a part of the range of their flap angle."""
 
-IMPLAUSIBLE_WEIGHTS = 50
-"""Forces above this many weights of the vehicle (root mean square) were not recorded in newtons."""
+IMPLAUSIBLE_WEIGHTS = 5
+"""Forces along an axis above this many weights of the vehicle (root mean square) were not recorded in newtons."""
 
 NEGLIGIBLE_WEIGHTS = 1e-6
 """Nor those below this."""
+
+MIN_SAMPLES_PER_BEAT = 4
+"""Forces sampled more slowly than this show no beat: the times are in another unit, or the flap frequency is wrong."""
 
 UNEVEN_STEPS = 0.01
 """How far the time steps of forces may differ from their median, relative: a filter needs an even clock."""

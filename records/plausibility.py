@@ -15,6 +15,7 @@ from records.limits import (
     MAX_MARKERS,
     MAX_ROWS,
     MIN_FRAMES,
+    MIN_SAMPLES_PER_BEAT,
     NEGLIGIBLE_WEIGHTS,
     UNEVEN_STEPS,
 )
@@ -91,25 +92,40 @@ def _check_positions(values: Array, wing: Wing, where: str, faults: Faults) -> N
 
 
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
-    """Forces in flight are about a weight; typical ones far from it are in another unit."""
-    along_axes = [axis[np.isfinite(axis)] for axis in recording.values.T]
-    for name, axis in zip(recording.forces, along_axes, strict=True):
-        if not axis.size:
+    """Forces in flight are about a weight; typical ones far from it are in another unit. One axis may be zero."""
+    sizes = {}
+    for name, axis in zip(recording.forces, recording.values.T, strict=True):
+        found = axis[np.isfinite(axis)]
+        if not found.size:
             faults.add(where, None, f"force_{name}_n has no value at all; remove the column")
+            continue
+        with np.errstate(over="ignore"):
+            sizes[f"force_{name}_n"] = float(np.sqrt(np.mean(found**2)))
+    if not any(sizes.values()):
+        which = " and ".join(sizes)
+        message = f"{which} {'are' if len(sizes) > 1 else 'is'} zero throughout; check the channel, or leave the recording out"
+        faults.add(where, 0.0, message)
+        return
     mass = vehicle.mass if recording.mass is None else recording.mass
     weight = mass * STANDARD_GRAVITY
-    with np.errstate(over="ignore"):
-        force = max(float(np.sqrt(np.mean(axis**2))) for axis in along_axes if axis.size)
+    name, force = max(sizes.items(), key=lambda item: item[1])
     low, high = NEGLIGIBLE_WEIGHTS * weight, IMPLAUSIBLE_WEIGHTS * weight
-    if low <= force <= high:
-        return
-    unit = "kilonewtons" if force < low else "millinewtons" if force > 4 * high else "gram-force or millinewtons"
-    message = (
-        f"forces are typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; they must "
-        f"lie in [{low:.4g}, {high:.4g}] N; that looks like {unit} in columns named _n: convert to newtons, or "
-        "check mass_kg"
-    )
-    faults.add(where, f"{force:.4g}", message)
+    if not low <= force <= high:
+        message = (
+            f"{name} is typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; it must "
+            f"lie in [{low:.4g}, {high:.4g}] N; that looks like {_unit(force / weight)} in columns named _n: "
+            "convert to newtons, or check mass_kg"
+        )
+        faults.add(where, f"{force:.4g}", message)
+
+
+def _unit(weights: float) -> str:
+    """The unit in which a force of so many weights would be nearest to one weight."""
+    if weights < 1:
+        return "a much larger unit"
+    gram_force, millinewtons = 1000 / STANDARD_GRAVITY, 1000.0  # in a newton
+    halfway = np.sqrt(gram_force * millinewtons)
+    return "gram-force (1 gf = 0.00980665 N)" if weights < halfway else "millinewtons (1 mN = 0.001 N)"
 
 
 def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -> None:
@@ -132,6 +148,19 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
             "one whole beat is needed (two or more are better): record longer, or check flap_frequency_hz and time_s"
         )
         faults.add(where, None, message)
+    if step * frequency * MIN_SAMPLES_PER_BEAT > 1.0 + UNEVEN_STEPS:
+        message = (
+            f"the sampling rate is {1 / step:.4g} Hz, {1 / (step * frequency):.3g} samples in a beat of "
+            f"{1 / frequency:.4g} s; at least {MIN_SAMPLES_PER_BEAT} are needed: give time_s in seconds, not "
+            "milliseconds, check flap_frequency_hz, or record faster"
+        )
+        faults.add(where, f"{1 / step:.4g}", message)
+    if low_pass is not None and low_pass.cutoff < frequency:
+        message = (
+            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz, below the flap frequency, {frequency:g} Hz: of such values "
+            "no beat is left; check both, give values less filtered, or leave low_pass out if they are not filtered"
+        )
+        faults.add(where, low_pass.cutoff, message)
     if low_pass is not None and low_pass.cutoff >= 0.5 / step:
         message = (
             f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "

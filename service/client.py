@@ -117,7 +117,7 @@ class Client(Transport):
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, name;
         of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
-        peel_width_beats. What is left out takes the server's default (the settings of the seeds).
+        peel_width_beats. What is left out takes the server's default.
         """
         body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))

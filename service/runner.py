@@ -192,7 +192,7 @@ class Runner:
             return
         LOG.error("run %s failed", run_id, exc_info=error)
         try:
-            self._advance(run_id, jobs.Fail(message(error)))
+            self._advance(run_id, jobs.Fail(_failure(error)))
         except Exception as late:
             # A full disk, say: the run stays as stored and goes on at the next start of the service.
             LOG.error("run %s: failure not stored (%s)", run_id, late)
@@ -200,9 +200,20 @@ class Runner:
 
 def message(error: Exception) -> str:
     """``error`` for the user: what the domain says as it stands, a surprise with its kind; no stack trace."""
-    told = isinstance(error, ValueError) and str(error)
-    text = with_remedy(str(error)) if told else f"{type(error).__name__}: {error}"
+    text = with_remedy(str(error)) if _told(error) else f"{type(error).__name__}: {error}"
     return text[:LONGEST_ERROR]
+
+
+def _told(error: Exception) -> bool:
+    """Whether ``error`` is the domain's own word to the user."""
+    return isinstance(error, ValueError) and bool(str(error))
+
+
+def _failure(error: Exception) -> str:
+    """Why a run failed; a surprise is the server's fault, and said to be."""
+    if _told(error):
+        return message(error)
+    return f"the server made a mistake ({message(error)}); the run's data are kept; please report it"
 
 
 def lower_priority() -> None:

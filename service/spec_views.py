@@ -11,13 +11,15 @@ from pydantic import BaseModel
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service.problems import ErrorItem, error_item, invalid
+from service.spec_parts import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
 from service.spec_schemas import RunIn, SpecOut, VehicleModel
 from service.units import MM, tidy_mm
 
 # A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
 WIDEST_BOUNDS = 100.0
-WING_ONLY = ("division", "bounds_factor", "accuracy_mm", "outputs")
-VEHICLE_ONLY = ("preset", "without", "axes", "low_pass_hz", "peel_width_beats")
+METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
+USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
+LONGEST_NAME = 200
 
 
 def spec_out(given: CalibrationSpec) -> SpecOut:
@@ -70,14 +72,39 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
     """A 422 for settings of a wing in a request about a vehicle, or the reverse; defaults do no harm."""
     what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
-    faults: list[ErrorItem] = []
-    for name in names:
-        field = type(body).model_fields.get(name)
-        if field is not None and getattr(body, name) != field.default:
-            message = f"means nothing for a {what}, which the dataset describes; leave it out"
-            faults.append(error_item(f"body.{name}", getattr(body, name), message))
-    if faults:
+    message = f"means nothing for a {what}, which the dataset describes; leave it out"
+    if faults := _given(body, names, message):
         raise invalid(f"the request has settings that a {what} does not have", faults)
+
+
+def refuse_idle(body: RunIn, method: str | None) -> None:
+    """A 422 for settings of a search in a request for Gauss-Newton alone; defaults do no harm."""
+    if method != "gauss_newton":
+        return
+    message = (
+        "means nothing for the method gauss_newton, which searches nothing; leave it out, or use genetic or cma_es"
+    )
+    if faults := _given(body, SEARCH_ONLY, message):
+        raise invalid("the request has settings of a search, and asks for none", faults)
+
+
+def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+    """A name for a run that was given none: what tells it from the other runs on its dataset."""
+    model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
+    if spec.without:
+        model += f" without {', '.join(spec.without)}"
+    unusual = spec.method not in (None, USUAL[dataset.kind])
+    method = METHODS.get(spec.method or "", spec.method) if unusual else None
+    if spec.finish:
+        method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
+    return ", ".join(part for part in (dataset.name, model, spec.mode, method) if part)[:LONGEST_NAME]
+
+
+def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorItem]:
+    """Faults for those settings of ``names`` that differ from their defaults."""
+    fields = type(body).model_fields
+    given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
+    return [error_item(f"body.{name}", getattr(body, name), message) for name in given]
 
 
 def _vehicle(body: VehicleModel) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Gene, Recording, Vehicle, WingMotion
+from records import Condition, EstimateError, Gene, Recording, Vehicle, WingMotion
 from sim.atmosphere import density
 from sim.blades.elements import (
     COSINE,
@@ -83,15 +83,12 @@ class BladeElementWing:
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Coefficients of the terms, then parameters of the wings' motion."""
+        """Coefficients of the terms, then parameters of the wings' motion; EstimateError for an estimate of no use."""
         coefficients = [gene for name in TERMS for gene in TERMS[name].genes if name in self.terms]
         if not self.vehicle.claps:
             coefficients = [gene for gene in coefficients if gene.name != "C_F"]
         genes = (*coefficients, *motion_genes(self.vehicle.motion))
-        known = {gene.name for gene in genes} | {gene.name for term in TERMS.values() for gene in term.genes}
-        for name in self.vehicle.estimates:
-            if name not in known:
-                raise ValueError(f"estimate for unknown gene {name!r}; vehicles have {', '.join(sorted(known))}")
+        _check_estimates(self.vehicle, genes)
         return tuple(replace(gene, nominal=self.vehicle.estimates.get(gene.name, gene.nominal)) for gene in genes)
 
     @cached_property
@@ -280,6 +277,21 @@ _ROWS = {
 }
 # Where the elements put it: peel decides at which instants the circulation of a pitching wing counts as which.
 _PLACES = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
+
+
+def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
+    """Refuse estimates that no model of ``vehicle`` takes; those for terms that are off must be good as well."""
+    known = {gene.name: gene for term in TERMS.values() for gene in term.genes} | {gene.name: gene for gene in genes}
+    remedy = "change vehicle.estimates in dataset.yaml"
+    for name, value in vehicle.estimates.items():
+        if name not in known:
+            raise EstimateError(
+                f"estimate for unknown gene {name!r}; vehicles have {', '.join(sorted(known))}: {remedy}"
+            )
+        try:
+            known[name].check(value)
+        except ValueError as error:
+            raise EstimateError(f"estimate of {error}: {remedy}") from None
 
 
 def _sum(weights: Array, rows: Array) -> Array:

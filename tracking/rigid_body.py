@@ -75,6 +75,18 @@ def poses(tracks: Array, shape: Array) -> Poses:
     return Poses(found.rotation, found.position, found.seen, found.residuals, found.shape, rejected)
 
 
+def scale(tracks: Array, shape: Array) -> float:
+    """How many times further apart the markers are seen than ``shape`` says; the median, so that swaps do no harm.
+
+    NaN where no two markers are seen together.
+    """
+    first, second = np.triu_indices(len(shape), 1)
+    told = np.linalg.norm(shape[first] - shape[second], axis=-1)
+    apart = told > 0
+    seen = np.linalg.norm(tracks[:, first[apart]] - tracks[:, second[apart]], axis=-1) / told[apart]
+    return float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else float("nan")
+
+
 def _refined(tracks: Array, shape: Array, seen: Mask) -> Poses:
     found = _fit(tracks, shape, seen)
     count = np.isfinite(found.residuals).sum(axis=0)

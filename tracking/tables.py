@@ -15,6 +15,7 @@ from records.errors import Faults, decode, fail, nearest, shown
 from records.limits import MAX_ROWS
 
 Array = npt.NDArray[np.float64]
+_NAMED = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,20 @@ class Table:
             message = f"row {row + 1} holds {times[row]:g}; times must be complete and increase: sort the rows"
             raise fail(f"{self.file}, column {name!r}", float(times[row]), message)
         return times
+
+
+def header_of(raw: bytes, file: str) -> list[str]:
+    """Names of the columns, before any number is looked at; empty of an empty file."""
+    rows = csv.reader(io.StringIO(decode(raw, file), newline=""))
+    return [name.strip() for name in next((row for row in rows if row), [])]
+
+
+def require(header: Sequence[str], names: Sequence[str], file: str) -> None:
+    """Raise DatasetError that names every one of ``names`` that ``header`` lacks."""
+    missing = [name for name in names if name not in header]
+    if missing:
+        which = ", no ".join(map(repr, missing[:_NAMED])) + (", ..." if len(missing) > _NAMED else "")
+        raise fail(f"{file}, line 1", missing[0], f"there is no column {which}; {nearest(missing[0], header)}")
 
 
 def read_table(raw: bytes, file: str, label: str | None = None) -> Table:

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize
+from scipy import optimize, stats
 
 from records import FourierFlap, FourierPitch, PassivePitch, WingMotion
 from tracking.noise import least_squares, products
@@ -22,6 +22,11 @@ from tracking.smoothing import PeriodicFit, basis, fit_periodic
 Array = npt.NDArray[np.float64]
 PitchKind = Literal["fourier", "passive"]
 _FEWEST_BEATS = 1.5
+_STILL = 1e-6
+"""Angles that range over less, rad, do not move."""
+_CHANCE = 0.01
+_LITTLE = 0.8
+"""A given frequency at which the series explains less of the variance than this is remarked on."""
 
 
 @dataclass(frozen=True)
@@ -144,11 +149,14 @@ def wing_motion(
     """
     if angles.pitch is None:
         raise ValueError("no wing pitch; give a column wing_pitch_deg, or markers along the chord")
+    _refuse_still(angles.flap)
     found = Frequency(frequency) if frequency else flap_frequency(angles.times, angles.flap)
     begin = start if start is not None else float(angles.times[0])
     flap = fit_periodic(angles.times, angles.flap, found.hertz, harmonics, begin)
     phase, error = closest(flap)
     remarks = [*angles.remarks, *(f"flap angle: {r}" for r in flap.remarks)]
+    if frequency:
+        remarks += _unexplained(angles, flap)
     if start is None:
         flap = flap.shifted(phase)
     elif min(phase, 1 - phase) > 0.01 + 3 * error:
@@ -178,8 +186,11 @@ def wing_motion(
 def flap_frequency(times: Array, flap: Array) -> Frequency:
     """Flap frequency from the flap angle [N]: strongest period, then least squares of a series over the frequency.
 
-    The standard error is that of the frequency fitted together with the series, under the noise found.
+    The standard error is that of the frequency fitted together with the series, under the noise found. ValueError where
+    such a period would be in noise by chance: the Wald statistic of the series under that noise, coloured as it is, for
+    as many trials as samples.
     """
+    _refuse_still(flap)
     seen = np.isfinite(flap)
     t, y = times[seen], flap[seen]
     if len(t) < 9:
@@ -208,7 +219,40 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
     B = basis(phase, orders)
     slope = np.sum(basis(phase, orders, 1) * np.linalg.solve(products(B, B), right(B)), axis=1)
     joint = least_squares(t, np.column_stack([B, slope * (t - middle)]), y)
+    moving, scatter = joint.coefficients[1:-1], joint.covariance[1:-1, 1:-1]
+    size = float(moving @ np.linalg.solve(scatter, moving)) / len(moving)
+    chance = len(t) * float(stats.f.sf(size, len(moving), max(len(t) - len(moving) - 2, 1)))
+    if chance > _CHANCE:
+        raise ValueError(
+            f"no flap frequency stands out: the strongest period, {hertz:.4g} Hz, is what noise of "
+            f"{np.degrees(joint.noise.deviation):.2g} deg shows by chance: give the frequency, or check the flap angle"
+        )
     return Frequency(hertz, float(np.sqrt(joint.covariance[-1, -1])))
+
+
+def _refuse_still(flap: Array) -> None:
+    seen = flap[np.isfinite(flap)]
+    if len(seen) and np.ptp(seen) < _STILL:
+        raise ValueError(
+            f"the flap angle is {np.degrees(seen[0]):.4g} deg throughout: there is no motion; check the column or markers"
+        )
+
+
+def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
+    """A remark where the series at the given frequency leaves much of the flap angle unexplained."""
+    seen = np.isfinite(angles.flap)
+    t, y = angles.times[seen], angles.flap[seen]
+    share = 1 - float(np.mean((y - flap.at((t - flap.start) * flap.frequency)) ** 2) / np.var(y))
+    if share > _LITTLE:
+        return []
+    try:
+        alone = f"by itself the flap angle shows {flap_frequency(angles.times, angles.flap).hertz:.5g} Hz"
+    except ValueError as error:
+        alone = f"by itself the flap angle shows none ({error})"
+    return [
+        f"at the flap frequency given, {flap.frequency:.5g} Hz, the motion explains {100 * max(share, 0):.0f} % of the flap "
+        f"angle's variance; {alone}"
+    ]
 
 
 def _strongest(times: Array, values: Array) -> float:

@@ -11,11 +11,12 @@ import typer
 
 from service import force_answers as f
 from service.client import DEFAULT_URL, Client, WingfitError
-from service.commands.loads import COLOURS, check_file
+from service.commands.force_plot import QUANTITIES, write_plot
+from service.commands.loads import check_file
 from service.commands.output import AsJson, Url, note, number, print_json, say, table
+from service.commands.rounding import ForceUnit, correlation, force_unit
+from service.units import MN
 
-MN = 1e3
-QUANTITIES = {"lift": "lift", "drag": "drag", "x": "X (forward)", "z": "Z (down)"}
 SOURCES = get_args(f.Source)
 PREFERENCE: tuple[f.Source, ...] = ("local", "joint", "global", "average", "nominal")
 
@@ -49,7 +50,7 @@ def forces(
         print_json(answer)
         return
     say(f"recording {answer['recording']}, coefficients: {answer['source']}")
-    table(["mean beat", ">recorded mN", ">modelled mN", ">RMS difference mN"], _beat_rows(answer))
+    _beats(answer)
     for remark in answer["remarks"]:
         note(f"note: {remark}")
 
@@ -89,8 +90,13 @@ def predict(
         return
     table(["coefficient", ">value"], [[name, number(value)] for name, value in answer["coefficients"].items()])
     say("")
-    rows = [[name, mn(answer["averages_n"][name]), *_extremes(answer, name)] for name in ("lift", "drag")]
-    table(["over one beat", ">mean mN", ">smallest mN", ">largest mN"], rows)
+    forces = {"lift": answer["lift_n"], "drag": answer["drag_n"]}
+    unit = force_unit(value for series in forces.values() for value in series)
+    rows = [
+        [name, *(unit.show(value) for value in (answer["averages_n"][name], min(series), max(series)))]
+        for name, series in forces.items()
+    ]
+    table(["over one beat", f">mean {unit.name}", f">smallest {unit.name}", f">largest {unit.name}"], rows)
 
 
 def models(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
@@ -116,10 +122,13 @@ def models(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
 
 def force_result(answer: f.ForceResult) -> None:
     """Print misfits, coefficients with their intervals, agreements, and the global model."""
-    rows = [["fitted", mn_(answer["before_mn"]), mn_(answer["after_mn"])]]
+    found = [["fitted", answer["before_mn"], answer["after_mn"]]]
     if answer["held_out"]:
-        rows.append(["held out", mn_(answer["held_out_before_mn"]), mn_(answer["held_out_after_mn"])])
-    table(["RMS difference of the fitted axes", ">before mN", ">after mN"], rows)
+        found.append(["held out", answer["held_out_before_mn"], answer["held_out_after_mn"]])
+    misfits = [[_newtons(before), _newtons(after)] for _, before, after in found]
+    unit = force_unit(value for pair in misfits for value in pair)
+    rows = [[str(use), *map(unit.show, pair)] for (use, *_), pair in zip(found, misfits, strict=True)]
+    table(["RMS difference of the fitted axes", f">before {unit.name}", f">after {unit.name}"], rows)
     say("")
     _coefficients(answer["estimates"])
     say("")
@@ -133,12 +142,19 @@ def force_result(answer: f.ForceResult) -> None:
 
 def given_forces(answer: f.ForceSimulation) -> None:
     """Print how a genome of one's own agrees with a recording."""
+    forces = [[one["mean_recorded_n"], one["mean_modelled_n"], one["rmse_n"]] for one in answer["agreements"]]
+    unit = force_unit(value for row in forces for value in row)
     rows = [
-        [QUANTITIES[one["quantity"]], mn(one["mean_recorded_n"]), mn(one["mean_modelled_n"]), *_fit(one)]
-        for one in answer["agreements"]
+        [
+            QUANTITIES[one["quantity"]],
+            *map(unit.show, row),
+            number(one["rmse_percent"], 3),
+            correlation(one["correlation"]),
+        ]
+        for one, row in zip(answer["agreements"], forces, strict=True)
     ]
-    columns = ["force", ">mean recorded mN", ">mean modelled mN", ">RMS mN", ">% of range", ">correlation"]
-    table([f"recording {answer['recording']}: {columns[0]}", *columns[1:]], rows)
+    heads = [f">{what} {unit.name}" for what in ("mean recorded", "mean modelled", "RMS")]
+    table([f"recording {answer['recording']}: force", *heads, ">% of range", ">correlation"], rows)
     for remark in answer["remarks"]:
         note(f"note: {remark}")
 
@@ -151,17 +167,11 @@ def write_files(answer: f.Forces, output: Path | None, plot: Path | None) -> Non
             columns |= {f"{kind[:-2]}_{name}_n": series for name, series in answer[kind].items()}
         _write_csv(output, list(columns), list(columns.values()))
     if plot:
-        _write_plot(answer, plot)
+        write_plot(answer, plot)
 
 
-def mn(newtons: float | None) -> str:
-    """Newtons as millinewtons with two decimals, a dash where there is none."""
-    return mn_(None if newtons is None else MN * newtons)
-
-
-def mn_(millinewtons: float | None) -> str:
-    """Millinewtons with two decimals, a dash where there is none."""
-    return "–" if millinewtons is None else f"{millinewtons:.2f}"
+def _newtons(millinewtons: Any) -> float | None:
+    return None if millinewtons is None else float(millinewtons) / MN
 
 
 def _coefficients(estimates: Sequence[f.Estimate]) -> None:
@@ -184,28 +194,35 @@ def _coefficients(estimates: Sequence[f.Estimate]) -> None:
 
 
 def _agreements(answer: f.ForceResult) -> None:
-    """Models side by side: RMS difference of each force, in mN and % of its range; mean and correlation of the lift."""
+    """Models side by side: RMS difference of each force, also in % of its range; mean and correlation of the lift."""
     shown = [source for source in PREFERENCE if _has(answer["agreements"], source)]
     heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["left_out"] else [])
     cells = {(a["recording"], a["quantity"], a["source"]): a for a in answer["agreements"]}
     left_out = {(a["recording"], a["quantity"]): a for a in answer["left_out"]}
-    rms, means = [], []
-    for recording, quantity in dict.fromkeys((a["recording"], a["quantity"]) for a in answer["agreements"]):
-        name = f"{recording} (held out)" if recording in answer["held_out"] else recording
-        models = [cells.get((recording, quantity, source)) for source in shown]
-        models += [left_out.get((recording, quantity))] if left_out else []
-        rms.append([name, quantity, *(_rms(model) for model in models)])
-        if quantity == answer["agreements"][0]["quantity"]:
-            recorded = next(model["mean_recorded_n"] for model in models if model)
-            means.append([name, mn(recorded), *(_mean_and_correlation(model) for model in models)])
-    table(["RMS difference, mN (% of range)", "force", *heads], rms)
-    say("")
+    every = [*answer["agreements"], *answer["left_out"]]
     quantity = answer["agreements"][0]["quantity"]
-    table([f"mean {quantity} over a beat, mN (correlation)", ">recorded", *heads], means)
+    of_rms = force_unit(a["rmse_n"] for a in every)
+    of_means = force_unit(
+        a[key] for a in every if a["quantity"] == quantity for key in ("mean_recorded_n", "mean_modelled_n")
+    )
+    rms, means = [], []
+    for recording, force in dict.fromkeys((a["recording"], a["quantity"]) for a in answer["agreements"]):
+        name = f"{recording} (held out)" if recording in answer["held_out"] else recording
+        models = [cells.get((recording, force, source)) for source in shown]
+        models += [left_out.get((recording, force))] if left_out else []
+        rms.append([name, force, *(_rms(model, of_rms) for model in models)])
+        if force == quantity:
+            recorded = next(model["mean_recorded_n"] for model in models if model)
+            means.append([name, of_means.show(recorded), *(_mean_and_correlation(model, of_means) for model in models)])
+    table([f"RMS difference, {of_rms.name} (% of range)", "force", *heads], rms)
+    say("")
+    table([f"mean {quantity} over a beat, {of_means.name} (correlation)", ">recorded", *heads], means)
 
 
-def _mean_and_correlation(agreement: f.Agreement | None) -> str:
-    return "–" if agreement is None else f"{mn(agreement['mean_modelled_n'])} ({number(agreement['correlation'], 4)})"
+def _mean_and_correlation(agreement: f.Agreement | None, unit: ForceUnit) -> str:
+    if agreement is None:
+        return "–"
+    return f"{unit.show(agreement['mean_modelled_n'])} ({correlation(agreement['correlation'])})"
 
 
 def _global(law: f.GlobalModel) -> None:
@@ -225,49 +242,15 @@ def _global(law: f.GlobalModel) -> None:
     say(f"fitted from {slow:g} to {fast:g} Hz and from {low:g} to {high:g} deg of body pitch")
 
 
-def _beat_rows(answer: f.Forces) -> list[list[str]]:
-    rows = []
+def _beats(answer: f.Forces) -> None:
+    found = {}
     for name, recorded in answer["recorded_n"].items():
         modelled = answer["modelled_n"][name]
         rms = (sum((m - r) ** 2 for m, r in zip(modelled, recorded, strict=True)) / len(recorded)) ** 0.5
-        rows.append([QUANTITIES[name], mn(_mean(recorded)), mn(_mean(modelled)), mn(rms)])
-    return rows
-
-
-def _write_plot(answer: f.Forces, path: Path) -> None:
-    from plotly import graph_objects
-    from plotly.subplots import make_subplots
-
-    names = list(answer["recorded_n"])
-    titles = [f"{QUANTITIES[name]}{what}" for name in names for what in ("", ", spectrum")]
-    figure = make_subplots(rows=len(names), cols=2, subplot_titles=titles, vertical_spacing=0.08)
-
-    def draw(row: int, column: int, x: Sequence[float], y: Sequence[float], what: str) -> None:
-        k = ("recorded", "modelled").index(what)
-        line = {"width": 2, "simplify": False, "color": COLOURS[k]}
-        named: dict[str, Any] = {"name": what, "legendgroup": what, "showlegend": (row, column) == (1, 1)}
-        figure.add_trace(graph_objects.Scatter(x=x, y=y, line=line, **named), row=row, col=column)
-
-    for row, name in enumerate(names, 1):
-        draw(row, 1, answer["phase"], answer["recorded_n"][name], "recorded")
-        draw(row, 1, answer["phase"], answer["modelled_n"][name], "modelled")
-        for what, spectra in (
-            ("recorded", answer["recorded_spectrum_n2_hz"]),
-            ("modelled", answer["modelled_spectrum_n2_hz"]),
-        ):
-            if name in spectra:  # the mean, at 0 Hz, has been taken off
-                draw(row, 2, answer["frequency_hz"][1:], spectra[name][1:], what)
-        figure.update_yaxes(title_text="N", row=row, col=1)
-        figure.update_yaxes(title_text="N²/Hz", type="log", row=row, col=2)
-    figure.update_xaxes(title_text="t*, beats", row=len(names), col=1)
-    figure.update_xaxes(title_text="Hz", row=len(names), col=2)
-    title = f"Forces of {answer['recording']}, coefficients: {answer['source']}"
-    figure.update_layout(title=title, height=330 * len(names), template="plotly_white")
-    try:
-        path.write_text(figure.to_html(include_plotlyjs=True), encoding="utf-8")
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
-    note(f"plots written to {path}; open it in a browser")
+        found[QUANTITIES[name]] = (_mean(recorded), _mean(modelled), rms)
+    unit = force_unit(value for values in found.values() for value in values)
+    heads = [f">{what} {unit.name}" for what in ("recorded", "modelled", "RMS difference")]
+    table(["mean beat", *heads], [[name, *map(unit.show, values)] for name, values in found.items()])
 
 
 def _write_csv(path: Path, names: Sequence[str], columns: Sequence[Sequence[float]]) -> None:
@@ -281,12 +264,8 @@ def _write_csv(path: Path, names: Sequence[str], columns: Sequence[Sequence[floa
     note(f"forces written to {path}")
 
 
-def _fit(one: f.Agreement) -> list[str]:
-    return [mn(one["rmse_n"]), number(one["rmse_percent"], 3), number(one["correlation"], 3)]
-
-
-def _rms(one: f.Agreement | None) -> str:
-    return "–" if one is None else f"{mn(one['rmse_n'])} ({number(one['rmse_percent'], 2)})"
+def _rms(one: f.Agreement | None, unit: ForceUnit) -> str:
+    return "–" if one is None else f"{unit.show(one['rmse_n'])} ({number(one['rmse_percent'], 2)})"
 
 
 def _has(agreements: Sequence[f.Agreement], source: str) -> bool:
@@ -295,11 +274,6 @@ def _has(agreements: Sequence[f.Agreement], source: str) -> bool:
 
 def _percent(value: float | None) -> str:
     return number(value, 2, "%")
-
-
-def _extremes(answer: f.Prediction, name: str) -> list[str]:
-    series = answer["lift_n"] if name == "lift" else answer["drag_n"]
-    return [mn(min(series)), mn(max(series))]
 
 
 def _mean(series: Sequence[float]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +18,7 @@ from service.client import WingfitError
 from service.commands.loads import COLOURS, check_file
 from service.commands.output import note, number, say, table
 from tracking.free_flight import Body, FreeFlight, free_flight, recording
-from tracking.tables import Table, read_table
+from tracking.tables import Table, header_of, read_table, require
 
 CENTRE = "centre_of_mass"
 AXES = "xyz"
@@ -77,7 +78,7 @@ def forces(
 
 
 def _flight(tracks: Path, body: Path, mass_kg: float, low_pass: LowPass, inertia: str) -> FreeFlight:
-    data, shape = _table(tracks), _table(body, "marker")
+    shape = _table(body, "marker")
     places = dict(zip(shape.labels, np.stack([shape.column(f"{a}_m") for a in AXES], axis=-1), strict=True))
     if CENTRE not in places:
         raise ValueError(f"{shape.file} has no row {CENTRE!r}; add it with the place of the centre of mass")
@@ -86,16 +87,21 @@ def _flight(tracks: Path, body: Path, mass_kg: float, low_pass: LowPass, inertia
         raise ValueError(
             f"{shape.file} has empty cells; give every marker and the {CENTRE} three coordinates in metres"
         )
+    data = _table(tracks, columns=["time_s", *(f"{name}_{axis}_m" for name in places for axis in AXES)])
     seen = np.stack([data.track(name) for name in places], axis=1)
     rigid = Body(np.stack(list(places.values())), centre, mass_kg, _inertia(inertia) if inertia else None)
     return free_flight(data.times(), seen, rigid, low_pass)
 
 
-def _table(path: Path, label: str | None = None) -> Table:
+def _table(path: Path, label: str | None = None, columns: Sequence[str] = ()) -> Table:
     try:
-        return read_table(path.read_bytes(), path.name, label)
+        raw = path.read_bytes()
     except OSError as error:
         raise WingfitError(f"cannot read {path}", error.strerror or str(error)) from error
+    header = header_of(raw, path.name)
+    if len(header) > 1:  # else read_table tells the separator or an empty file
+        require(header, columns, path.name)
+    return read_table(raw, path.name, label)
 
 
 def _inertia(text: str) -> npt.NDArray[np.float64]:

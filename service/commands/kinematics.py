@@ -15,10 +15,11 @@ from service.client import WingfitError
 from service.commands.loads import COLOURS, check_file
 from service.commands.output import note, number, say, table
 from tracking.smoothing import PeriodicFit
-from tracking.tables import Table, read_table
+from tracking.tables import Table, header_of, read_table, require
 from tracking.wing_kinematics import Angles, WingKinematics, WingPlace, beats_of, from_markers, wing_motion
 
 Wing = Literal["upper-right", "upper-left", "lower-right", "lower-left"]
+SMALLEST_RANGE_DEG = 2.0  # of a flap angle that needs no remark: 2 rad would be 115 deg
 ORDERS = ("", "/s", "/s²", "/s³")
 
 
@@ -55,7 +56,9 @@ def kinematics(
     check_file(output, "--output")
     check_file(plot, "--plot", (".html",))
     try:
-        data = read_table(_bytes(file), file.name)
+        raw = _bytes(file)
+        _check_columns(header_of(raw, file.name), file.name, f"{leading_edge},{chord}" if leading_edge else "")
+        data = read_table(raw, file.name)
         angles, start = _angles(data, leading_edge, chord, wing, dihedral_deg, hinge_m, flap_hz)
         found = wing_motion(
             angles,
@@ -100,6 +103,18 @@ def _write(path: Path, text: str) -> None:
         raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
 
 
+def _check_columns(header: list[str], file: str, markers: str) -> None:
+    """Name all columns that are missing before any number is read."""
+    if len(header) < 2:
+        return  # read_table tells the separator or an empty file
+    if not markers and "flap_angle_deg" not in header and any(name.endswith("_x_m") for name in header):
+        raise ValueError("the file holds markers; say which: --leading-edge A,B and --chord C,D")
+    times = "t_star" if "t_star" in header and "time_s" not in header else "time_s"
+    names = [name.strip() for name in markers.split(",") if name.strip()]
+    angles = [f"{name}_{axis}_m" for name in names for axis in "xyz"] or ["flap_angle_deg", "wing_pitch_deg"]
+    require(header, [times, *angles], file)
+
+
 def _angles(
     data: Table,
     leading_edge: str,
@@ -112,16 +127,23 @@ def _angles(
     """The angles that the file holds, and the start of a beat where its times say so."""
     times, start = _times(data, flap_hz)
     if not leading_edge:
-        if "flap_angle_deg" not in data.columns and any(name.endswith("_x_m") for name in data.columns):
-            raise ValueError("the file holds markers; say which: --leading-edge A,B and --chord C,D")
         flap, pitch = data.column("flap_angle_deg"), data.column("wing_pitch_deg")
-        return Angles(times, np.radians(flap), np.radians(pitch)), start
+        return Angles(times, np.radians(flap), np.radians(pitch), _small(flap)), start
     place = WingPlace(
         wing.startswith("upper"), wing.endswith("right"), None if dihedral_deg is None else np.radians(dihedral_deg)
     )
     edge = _tracks(data, leading_edge)
     along = _tracks(data, chord) if chord else None
     return from_markers(times, edge, along, place, _pair(hinge_m) if hinge_m else None), start
+
+
+def _small(flap: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[str, ...]:
+    """A remark where the flap angle, deg, hardly moves: it may be in radians."""
+    seen = flap[np.isfinite(flap)]
+    size = float(np.ptp(seen)) if len(seen) else np.inf
+    if size >= SMALLEST_RANGE_DEG:
+        return ()
+    return (f"flap_angle_deg ranges over {number(size, 2)} deg only; if these are radians, convert to degrees",)
 
 
 def _times(data: Table, flap_hz: float | None) -> tuple[np.ndarray[Any, np.dtype[np.float64]], float | None]:

@@ -23,6 +23,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the server's answer 
 # A pipe has no width: wide enough that no id is cut off in a table that a script reads.
 PIPE_WIDTH = 160
 PLAIN_EVERY_S = 5.0
+WHOLE_BELOW = 1e6
 
 Report = Callable[..., None]
 
@@ -66,10 +67,13 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], empty: str = "n
 
 
 def number(value: float | None, digits: int = 4, unit: str = "") -> str:
-    """``value`` with significant digits, a dash where there is none."""
+    """``value`` with significant digits, whole from 100 to a million, a dash where there is none."""
     if value is None:
         return "–"
-    return f"{value:.{digits}g}{' ' + unit if unit else ''}"
+    text = f"{value + 0.0:.{digits}g}"  # 0.0 takes the sign from -0
+    if "e+" in text and abs(value) < WHOLE_BELOW:
+        text = f"{value:.0f}"
+    return f"{text}{' ' + unit if unit else ''}"
 
 
 def mm(value: float | None) -> str:

@@ -13,6 +13,9 @@ from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.force_runs import RunId, force_result, forces, predict
 from service.commands.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
+from service.commands.rounding import with_unit
+from service.spec_parts import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
+from service.units import MN
 
 app = typer.Typer(no_args_is_help=True, help="Submit, watch and steer calibrations; fetch what they found.")
 
@@ -92,7 +95,7 @@ def submit(
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
-    """Submit a calibration; what is left out takes the settings of the seed: thesis for wings, DelFly for vehicles.
+    """Submit a calibration; what is left out is as published: the thesis for wings, Armanini et al. (2016) for vehicles.
 
     Example: wingfit runs submit ID --division 11 --seed 7 --watch
     """
@@ -150,7 +153,7 @@ def show(run_id: RunId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None
         ["progress", f"{100 * run['progress']:.0f} %, {duration(run['eta_seconds'])} left"],
         ["generations", f"{run['generations']} ({run['evaluations']} evaluations)"],
         ["best", f"{best(run)} {'per marker' if run['kind'] == 'tracks' else 'RMS'}"],
-        ["settings", ", ".join(f"{k} {v}" for k, v in run["spec"].items() if v not in (None, [], {}))],
+        ["settings", ", ".join(settings(run))],
         ["submitted", moment(run["created_at"])],
         ["ended", moment(run["finished_at"])],
     ]
@@ -255,9 +258,27 @@ def result(run_id: RunId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> No
 
 
 def best(run: a.Run) -> str:
-    """The misfit of a run so far, in mm of tracks or mN of forces."""
+    """The misfit of a run so far, in mm of tracks or the unit of force that fits."""
     misfit, unit = (run["best_mm"], "mm") if run["kind"] == "tracks" else (run["best_mn"], "mN")
-    return "–" if misfit is None else f"{misfit:.2f} {unit}"
+    if misfit is None:
+        return "–"
+    return f"{misfit:.2f} {unit}" if unit == "mm" else with_unit(misfit / MN)
+
+
+def settings(run: a.Run) -> list[str]:
+    """What a run was set to: what belongs to its kind of dataset and to its method."""
+    spec = run["spec"]
+    foreign = set(VEHICLE_ONLY if run["kind"] == "tracks" else WING_ONLY)
+    if spec["method"] == "gauss_newton":
+        foreign |= {*SEARCH_ONLY, "seed"}
+    shown = {key: value for key, value in spec.items() if key not in foreign and value not in (None, [], {})}
+    return [f"{key} {_said(value)}" for key, value in shown.items()]
+
+
+def _said(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def genes(items: list[a.GeneInfo]) -> None:

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import Response
 
 from calibration.search import CalibrationSpec
-from records import Dataset
+from records import Dataset, EstimateError
 from service import http, spec_views, store, views
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import Page, RunOut
@@ -40,8 +40,8 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
     spec = _checked(service, spec_views.of_run(body), dataset)
-    model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
-    name = body.name or f"{dataset.name}, {model}"[:200]
+    spec_views.refuse_idle(body, spec.method)
+    name = body.name or spec_views.run_name(dataset, spec)
 
     def create(session: Session) -> store.Answer:
         store.dataset(session, body.dataset_id)
@@ -121,6 +121,9 @@ def gene_names(service: Service, spec: CalibrationSpec, dataset: Dataset) -> tup
     """Genes of the model that a body asks for, or a 422."""
     try:
         return service.engine.gene_names(spec, dataset)
+    except EstimateError as error:
+        place = f"dataset.{'wing' if dataset.kind == 'tracks' else 'vehicle'}.estimates"
+        raise invalid("the dataset's estimates do not fit", [error_item(place, None, str(error))]) from None
     except ValueError as error:
         tracks = dataset.kind == "tracks"
         where, value = ("body.division", spec.division) if tracks else ("body.without", ", ".join(spec.without))

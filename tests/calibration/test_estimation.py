@@ -135,9 +135,10 @@ def test_left_out_laws_say_where_they_extrapolate(local: ForceResult, dataset: D
         "airspeed 2 m/s",
     ]
     assert not any("'test-4' left out" in r for r in local.remarks)  # amid the others
-    five = tuple(e.name for e in local.estimates[:5])
-    _, few = run(replace(LOCAL, recordings=five), dataset)
-    assert sum("with a recording left out: 4 conditions" in r for r in few.remarks) == 1
+    four = tuple(e.name for e in local.estimates[:4])
+    _, few = run(replace(LOCAL, recordings=four), dataset)
+    assert few.left_out == ()
+    assert sum(r.startswith("with a recording left out: no global model: a law in") for r in few.remarks) == 1
     assert len(set(few.remarks)) == len(few.remarks)
 
 
@@ -261,3 +262,40 @@ def test_prediction_of_a_condition(local: ForceResult, dataset: Dataset) -> None
     assert beyond.values["C_l"] == 0.0
     assert any("flap frequency 20 Hz is outside" in remark for remark in beyond.remarks)
     assert any("gives C_l = -" in remark and "0 is taken" in remark for remark in beyond.remarks)
+
+
+def test_the_headline_is_the_root_mean_square_of_all_samples(dataset: Dataset) -> None:
+    found = run(JOINT, dataset)[1]
+    by_recording = [a for a in found.agreements if (a.source, a.quantity) == ("joint", "x")]
+    each = np.array([a.rmse for a in by_recording if a.recording not in HELD_OUT])
+    assert found.after == pytest.approx(float(np.sqrt(np.mean(each**2))), rel=0.05)  # recordings of nearly equal length
+    assert found.after > 1.1 * each.mean()
+
+
+def test_a_model_that_lacks_something_tells_no_coefficient(dataset: Dataset, local: ForceResult) -> None:
+    assert not any("lacks something" in remark for remark in local.remarks)
+    assert [g.name for g in local.genes if g.identifiable] == ["C_l", "C_r", "C_F"]
+    poorer = run(replace(LOCAL, without=("clap_and_peel",)), dataset)[1]
+    said = [remark for remark in poorer.remarks if "lacks something" in remark]
+    assert len(said) == 6
+    assert "times the scatter from beat to beat" in said[0]
+    assert not any(g.identifiable for g in poorer.genes)
+
+
+def test_a_low_pass_that_was_not_applied_is_said(dataset: Dataset) -> None:
+    filtered = replace(dataset.recordings[0], low_pass=LowPass(100.0))
+    mixed = replace(dataset, recordings=(filtered, *dataset.recordings[1:]))
+    said = run(replace(LOCAL, low_pass=60.0), mixed)[1].remarks
+    assert any("'test-1' says that it has been low-passed at 100 Hz; 60 Hz was not applied" in r for r in said)
+    assert not any("was not applied" in remark for remark in run(LOCAL, mixed)[1].remarks)
+
+
+def test_what_is_only_predicted_may_lack_the_fitted_axis(dataset: Dataset) -> None:
+    seventh = dataset.recording("test-7")
+    z_only = replace(seventh, forces=("z",), values=seventh.values[:, 1:])
+    mixed = replace(dataset, recordings=tuple(z_only if r is seventh else r for r in dataset.recordings))
+    found = run(LOCAL, mixed)[1]
+    assert {a.quantity for a in found.agreements if a.recording == "test-7"} == {"z"}
+    assert found.held_out_after is not None
+    with pytest.raises(ValueError, match="force axis 'x' is to be fitted"):
+        plan(replace(LOCAL, recordings=()), replace(mixed, held_out=()))

@@ -162,3 +162,11 @@ def test_nothing_is_relative_to_zero(c_r: list[float]) -> None:
     found = fit_global(local, CONDITIONS).genes[1]
     assert found.left_out_error is not None
     assert 0.0 <= found.largest_error <= found.left_out_error < 25.0
+
+
+def test_a_coefficient_that_nothing_tells_is_said() -> None:
+    unsure = [
+        replace(estimate(str(k), {"C_l": law(c), "C_r": 1.4}), standard_errors={"C_l": 0.01, "C_r": 4.0})
+        for k, c in enumerate(CONDITIONS)
+    ]
+    assert fit_global(unsure, CONDITIONS).remarks == ("C_r is told under none of the conditions: its law says nothing",)

@@ -1,0 +1,60 @@
+"""Forces, per cent and correlations as people read them; the page rounds alike (web/format.js)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SMALLEST, LARGEST = 1e-4, 1e6  # beyond, a power of ten is easier to read
+NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
+
+
+def kept(value: float | None, digits: int = 3) -> str:
+    """``value`` with significant digits, noughts among them: 0.0500, 12.0, 385; a dash where there is none."""
+    if value is None:
+        return "–"
+    if value == 0:
+        return "0"
+    power = int(f"{value:.{digits - 1}e}".split("e")[1])
+    if not SMALLEST <= 10.0**power < LARGEST:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(digits - 1 - power, 0)}f}"
+
+
+def correlation(value: float | None) -> str:
+    """A correlation with four decimals; one that is not 1 is not shown as 1."""
+    if value is None:
+        return "–"
+    if NEAREST_ONE <= value < 1:
+        return ">0.9999"
+    return f"{round(value, 4) + 0.0:.4f}"
+
+
+@dataclass(frozen=True)
+class ForceUnit:
+    """A unit for the forces of one table."""
+
+    name: str
+    per_newton: float
+
+    def show(self, newtons: float | None, digits: int = 3) -> str:
+        """A force (N) in this unit, without its name; a dash where there is none."""
+        return kept(None if newtons is None else self.per_newton * newtons, digits)
+
+
+UNITS = ((10.0, ForceUnit("N", 1.0)), (1e-3, ForceUnit("mN", 1e3)), (0.0, ForceUnit("µN", 1e6)))
+
+
+def force_unit(newtons: Iterable[float | None]) -> ForceUnit:
+    """The unit in which the largest of ``newtons`` reads well: mN for 1 mN to 10 N; mN when there is none."""
+    largest = max((abs(value) for value in newtons if value), default=1.0)
+    if not math.isfinite(largest):
+        largest = 1.0
+    return next(unit for least, unit in UNITS if largest >= least)
+
+
+def with_unit(newtons: float, digits: int = 3) -> str:
+    """One force (N) with the unit that fits."""
+    unit = force_unit([newtons])
+    return f"{unit.show(newtons, digits)} {unit.name}"
