@@ -102,18 +102,17 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
         with np.errstate(over="ignore"):
             sizes[f"force_{name}_n"] = float(np.sqrt(np.mean(found**2)))
     if not any(sizes.values()):
-        which = " and ".join(sizes)
-        message = f"{which} {'are' if len(sizes) > 1 else 'is'} zero throughout; check the channel, or leave the recording out"
-        faults.add(where, 0.0, message)
+        which = " and ".join(sizes) + (" are" if len(sizes) > 1 else " is")
+        faults.add(where, 0.0, f"{which} zero throughout; check the channel, or leave the recording out")
         return
     mass = vehicle.mass if recording.mass is None else recording.mass
     weight = mass * STANDARD_GRAVITY
-    name, force = max(sizes.items(), key=lambda item: item[1])
+    largest, force = max(sizes.items(), key=lambda item: item[1])
     low, high = NEGLIGIBLE_WEIGHTS * weight, IMPLAUSIBLE_WEIGHTS * weight
     if not low <= force <= high:
         message = (
-            f"{name} is typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; it must "
-            f"lie in [{low:.4g}, {high:.4g}] N; that looks like {_unit(force / weight)} in columns named _n: "
+            f"{largest} is typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; it "
+            f"must lie in [{low:.4g}, {high:.4g}] N; that looks like {_unit(force / weight)} in columns named _n: "
             "convert to newtons, or check mass_kg"
         )
         faults.add(where, f"{force:.4g}", message)

@@ -18,16 +18,12 @@ from scipy import interpolate
 from records import Condition, LowPass, Recording
 from records.dataset import STANDARD_GRAVITY
 from records.limits import UNEVEN_STEPS
-from tracking.rigid_body import Poses, poses, quaternions, scale
+from tracking.rigid_body import Poses, poses, quaternions, scale_remarks
 from tracking.zero_phase import Kernels, kernels
 
 Array = npt.NDArray[np.float64]
 _CHUNK = 512
 _LAGS = 50
-_WRONG_SCALE = 1.3
-"""Markers seen this many times too far apart, or too close, are in another unit or are not those of the body file."""
-_OFF_SCALE = 1.05
-_LARGEST = 10.0
 _FASTEST = 100.0  # m/s, as in a dataset
 
 
@@ -97,7 +93,7 @@ def free_flight(
     """
     step = _even_step(times)
     windows = kernels(low_pass, 1 / step)
-    remarks = _scale(tracks, body)
+    remarks = scale_remarks(tracks, body.markers)
     found = poses(tracks, body.markers)
     remarks += _about(found)
     centre = found.position + found.rotation @ body.centre
@@ -120,8 +116,8 @@ def free_flight(
     speed = float(np.linalg.norm(np.nanmean(smooth[1][:, :3], axis=0)))
     if speed > _FASTEST:
         raise ValueError(
-            f"the body flies at {speed:.4g} m/s; it must be at most {_FASTEST:g} m/s: give the markers of both files in "
-            "metres and time_s in seconds"
+            f"the body flies at {speed:.4g} m/s; it must be at most {_FASTEST:g} m/s: give the markers of both "
+            "files in metres and time_s in seconds"
         )
     R, rate, turning = _attitude(smooth)
     weight = np.array([0.0, 0.0, gravity])
@@ -186,32 +182,6 @@ def _even_step(times: Array) -> float:
             f"{100 * UNEVEN_STEPS:g} %: give every frame a row, with empty cells where a marker was not seen"
         )
     return float((times[-1] - times[0]) / (len(times) - 1))
-
-
-def _scale(tracks: Array, body: Body) -> list[str]:
-    """Refuse tracks and body in different units, or both in a wrong one; a remark where they differ a little."""
-    size = float(np.linalg.norm(np.ptp(body.markers, axis=0)))
-    if size > _LARGEST:
-        raise ValueError(
-            f"the markers in the body file lie {size:.4g} m apart; it must be at most {_LARGEST:g} m: give metres, not "
-            "millimetres or centimetres"
-        )
-    ratio = scale(tracks, body.markers)
-    off = max(ratio, 1 / ratio)
-    if off > _WRONG_SCALE:
-        which, other = ("tracks", "body file") if ratio > 1 else ("body file", "tracks")
-        units = {10.0: "decimetres", 100.0: "centimetres", 1000.0: "millimetres"}
-        near = [unit for factor, unit in units.items() if factor / _WRONG_SCALE < off < factor * _WRONG_SCALE]
-        cause = (
-            f"that looks like {near[0]} in the {which}" if near else f"the {which} or the {other} are in another unit"
-        )
-        raise ValueError(
-            f"the markers are seen {ratio:.4g} times as far apart as the body file says; it must be 1 within "
-            f"{100 * (_WRONG_SCALE - 1):.0f} %: {cause}, or the names are not those of the same markers: give metres in both"
-        )
-    if off > _OFF_SCALE:
-        return [f"the markers are seen {ratio:.3g} times as far apart as the body file says; check the cameras' scale"]
-    return []
 
 
 def _about(found: Poses) -> list[str]:

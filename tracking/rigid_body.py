@@ -13,6 +13,10 @@ _FLAT = 0.02
 """Markers whose second extent is below this share of their first lie on a line: no attitude about it."""
 _OUTLIER = 8.0
 _PASSES = 3
+_WRONG_SCALE = 1.3
+"""Markers seen this many times too far apart, or too close, are in another unit or are not those of the body file."""
+_OFF_SCALE = 1.05
+_LARGEST = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,48 @@ class Poses:
         return result
 
 
+def scale_remarks(tracks: Array, shape: Array) -> list[str]:
+    """Refuse ``tracks`` [T, M, 3] and ``shape`` [M, 3] in different units, or both in a wrong one.
+
+    A remark where they differ a little.
+    """
+    size = float(np.linalg.norm(np.ptp(shape, axis=0)))
+    if size > _LARGEST:
+        raise ValueError(
+            f"the markers in the body file spread over {size:.4g} m; it must be at most {_LARGEST:g} m: give metres, "
+            "not millimetres or centimetres"
+        )
+    ratio = _scale(tracks, shape)
+    off = max(ratio, 1 / ratio)
+    if off > _WRONG_SCALE:
+        which, other = ("tracks", "body file") if ratio > 1 else ("body file", "tracks")
+        units = {10.0: "decimetres", 100.0: "centimetres", 1000.0: "millimetres"}
+        near = [unit for factor, unit in units.items() if factor / _WRONG_SCALE < off < factor * _WRONG_SCALE]
+        cause = (
+            f"that looks like {near[0]} in the {which}" if near else f"the {which} or the {other} are in another unit"
+        )
+        raise ValueError(
+            f"the markers are seen {ratio:.4g} times as far apart as the body file says; it must be 1 within "
+            f"{100 * (_WRONG_SCALE - 1):.0f} %: {cause}, or the names are not those of the same "
+            "markers: give metres in both"
+        )
+    if off > _OFF_SCALE:
+        return [f"the markers are seen {ratio:.3g} times as far apart as the body file says; check the cameras' scale"]
+    return []
+
+
+def _scale(tracks: Array, shape: Array) -> float:
+    """How many times further apart the markers are seen than ``shape`` says; the median, so that swaps do no harm.
+
+    NaN where no two markers are seen together.
+    """
+    first, second = np.triu_indices(len(shape), 1)
+    told = np.linalg.norm(shape[first] - shape[second], axis=-1)
+    apart = told > 0
+    seen = np.linalg.norm(tracks[:, first[apart]] - tracks[:, second[apart]], axis=-1) / told[apart]
+    return float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else float("nan")
+
+
 def poses(tracks: Array, shape: Array) -> Poses:
     """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3] in m, NaN for not seen.
 
@@ -73,18 +119,6 @@ def poses(tracks: Array, shape: Array) -> Poses:
     else:
         found = _refined(tracks, shape, seen)
     return Poses(found.rotation, found.position, found.seen, found.residuals, found.shape, rejected)
-
-
-def scale(tracks: Array, shape: Array) -> float:
-    """How many times further apart the markers are seen than ``shape`` says; the median, so that swaps do no harm.
-
-    NaN where no two markers are seen together.
-    """
-    first, second = np.triu_indices(len(shape), 1)
-    told = np.linalg.norm(shape[first] - shape[second], axis=-1)
-    apart = told > 0
-    seen = np.linalg.norm(tracks[:, first[apart]] - tracks[:, second[apart]], axis=-1) / told[apart]
-    return float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else float("nan")
 
 
 def _refined(tracks: Array, shape: Array, seen: Mask) -> Poses:

@@ -24,7 +24,9 @@ PitchKind = Literal["fourier", "passive"]
 _FEWEST_BEATS = 1.5
 _STILL = 1e-6
 """Angles that range over less, rad, do not move."""
-_CHANCE = 0.01
+_CHANCE = 0.001
+"""A period that noise would show with a larger probability is not believed."""
+_FEWEST_SAMPLES = 2.5
 _LITTLE = 0.8
 """A given frequency at which the series explains less of the variance than this is remarked on."""
 
@@ -200,6 +202,13 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
     if span * first < _FEWEST_BEATS:
         message = f"the recording spans {span * first:.1f} beats; {_FEWEST_BEATS} are needed to find the flap frequency"
         raise ValueError(f"{message}: give it, or record longer")
+    if step * first * _FEWEST_SAMPLES > 1:
+        message = (
+            f"no flap frequency stands out: the strongest period, {first:.4g} Hz, has {1 / (step * first):.2g} samples"
+        )
+        raise ValueError(
+            f"{message}; at least {_FEWEST_SAMPLES} are needed: give the frequency, or check the flap angle"
+        )
     orders = max(1, min(4, int(0.4 / (step * first)), (len(t) - 4) // 6))
     middle = float(t.mean())
 
@@ -234,7 +243,8 @@ def _refuse_still(flap: Array) -> None:
     seen = flap[np.isfinite(flap)]
     if len(seen) and np.ptp(seen) < _STILL:
         raise ValueError(
-            f"the flap angle is {np.degrees(seen[0]):.4g} deg throughout: there is no motion; check the column or markers"
+            f"the flap angle is {np.degrees(seen[0]):.4g} deg throughout: there is no motion; check the column, or the "
+            "markers"
         )
 
 
@@ -249,10 +259,8 @@ def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
         alone = f"by itself the flap angle shows {flap_frequency(angles.times, angles.flap).hertz:.5g} Hz"
     except ValueError as error:
         alone = f"by itself the flap angle shows none ({error})"
-    return [
-        f"at the flap frequency given, {flap.frequency:.5g} Hz, the motion explains {100 * max(share, 0):.0f} % of the flap "
-        f"angle's variance; {alone}"
-    ]
+    given = f"at the flap frequency given, {flap.frequency:.5g} Hz, the motion explains {100 * max(share, 0):.0f} %"
+    return [f"{given} of the flap angle's variance; {alone}"]
 
 
 def _strongest(times: Array, values: Array) -> float:

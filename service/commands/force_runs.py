@@ -14,7 +14,7 @@ from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.force_plot import QUANTITIES, write_plot
 from service.commands.loads import check_file
 from service.commands.output import AsJson, Url, note, number, print_json, say, table
-from service.commands.rounding import ForceUnit, correlation, force_unit
+from service.commands.rounding import ForceUnit, correlation, force_unit, kept
 from service.units import MN
 
 SOURCES = get_args(f.Source)
@@ -148,7 +148,7 @@ def given_forces(answer: f.ForceSimulation) -> None:
         [
             QUANTITIES[one["quantity"]],
             *map(unit.show, row),
-            number(one["rmse_percent"], 3),
+            kept(one["rmse_percent"]),
             correlation(one["correlation"]),
         ]
         for one, row in zip(answer["agreements"], forces, strict=True)
@@ -265,7 +265,7 @@ def _write_csv(path: Path, names: Sequence[str], columns: Sequence[Sequence[floa
 
 
 def _rms(one: f.Agreement | None, unit: ForceUnit) -> str:
-    return "–" if one is None else f"{unit.show(one['rmse_n'])} ({number(one['rmse_percent'], 2)})"
+    return "–" if one is None else f"{unit.show(one['rmse_n'])} ({kept(one['rmse_percent'], 2)})"
 
 
 def _has(agreements: Sequence[f.Agreement], source: str) -> bool:
@@ -273,7 +273,7 @@ def _has(agreements: Sequence[f.Agreement], source: str) -> bool:
 
 
 def _percent(value: float | None) -> str:
-    return number(value, 2, "%")
+    return "–" if value is None else f"{kept(value, 2)} %"
 
 
 def _mean(series: Sequence[float]) -> float:

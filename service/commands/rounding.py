@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 SMALLEST, LARGEST = 1e-4, 1e6  # beyond, a power of ten is easier to read
 NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
+ROUNDING = 1e-9  # of the correlation of a thing with itself
 
 
 def kept(value: float | None, digits: int = 3) -> str:
@@ -26,7 +27,7 @@ def correlation(value: float | None) -> str:
     """A correlation with four decimals; one that is not 1 is not shown as 1."""
     if value is None:
         return "–"
-    if NEAREST_ONE <= value < 1:
+    if NEAREST_ONE <= value < 1 - ROUNDING:
         return ">0.9999"
     return f"{round(value, 4) + 0.0:.4f}"
 

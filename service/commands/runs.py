@@ -95,7 +95,7 @@ def submit(
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
-    """Submit a calibration; what is left out is as published: the thesis for wings, Armanini et al. (2016) for vehicles.
+    """Submit a calibration; what is left out follows the thesis (wings) or Armanini et al. (2016) (vehicles).
 
     Example: wingfit runs submit ID --division 11 --seed 7 --watch
     """

@@ -1,13 +1,12 @@
 // How well each model agrees with each recording: differences, correlation, averages over the beat.
 
-import { $, el } from "./format.js";
+import { $, correlation, el, forceUnit, kept } from "./format.js";
 import { QUANTITIES, SOURCES } from "./words.js";
 
-const COLUMNS = [
-  ["RMSE, N", (a) => fixed(a.rmse_n, 4)], ["%", (a) => fixed(a.rmse_percent, 1)], ["r", (a) => fixed(a.correlation, 2)],
+const columns = ({ unit, show }) => [
+  [unit, (a) => show(a.rmse_n)], ["%", (a) => kept(a.rmse_percent)], ["r", (a) => correlation(a.correlation)],
 ];
 
-const fixed = (value, digits) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 const number = (text, first = false) => el("td", { className: first ? "n first" : "n" }, text);
 
 export function fillQuantities(result) {
@@ -35,7 +34,7 @@ export function drawAgreement(result, dataset, quantity) {
   const rows = recordings.map((recording) => ({ name: recording.name, use: use(recording, fitted), by: found.get(recording.name) }));
   drawDifferences(rows, models, rows.filter((row) => fitted.has(row.name)));
   drawAverages(rows, models);
-  $("agreement-note").textContent = "RMS difference over all samples of the whole beats, in N and in per cent of the range of the recorded mean beat; "
+  $("agreement-note").textContent = "RMS difference over all samples of the whole beats, in the unit of force and in per cent of the range of the recorded mean beat; "
     + "r: correlation."
     + (models.includes("left_out") ? " Left out: the global model fitted without the recording that it predicts." : "");
 }
@@ -48,10 +47,11 @@ function use(recording, fitted) {
 const nameCell = (row) => el("th", { scope: "row" }, row.name, row.use ? " " : null, row.use?.cloneNode(true));
 
 function drawDifferences(rows, models, fitted) {
+  const shown = columns(forceUnit(rows.flatMap((row) => models.map((name) => row.by[name]?.rmse_n))));
   $("agreement").tHead.replaceChildren(
-    el("tr", { className: "groups" }, el("th", {}), ...models.map((name) => el("th", { colSpan: COLUMNS.length, scope: "colgroup", className: "n first" }, SOURCES[name]))),
-    el("tr", {}, el("th", {}, "Recording"), ...models.flatMap(() => COLUMNS.map(([title], k) => el("th", { className: k ? "n" : "n first" }, title)))));
-  const cells = (by) => models.flatMap((name) => COLUMNS.map(([, show], k) => number(by[name] ? show(by[name]) : "–", k === 0)));
+    el("tr", { className: "groups" }, el("th", {}), ...models.map((name) => el("th", { colSpan: shown.length, scope: "colgroup", className: "n first" }, SOURCES[name]))),
+    el("tr", {}, el("th", {}, "Recording"), ...models.flatMap(() => shown.map(([title], k) => el("th", { className: k ? "n" : "n first" }, title)))));
+  const cells = (by) => models.flatMap((name) => shown.map(([, show], k) => number(by[name] ? show(by[name]) : "–", k === 0)));
   const body = rows.map((row) => el("tr", {}, nameCell(row), ...cells(row.by)));
   if (fitted.length > 1) {
     const means = Object.fromEntries(models.map((name) => [name, meanOf(fitted.map((row) => row.by[name]))]));
@@ -69,8 +69,11 @@ function meanOf(agreements) {
 }
 
 function drawAverages(rows, models) {
+  const means = (row) => [Object.values(row.by)[0].mean_recorded_n, ...models.map((name) => row.by[name]?.mean_modelled_n)];
+  const { unit, show } = forceUnit(rows.flatMap(means));
+  $("averages-title").textContent = `Average over the beat, ${unit}`;
   $("averages").tHead.replaceChildren(el("tr", {}, el("th", {}, "Recording"), el("th", { className: "n" }, "Recorded"),
     ...models.map((name) => el("th", { className: "n" }, SOURCES[name]))));
   $("averages").tBodies[0].replaceChildren(...rows.map((row) => el("tr", {}, nameCell(row),
-    number(fixed(Object.values(row.by)[0].mean_recorded_n, 4)), ...models.map((name) => number(fixed(row.by[name]?.mean_modelled_n, 4))))));
+    ...means(row).map((value) => number(show(value))))));
 }

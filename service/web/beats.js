@@ -1,8 +1,8 @@
 // Forces over the beat, recorded and modelled, and their power spectra.
 
-import { $, significant } from "./format.js";
+import { $, forceUnit, significant } from "./format.js";
 import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "./plots.js";
-import { mn, QUANTITIES, SOURCES } from "./words.js";
+import { QUANTITIES, SOURCES } from "./words.js";
 
 const HARMONICS = 8;
 const DECADES = 6;
@@ -19,7 +19,9 @@ export async function drawBeats(forces, names, about) {
     drawBeat(Plotly, $(`beat-${k}`), look, forces, names[k]);
     drawSpectrum(Plotly, $(`spectrum-${k}`), look, forces, names[k], about.flap_frequency_hz);
   }
-  const off = names.map((name) => `${name} ${mn(meanBeatDifference(forces, name))} mN`).join(", ");
+  const differences = names.map((name) => meanBeatDifference(forces, name));
+  const { unit, show } = forceUnit(differences);
+  const off = names.map((name, k) => `${name} ${show(differences[k])} ${unit}`).join(", ");
   const wide = forces.spread_n[names[0]] ? " The band is one standard deviation between beats." : "";
   return [
     `${forces.recording}: ${significant(about.flap_frequency_hz)} Hz, body pitch ${significant(about.angle_of_attack_deg)}°, `
@@ -30,7 +32,7 @@ export async function drawBeats(forces, names, about) {
 
 function meanBeatDifference(forces, name) {
   const [recorded, modelled] = [forces.recorded_n[name], forces.modelled_n[name]];
-  return 1e3 * Math.sqrt(recorded.reduce((sum, value, i) => sum + (value - modelled[i]) ** 2, 0) / recorded.length);
+  return Math.sqrt(recorded.reduce((sum, value, i) => sum + (value - modelled[i]) ** 2, 0) / recorded.length);
 }
 
 // A beat has no last instant: its end is the start of the next.
@@ -45,7 +47,7 @@ function drawBeat(Plotly, node, look, forces, name) {
     hoverinfo: "skip", showlegend: false, ...extra,
   });
   const curve = (label, y, line) => ({
-    x, y, name: label, type: "scatter", mode: "lines", line: { simplify: false, ...line }, hovertemplate: `%{y:.3f} N<extra>${label}</extra>`,
+    x, y, name: label, type: "scatter", mode: "lines", line: { simplify: false, ...line }, hovertemplate: `%{y:.3~s}N<extra>${label}</extra>`,
   });
   const traces = [
     ...(spread ? [edge(-1, {}), edge(1, { fill: "tonexty", fillcolor: `${look.faint}59` })] : []),

@@ -1,6 +1,6 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
-import { $, el, plural, significant } from "./format.js";
+import { $, correlation, el, fixed, kept, plural, significant } from "./format.js";
 import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
 
 const STRONG = 0.9;
@@ -45,17 +45,17 @@ function drawTable(result, rows) {
 
 function valueCell(coefficient) {
   const low = coefficient.low_90;
-  const interval = low === null ? "not told" : `${low.toFixed(3)} to ${coefficient.high_90.toFixed(3)}`;
-  return el("td", { className: "n" }, coefficient.value.toFixed(3), el("small", {}, ` ${interval}`));
+  const interval = low === null ? "not told" : `${fixed(low, 3)} to ${fixed(coefficient.high_90, 3)}`;
+  return el("td", { className: "n" }, fixed(coefficient.value, 3), el("small", {}, ` ${interval}`));
 }
 
 function drawLaw(law) {
   $("law-part").hidden = !law;
   if (!law) return;
-  const percent = (value) => (value === null ? "–" : `${significant(value, 2)} %`);
+  const error = (value) => (value === null ? "–" : `${kept(value, 2)} %`);
   $("law").tBodies[0].replaceChildren(...law.genes.map((gene) => el("tr", {}, el("td", {}, gene.name),
     ...[gene.constant, gene.per_hz, gene.per_deg].map((value) => el("td", { className: "n" }, value === 0 ? "–" : significant(value, 3))),
-    el("td", { className: "n" }, percent(gene.largest_error_percent)), el("td", { className: "n" }, percent(gene.left_out_error_percent)))));
+    el("td", { className: "n" }, error(gene.largest_error_percent)), el("td", { className: "n" }, error(gene.left_out_error_percent)))));
   const range = ([low, high], unit) => `${significant(low)} to ${significant(high)} ${unit}`;
   $("law-note").textContent = `Fitted to ${plural(law.recordings.length, "recording")}, ${range(law.frequency_range_hz, "Hz")} and `
     + `${range(law.pitch_range_deg, "deg")}. Largest error: from a local estimate. Left out: of one that the fit had not seen.`;
@@ -126,7 +126,7 @@ export function drawCorrelation(result, name) {
 }
 
 function shaded(value) {
-  const cell = el("td", {}, value === null ? "–" : value.toFixed(2));
+  const cell = el("td", {}, correlation(value));
   if (value !== null) {
     const colour = value < 0 ? "var(--series-2)" : "var(--accent)";
     cell.style.background = `color-mix(in srgb, ${colour} ${Math.round(45 * Math.abs(value))}%, transparent)`;

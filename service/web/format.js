@@ -2,6 +2,39 @@
 
 export const DASH = "–";
 
+// ``value`` with decimals; never -0.
+export const fixed = (value, decimals) => {
+  if (value === null || value === undefined) return DASH;
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? text.replace("-", "") : text;
+};
+
+// Significant digits, noughts among them: 0.0500, 12.0, 385. Rounds as the command line does (commands/rounding.py).
+export function kept(value, digits = 3) {
+  if (value === null || value === undefined) return DASH;
+  if (value === 0) return "0";
+  const power = Number(value.toExponential(digits - 1).split("e")[1]);
+  return power < -4 || power > 5 ? significant(value, digits) : value.toFixed(Math.max(digits - 1 - power, 0));
+}
+
+// Four decimals; a correlation that is not 1 is not shown as 1.
+export const correlation = (value) => (value !== null && value >= 0.99995 && value < 1 - 1e-9 ? ">0.9999" : fixed(value, 4));
+
+const UNITS = [["N", 1, 10], ["mN", 1e3, 1e-3], ["µN", 1e6, 0]];
+
+// One unit for the forces (N) of a table, in which the largest reads well, and how to show them in it.
+export function forceUnit(newtons) {
+  const sizes = newtons.filter(Boolean).map(Math.abs);
+  const largest = sizes.length ? Math.max(...sizes) : 1;
+  const [unit, factor] = UNITS.find(([, , least]) => largest >= least) ?? UNITS[1];
+  return { unit, show: (value, digits = 3) => kept(value === null || value === undefined ? null : factor * value, digits) };
+}
+
+export const withForceUnit = (newtons) => {
+  const { unit, show } = forceUnit([newtons]);
+  return `${show(newtons)} ${unit}`;
+};
+
 export const mm = (value) => (value === null || value === undefined ? DASH : value.toFixed(value < 10 ? 2 : 1));
 
 export function significant(value, digits = 4) {

@@ -1,14 +1,18 @@
 // Fitness by generation: best and mean on a log axis, with the boundaries of the stages.
 
-import { mm, significant } from "./format.js";
+import { mm, significant, withForceUnit } from "./format.js";
 import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
-import { mn } from "./words.js";
+import { newtons } from "./words.js";
 
 const GAP = { sequence: null, best: null, mean: null };
 const SIDE_BY_SIDE = 3; // stages whose names fit over the figure; of more, they stand upright
 const UNDER_NAMES = 0.78;
 const LONGEST_UPRIGHT = 9;
 const FEW = 12; // points of a stage, each worth a dot
+const MOST_TICKS = 10;
+const FEWEST_TICKS = 3;
+const EVEN_TICKS = 8; // at most; of steps of 1, 2 and 5 at least three fall into the range
+const NARROWEST = 0.02; // decades left free at either end: a flat line stands in the middle
 
 // "test-1, Gauss-Newton" is named by its recording, unless it finishes a search on the same one.
 function stageLabel(name, stages, upright) {
@@ -23,7 +27,7 @@ const MARKERS = {
   about: "Sum of squared distances between simulated and recorded markers; lower is better.",
 };
 const FORCES = {
-  unit: "N²", hover: (item) => `, RMS ${mn(item.best_mn)} mN, ${item.stage}: genes moved by ${significant(item.diversity, 2)} of their range`,
+  unit: "N²", hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${item.stage}: genes moved by ${significant(item.diversity, 2)} of their range`,
   about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weighs recordings and axes by their noise, so that the sum need not fall every time.",
 };
 
@@ -52,7 +56,7 @@ export async function drawHistory(node, items, forces = false) {
   ];
   const figure = layout(look, {
     margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
-    xaxis: axis(look, { title: { text: "generation", standoff: 8 }, showgrid: false, range: span(x), tickformat: "d" }),
+    xaxis: axis(look, { title: { text: "generation", standoff: 8 }, showgrid: false, range: span(x), ...wholeTicks(x) }),
     yaxis: axis(look, {
       title: { text: `fitness, ${shown.unit}`, standoff: 8 }, type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)),
     }),
@@ -73,17 +77,37 @@ export async function drawHistory(node, items, forces = false) {
 
 const span = (x) => (x.length > 1 ? [x[0] - 0.5, x.at(-1) + 0.5] : [0.5, 2.5]);
 
-// Ticks at whole powers of ten, or at 1, 2, 5 where there are too few of those.
+const niceStep = (least) => {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((digit) => digit * power).find((step) => step >= least * (1 - 1e-9));
+};
+
+const multiples = (step, low, high) => {
+  const first = Math.ceil(low / step - 1e-9);
+  return Array.from({ length: Math.max(Math.floor(high / step + 1e-9) - first + 1, 0) }, (_, i) => (first + i) * step);
+};
+
+// Generations are counted: no tick between two of them.
+const wholeTicks = (x) => {
+  const step = Math.max(1, niceStep(Math.max(x.at(-1) - x[0], 1) / MOST_TICKS));
+  return { tickmode: "array", tickvals: multiples(step, x[0], x.at(-1)), tickformat: "d" };
+};
+
+// Range and ticks of a log axis: at powers of ten; at 1, 2, 5 where there are too few of those; or evenly in a narrow range.
 function logTicks(values) {
   const known = values.filter((value) => value > 0);
   if (!known.length) return {};
-  const [low, high] = [Math.min(...known), Math.max(...known)];
-  const digits = high / low < 300 ? (high / low < 10 ? [1, 2, 3, 4, 6, 8] : [1, 2, 5]) : [1];
-  const ticks = [];
-  for (let power = Math.floor(Math.log10(low)); power <= Math.ceil(Math.log10(high)); power += 1) {
-    ticks.push(...digits.map((digit) => digit * 10 ** power));
-  }
-  return { tickmode: "array", tickvals: ticks, ticktext: ticks.map((tick) => significant(tick, 1)) };
+  const ends = [Math.min(...known), Math.max(...known)].map(Math.log10);
+  const pad = Math.max(0.06 * (ends[1] - ends[0]), NARROWEST);
+  const range = [ends[0] - pad, ends[1] + pad];
+  const [low, high] = range.map((power) => 10 ** power);
+  const powers = multiples(1, Math.floor(range[0]), Math.ceil(range[1]));
+  const inside = (digits) => powers.flatMap((power) => digits.map((digit) => digit * 10 ** power)).filter((tick) => tick >= low && tick <= high);
+  const round = [[1], [1, 2, 5]].map(inside).find((ticks) => ticks.length >= FEWEST_TICKS);
+  const step = niceStep((high - low) / EVEN_TICKS);
+  const ticks = round ?? multiples(step, low, high);
+  const digits = round ? 1 : Math.max(1, Math.floor(Math.log10(high) + 1e-9) - Math.floor(Math.log10(step) + 1e-9) + 1);
+  return { range, tickmode: "array", tickvals: ticks, ticktext: ticks.map((tick) => significant(tick, digits)) };
 }
 
 // The name stands at the end of its line, so that nobody has to look it up in a legend.

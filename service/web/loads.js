@@ -1,7 +1,7 @@
 // What acts inside the wing and on it, over one beat: torques, powers, forces, bending moments, energies.
 
 import { get, part } from "./api.js";
-import { $, el, significant } from "./format.js";
+import { $, el, kept, significant } from "./format.js";
 import { lines } from "./plots.js";
 
 const ASKED = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
@@ -60,7 +60,7 @@ async function load() {
   }
   const off = Math.abs(loads.outputs.averages.closing_error_percent);
   $("loads-note").textContent = `${recording}, ${genome} genome, one periodic beat; phase 0 is where the wing crosses the horizontal `
-    + `upwards. Energy balance closes to ${significant(off, 2)} % of what enters.`;
+    + `upwards. Energy balance closes to ${kept(off, 2)} % of what enters.`;
   $("loads").hidden = false;
   drawAverages(loads.outputs.averages);
   draw();

@@ -1,7 +1,7 @@
 // Forces that the global model of a run predicts for a condition that somebody asks for.
 
 import { part, postJson } from "./api.js";
-import { $, el, significant } from "./format.js";
+import { $, el, forceUnit, significant } from "./format.js";
 import { lines } from "./plots.js";
 import { showErrors, showRemarks } from "./said.js";
 
@@ -77,10 +77,12 @@ async function predict() {
 
 function draw() {
   $("prediction").hidden = false;
-  const cell = (label, value, unit = "") => el("div", {}, el("dt", {}, label), el("dd", {}, significant(value, 3), unit && el("small", {}, ` ${unit}`)));
+  const cell = (label, text, unit = "") => el("div", {}, el("dt", {}, label), el("dd", {}, text, unit && el("small", {}, ` ${unit}`)));
+  const means = prediction.averages_n;
+  const { unit, show } = forceUnit([means.lift, means.drag]);
   $("prediction-numbers").replaceChildren(
-    cell("mean lift", prediction.averages_n.lift, "N"), cell("mean drag", prediction.averages_n.drag, "N"),
-    ...Object.entries(prediction.coefficients).map(([name, value]) => cell(name, value)));
+    cell("mean lift", show(means.lift), unit), cell("mean drag", show(means.drag), unit),
+    ...Object.entries(prediction.coefficients).map(([name, value]) => cell(name, significant(value, 3))));
   const { phase, lift_n: lift, drag_n: drag, x_n: x, z_n: z } = prediction;
   Promise.all([
     lines($("prediction-lift"), phase, [["lift", lift], ["drag", drag]], { unit: "N", x: "t*, beats; 0: wings closest" }),

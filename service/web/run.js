@@ -9,7 +9,7 @@ import { redrawLoads } from "./loads.js";
 import { remove } from "./submit.js";
 import { drawGenes, drawMisfit, drawNumbers } from "./tables.js";
 import { hideWing, redrawWing, setUpViewer, showWing } from "./viewer.js";
-import { isForces, setup } from "./words.js";
+import { isForces, request, setup } from "./words.js";
 
 const ALLOWED = {
   pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],
@@ -36,7 +36,7 @@ export function setUpRun(given) {
   });
   $("copy-curl").addEventListener("click", () => {
     const name = run.name ? { name: run.name } : {};
-    copy(curl("runs", { dataset_id: run.dataset_id, ...run.spec, ...name }));
+    copy(curl("runs", { dataset_id: run.dataset_id, ...request(run), ...name }));
   });
 }
 

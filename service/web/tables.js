@@ -1,7 +1,7 @@
 // Tables of a run: numbers at the top, misfit by recording, genes.
 
-import { $, el, mm, plural, significant } from "./format.js";
-import { isForces, misfit, mn } from "./words.js";
+import { $, el, forceUnit, kept, mm, plural, significant } from "./format.js";
+import { isForces, misfit, newtons } from "./words.js";
 
 export function drawNumbers(run, result) {
   const cell = (label, value, unit = "", main = false) =>
@@ -35,13 +35,16 @@ function outcome(result, cell) {
 }
 
 function forceOutcome(result, cell) {
+  const [before, after, heldBefore, heldAfter] = ["before_mn", "after_mn", "held_out_before_mn", "held_out_after_mn"]
+    .map((key) => newtons(result[key]));
+  const { unit, show } = forceUnit([before, after, heldBefore, heldAfter]);
   const cells = [
-    cell("before, RMS of the fitted forces", mn(result.before_mn), "mN"),
-    cell("after, RMS of the fitted forces", mn(result.after_mn), "mN", true),
+    cell("before, RMS of the fitted forces", show(before), unit),
+    cell("after, RMS of the fitted forces", show(after), unit, true),
   ];
-  if (result.held_out_after_mn !== null) {
-    cells.push(cell("before, held out", mn(result.held_out_before_mn), "mN"));
-    cells.push(cell("after, held out, predicted", mn(result.held_out_after_mn), "mN", true));
+  if (heldAfter !== null) {
+    cells.push(cell("before, held out", show(heldBefore), unit));
+    cells.push(cell("after, held out, predicted", show(heldAfter), unit, true));
   }
   return cells;
 }
@@ -123,6 +126,6 @@ function position({ lower, upper }, value) {
 function told(gene) {
   if (!gene.searched) return "not searched";
   if (gene.identifiable === null) return "judged at the end";
-  const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
+  const error = gene.standard_error_percent === null ? "" : ` ± ${kept(gene.standard_error_percent, 2)} %`;
   return `${gene.identifiable ? "yes" : "no"}${error && `, ${error.trim()}`}`;
 }

@@ -1,6 +1,6 @@
 // What differs between runs on tracked markers and runs on forces, and the words for what a run can be set to.
 
-import { mm, significant } from "./format.js";
+import { forceUnit, mm, significant } from "./format.js";
 
 export const isForces = (thing) => thing?.kind === "forces";
 
@@ -17,6 +17,10 @@ export const SOURCES = {
 };
 export const QUANTITIES = { lift: "Lift", drag: "Drag", x: "Force along x", z: "Force along z" };
 
+const WING_ONLY = ["division", "bounds_factor", "accuracy_mm"];
+const VEHICLE_ONLY = ["preset", "without", "axes", "low_pass_hz", "peel_width_beats"];
+const SEARCH_ONLY = ["population", "stall", "tolerance", "seed", "finish"];
+
 export const spoken = (name) => name.replaceAll("_", " ");
 
 export const modelOf = (run) => (isForces(run)
@@ -25,10 +29,19 @@ export const modelOf = (run) => (isForces(run)
 
 // The misfit of a run as the lists and the head of the page show it: a number and its unit.
 export function misfit(run) {
-  return isForces(run) ? { value: mn(run.best_mn), unit: "mN" } : { value: mm(run.best_mm), unit: "mm" };
+  if (!isForces(run)) return { value: mm(run.best_mm), unit: "mm" };
+  const best = newtons(run.best_mn);
+  const { unit, show } = forceUnit([best]);
+  return { value: show(best), unit };
 }
 
-export const mn = mm;
+export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e3);
+
+// What a run was set to, as a request: without what its kind of dataset or its method has no use for.
+export function request(run) {
+  const idle = [...(isForces(run) ? WING_ONLY : VEHICLE_ONLY), ...(run.spec.method === "gauss_newton" ? SEARCH_ONLY : [])];
+  return Object.fromEntries(Object.entries(run.spec).filter(([name]) => !idle.includes(name)));
+}
 
 export function setup(run) {
   const { spec } = run;

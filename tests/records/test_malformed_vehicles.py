@@ -11,13 +11,16 @@ import h5py
 import numpy as np
 import pytest
 
-from records import Dataset, DatasetError, LowPass, Recording, save_dataset
+from records import Dataset, DatasetError, LowPass, Recording, load_archive, save_dataset
+from records.errors import Faults
 from records.netcdf import write_netcdf
-from tests.records.malformed import error_of, error_of_zip, good_files
+from records.plausibility import check_numbers
+from tests.records.malformed import error_of, error_of_zip, good_files, zipped
 from tests.records.samples import falcon_dataset
 from tests.records.vehicles import (
     FORCES,
     YAML,
+    delfly,
     delfly_dataset,
     good_vehicle,
     measured_motion,
@@ -73,6 +76,12 @@ DESCRIPTIONS = {
     "harmonics": (MEASURED, "cosine_deg: [-18.0]", ["recordings[2].motion.flap"], ["sine_deg 2", "fill up"]),
     "order": ("order: 2", "order: 2.5", ["low_pass.order"], ["number 2.5", "1, 2, 3"]),
     "cutoff unit": ("cutoff_hz: 40.0", "cutoff_rad_s: 250", ["low_pass.cutoff_rad_s"], ["'cutoff_hz'"]),
+    "cutoff below the beat": (
+        "cutoff_hz: 40.0",
+        "cutoff_hz: 12",
+        ["recordings/slow.csv"],
+        ["is 12 Hz, below the flap frequency, 12.5 Hz", "leave low_pass out"],
+    ),
     "cutoff": ("cutoff_hz: 40.0", "cutoff_hz: 125", ["recordings/slow.csv"], ["is 125 Hz", "sampling rate, 125 Hz"]),
     "rig": ("rig: free_flight", "rig: bath", ["recordings[2].rig"], ["'free_flight'"]),
     "velocities": ("velocities: mirrored", "velocities: other", ["vehicle.velocities"], ["'mirrored' or 'printed'"]),
@@ -88,6 +97,11 @@ def _rows(change: Callable[[list[str]], list[str]]) -> Files:
 
 def _scaled(factor: float) -> Files:
     return _rows(lambda row: [row[0], *(repr(factor * float(cell)) for cell in row[1:])])
+
+
+def _axis(factor: float) -> Files:
+    """Force z alone in another unit."""
+    return _rows(lambda row: [row[0], row[1], repr(factor * float(row[2]))])
 
 
 def _cell(line: int, column: int, cell: str) -> Files:
@@ -113,9 +127,16 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["there is no force"]),
     "decimal commas": (lambda: vehicle_csv("0.0,0.1", "0,0,0,1"), ["line 2"], ["5 cells", "decimal commas"]),
     "semicolons": (lambda: vehicle_csv(",", ";"), ["line 1"], ["semicolons"]),
-    "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 8.532] N", "convert"]),
-    "values in gf": (lambda: _scaled(101.97), [FORCES], ["gram-force"]),
-    "values in MN": (lambda: _scaled(1e-7), [FORCES], ["kilonewtons", "weighs 0.1706 N"]),
+    "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 0.8532] N", "convert"]),
+    "values in gf": (lambda: _scaled(101.97), [FORCES], ["force_x_n is typically", "looks like gram-force"]),
+    "weak values in gf": (lambda: _scaled(0.1 * 101.97), [FORCES], ["looks like gram-force"]),
+    "one axis in gf": (lambda: _axis(101.97), [FORCES], ["force_z_n is typically 3.", "looks like gram-force"]),
+    "values in MN": (lambda: _scaled(1e-7), [FORCES], ["a much larger unit", "weighs 0.1706 N"]),
+    "zero": (
+        lambda: _scaled(0.0),
+        [FORCES],
+        ["force_x_n and force_z_n are zero throughout", "leave the recording out"],
+    ),
     "empty column": (lambda: _rows(lambda row: [row[0], row[1], ""]), [FORCES], ["force_z_n has no value", "remove"]),
     "nothing": (lambda: _rows(lambda row: [row[0], "", ""]), [FORCES], ["no force at all"]),
     "milliseconds": (lambda: _rows(lambda row: [repr(float(row[0]) / 1e3), *row[1:]]), [FORCES], ["0.00 beats"]),
@@ -124,6 +145,7 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
         [f"{FORCES}, line 9"],
         ["0.0075188 s after", "typically 0.0037594 s", "a row with empty cells"],
     ),
+    "times in ms": (lambda: _rows(lambda row: [repr(float(row[0]) * 1e3), *row[1:]]), [FORCES], ["not milliseconds"]),
     "few digits": (lambda: _rows(lambda row: [f"{float(row[0]):.3f}", *row[1:]]), [FORCES], ["more digits"]),
     "few frames": (lambda: {**good_vehicle(), FORCES: "\n".join([HEADER, *ROWS[:7]]).encode()}, [FORCES], ["7 frames"]),
 }
@@ -147,6 +169,26 @@ def test_each_mistake_of_the_description_is_named(what: str, tmp_path: Path) -> 
 def test_each_mistake_of_the_numbers_is_named(what: str, tmp_path: Path) -> None:
     make, places, words = FILES[what]
     _assert_named(error_of(make(), tmp_path), places, words)
+
+
+def test_an_axis_may_be_zero_beside_a_good_one() -> None:
+    read = load_archive(zipped(_axis(0.0)), "a.zip").recording("hover")
+    assert not read.values[:, 1].any()
+    assert read.values[:, 0].all()
+
+
+@pytest.mark.parametrize(("rate_hz", "fine"), [(4.0, True), (3.8, False)])
+def test_four_samples_show_a_beat(rate_hz: float, fine: bool) -> None:
+    faults, recording = Faults(), delfly_dataset().recordings[0]
+    slow = replace(recording, times=np.arange(60) / (rate_hz * recording.condition.flap_frequency))
+    check_numbers(slow, delfly(), "hover", str, faults)
+    assert [fault.message.partition(" of ")[0] for fault in faults.kept] == (
+        [] if fine else ["the sampling rate is 50.54 Hz, 3.8 samples in a beat"]
+    )
+
+
+def test_a_single_wing_may_clap_with_a_mirror() -> None:
+    assert load_archive(zipped(vehicle_yaml("layout: x4", "layout: single")), "a.zip").vehicle.claps
 
 
 def test_a_wrong_unit_is_one_mistake(tmp_path: Path) -> None:

@@ -272,6 +272,7 @@ def test_numbers() -> None:
     assert [duration(s) for s in (None, 7.4, 192, 3765)] == ["–", "0:07", "3:12", "1:02:45"]
     assert [mm(v) for v in (None, 2.346)] == ["–", "2.35"]
     assert [number(v) for v in (None, 12345678.0, 0.25)] == ["–", "1.235e+07", "0.25"]
+    assert [number(v, 2, "%") for v in (109.6, 12.34, 3456.7, -0.0)] == ["110 %", "12 %", "3457 %", "0 %"]
     assert number(3.0, unit="Hz") == "3 Hz"
 
 

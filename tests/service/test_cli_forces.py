@@ -6,11 +6,15 @@ import csv
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from plotly.graph_objects import Figure
 
 from records import load_dataset
 from service.client import Client, WingfitError
+from service.commands.force_plot import write_plot
+from service.commands.rounding import correlation, force_unit, kept, with_unit
 from sim.balance import TRIALS, read_truth
 from tests.service import force_data
 from tests.service.processes import ServerProcess
@@ -74,6 +78,9 @@ def test_submit_with_every_option(wingfit: Wingfit, client: Client, dataset_id: 
 def test_what_is_left_out_is_decided_by_the_server(wingfit: Wingfit, run_id: str, dataset_id: str) -> None:
     shown = wingfit("runs", "show", run_id)[1]
     assert "method gauss_newton" in shown
+    assert "preset proposed, peel_width_beats 0.0, max_generations 200, axes x, mode local" in " ".join(shown.split())
+    for foreign in ("division", "bounds_factor", "accuracy_mm", "population", "stall", "tolerance", "seed", "finish"):
+        assert f" {foreign} " not in shown, foreign
     assert " mN RMS" in shown
     assert " mN" in wingfit("runs", "list", "--dataset", dataset_id)[1]
     assert "body pitch" in wingfit("datasets", "show", dataset_id)[1]
@@ -96,12 +103,12 @@ def test_the_result_as_tables(wingfit: Wingfit, client: Client, run_id: str) -> 
         if (a["recording"], a["quantity"]) == (force_data.HELD_OUT, "lift")
     }
     assert held.split()[4] == "–", "nothing was estimated on a recording that was held out"
-    assert held.split()[5] == f"{1e3 * (said['global'] or 0):.2f}"
+    assert held.split()[5] == f"{1e3 * (said['global'] or 0):.3g}"
     lift = next(a for a in result["agreements"] if (a["quantity"], a["source"]) == ("lift", "local"))
     means = lines[next(k for k, line in enumerate(lines) if line.startswith("mean lift over a beat")) :]
     row = next(line for line in means if line.startswith(lift["recording"]))
-    assert row.split()[1] == f"{1e3 * (lift['mean_recorded_n'] or 0):.2f}"
-    assert f"{1e3 * (lift['mean_modelled_n'] or 0):.2f} ({lift['correlation']:.4g})" in row
+    assert row.split()[1] == f"{1e3 * (lift['mean_recorded_n'] or 0):.3g}"
+    assert f"{1e3 * (lift['mean_modelled_n'] or 0):.3g} ({correlation(lift['correlation'])})" in row
     assert "fitted from 10.3 to 13.3 Hz" in out
     assert err.count("scatter cannot be told") == 1
     assert json.loads(wingfit("runs", "result", run_id, "--json")[1]) == result
@@ -121,6 +128,7 @@ def test_forces_as_table_csv_and_page(wingfit: Wingfit, client: Client, run_id: 
     text = page.read_text()
     assert "lift, spectrum" in text
     assert "<script src=" not in text
+    assert "between beats" in text
     assert json.loads(wingfit("runs", "forces", run_id, "--json")[1]) == client.forces(run_id)
     assert wingfit("runs", "forces", run_id, "--source", "best")[0] == 2
     assert wingfit("runs", "forces", run_id, "--plot", "x.png")[0] == 2
@@ -135,7 +143,7 @@ def test_predict(wingfit: Wingfit, client: Client, run_id: str, tmp_path: Path) 
     assert code == 0
     found = client.predict(run_id, flap_frequency_hz=14.0, body_pitch_deg=72.0, airspeed_m_s=0.6, pressure_mbar=900.0)
     assert f"warning: {found['warnings'][0]}" in err
-    assert f"{1e3 * found['averages_n']['lift']:.2f}" in out
+    assert f"{1e3 * found['averages_n']['lift']:.3g}" in out
     assert [float(row["drag_n"]) for row in csv.DictReader(beat.open())] == found["drag_n"]
     thinner = client.predict(
         run_id, flap_frequency_hz=14.0, body_pitch_deg=72.0, airspeed_m_s=0.6, pressure_mbar=900.0, temperature_c=60.0
@@ -190,3 +198,41 @@ def test_a_balance_campaign_is_written_with_its_truth(wingfit: Wingfit, tmp_path
     code, out, _ = wingfit("datasets", "check", str(tmp_path / "mine"))
     assert (code, "vehicle 'delfly'" in out) == (0, True)
     assert wingfit("balance", str(tmp_path / "mine"))[0] == 1
+
+
+def test_forces_of_any_size_keep_three_digits() -> None:
+    assert [kept(v) for v in (None, 0.0, -0.0, 0.05, 12.0, 9.996, 385051.8)] == [
+        "–", "0", "0", "0.0500", "12.0", "10.0", "385052",
+    ]  # fmt: skip
+    assert [with_unit(v) for v in (5e-5, 0.0312, -0.9, 385051.8, 0.0)] == [
+        "50.0 µN", "31.2 mN", "-900 mN", "385052 N", "0 mN",
+    ]  # fmt: skip
+    small = force_unit([3.1e-5, None, 4.4e-4])
+    assert (small.name, small.show(3.1e-5), small.show(4.4e-4), small.show(None)) == ("µN", "31.0", "440", "–")
+    assert [correlation(v) for v in (1 - 1e-15, 0.99997, 0.99968, -0.00001, None)] == [
+        "1.0000", ">0.9999", "0.9997", "0.0000", "–",
+    ]  # fmt: skip
+
+
+def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    drawn: list[Figure] = []
+
+    def caught(figure: Figure, **_: object) -> str:
+        drawn.append(figure)
+        return ""
+
+    monkeypatch.setattr(Figure, "to_html", caught)
+    phase, recorded, spread = [0.0, 0.5], {"x": [1.0, 3.0]}, {"x": [0.1, 0.2]}
+    spectra = {"frequency_hz": [0.0, 1.0, 2.0], "recorded_spectrum_n2_hz": {"x": [9.0, 1e-2, 1e-5]}}
+    answer: Any = {"recording": "r", "source": "local", "phase": phase, "recorded_n": recorded, "spread_n": spread}
+    answer |= {"modelled_n": {"x": [1.0, 2.0]}, "modelled_spectrum_n2_hz": {"x": [9.0, 1e-3, 1e-36]}, **spectra}
+    write_plot(answer, tmp_path / "plot.html")
+    (figure,) = drawn
+    assert list(figure.data[0].y) == pytest.approx([1.1, 3.2, 2.8, 0.9])
+    assert list(figure.data[0].x) == [0.0, 0.5, 0.5, 0.0]
+    assert list(figure.layout.yaxis2.range) == pytest.approx([-10, -1.7])
+    assert figure.layout.yaxis2.exponentformat == "power"
+    write_plot(answer | {"spread_n": {}}, tmp_path / "plot.html")
+    assert [trace.name for trace in drawn[1].data] == ["recorded", "modelled", "recorded", "modelled"]

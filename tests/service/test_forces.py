@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calibration.search import CalibrationSpec, resolved
 from records import LowPass, Recording
 from service.app import create_app
 from service.force_schemas import (
@@ -24,6 +25,7 @@ from service.force_schemas import (
 from service.schemas import DatasetOut, RunOut
 from service.settings import Settings
 from service.spec_schemas import Preset
+from service.spec_views import run_name
 from sim.balance import TRIALS
 from sim.blades.terms import PRESETS, TERMS
 from sim.lift_drag import lift_drag
@@ -89,7 +91,7 @@ def test_a_dataset_of_forces_is_described(dataset: Json) -> None:
 
 def test_what_is_left_open_is_decided_and_shown(api: Api, local: Json) -> None:
     run = RunOut.model_validate(local)
-    assert (run.kind, run.best_mm, run.name) == ("forces", None, "delfly, proposed")
+    assert (run.kind, run.best_mm, run.name) == ("forces", None, "delfly, proposed, local")
     spec = run.spec
     assert (spec.mode, spec.method, spec.preset, spec.axes) == ("local", "gauss_newton", "proposed", ["x"])
     assert (spec.low_pass_hz, spec.finish, spec.without, spec.peel_width_beats) == (None, False, [], 0.0)
@@ -371,6 +373,9 @@ def test_a_simulation_that_cannot_be_meant(api: Api, dataset: Json, body: Json, 
         ({"division": "4"}, "body.division", "means nothing for a vehicle"),
         ({"accuracy_mm": 0.2}, "body.accuracy_mm", "means nothing for a vehicle"),
         ({"finish": 1}, "body.finish", "boolean"),
+        ({"finish": True}, "body.finish", "gauss_newton, which searches nothing"),
+        ({"method": "gauss_newton", "population": 20}, "body.population", "leave it out, or use genetic or cma_es"),
+        ({"stall": 3}, "body.stall", "searches nothing"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_refused(
@@ -388,6 +393,7 @@ def test_a_specification_that_does_not_fit_is_refused(
 def test_a_search_followed_by_gauss_newton(api: Api, dataset: Json) -> None:
     options: Json = {"method": "cma_es", "finish": True, "population": 6, "max_generations": 5, "genes": ["C_l", "C_F"]}
     run = finished(api, dataset, recordings=["test-4"], axes=["x", "z"], low_pass_hz=40, **options)
+    assert run["name"] == "delfly, proposed, local, CMA-ES finished by Gauss-Newton"
     assert [item["stage"] for item in api.history(run["id"])][:6] == ["test-4"] * 5 + ["test-4, Gauss-Newton"]
     (estimate,) = api.get(f"/v1/runs/{run['id']}/result")["estimates"]
     assert [c["name"] for c in estimate["coefficients"]] == ["C_l", "C_F"]
@@ -423,3 +429,16 @@ def test_settings_of_a_vehicle_are_refused_for_a_wing(tmp_path: Path) -> None:
         assert (forces.status_code, "/comparison" in forces.json()["detail"]) == (409, True)
         body = {"flap_frequency_hz": 12.5, "body_pitch_deg": 71.0, "airspeed_m_s": 0.65}
         assert client.post(f"/v1/runs/{run['id']}/predictions", json=body).status_code == 409
+
+
+@pytest.mark.parametrize(
+    ("spec", "name"),
+    [
+        ({}, "delfly, proposed, local"),
+        ({"without": ("clap_and_peel",), "mode": "joint"}, "delfly, proposed without clap_and_peel, joint"),
+        ({"preset": "dickinson", "method": "genetic"}, "delfly, dickinson, local, genetic"),
+    ],
+)
+def test_a_run_without_a_name_is_named_after_what_tells_it_from_others(spec: Json, name: str) -> None:
+    given = force_data.dataset()
+    assert run_name(given, resolved(CalibrationSpec(**spec), given)) == name

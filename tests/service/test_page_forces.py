@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from service.app import create_app
+from service.commands.rounding import correlation, kept, with_unit
 from service.settings import Settings
 from tests.records.samples import falcon_dataset
 from tests.service import force_data
@@ -18,7 +19,7 @@ from tests.service.conftest import Api, serving
 from workers import make_evaluator
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Route
 
 PATIENCE = 120.0
 
@@ -96,11 +97,11 @@ def test_convergence_and_outcome_are_in_millinewtons(seen: Seen, api: Api, local
     assert drawn == pytest.approx([item["best"] for item in history])
     assert seen.data("history", 1, "y").count(None) == len(force_data.FITTED) - 1  # no line joins two recordings
     assert set(seen.data("history", 0, "y")) == {None}  # an iteration has no mean beside it
-    assert f"RMS {history[-1]['best_mn']:.2f} mN" in seen.data("history", 1, "text")[-1]
+    assert f"RMS {with_unit(history[-1]['best_mn'] / 1e3)}" in seen.data("history", 1, "text")[-1]
     names = seen.page.evaluate("document.getElementById('history').layout.annotations.map((a) => a.text)")
     assert set(force_data.FITTED) <= set(names)
     seen.wait("document.getElementById('numbers').textContent.includes('held out')")
-    assert f"{result['after_mn']:.2f}" in seen.page.inner_text("#numbers")
+    assert kept(result["after_mn"]) in seen.page.inner_text("#numbers")
     about = seen.page.inner_text("#run-about")
     assert "fitted to x" in about
     assert "low-pass at 3.2 × flap frequency" in about
@@ -148,10 +149,8 @@ def test_the_correlation_of_the_chosen_estimate_can_be_read(seen: Seen, local: s
     for name in (force_data.FITTED[0], force_data.FITTED[-1]):
         seen.page.select_option("#estimate", name)
         estimate = next(e for e in result["estimates"] if e["name"] == name)
-        expected = [[f"{value:.2f}" for value in row] for row in estimate["correlation"]]
-        assert [[cell.replace("-0.00", "0.00") for cell in row[1:]] for row in seen.rows("correlation")] == [
-            [cell.replace("-0.00", "0.00") for cell in row] for row in expected
-        ]
+        expected = [[correlation(value) for value in row] for row in estimate["correlation"]]
+        assert [row[1:] for row in seen.rows("correlation")] == expected
         noise = math.sqrt(estimate["noise_mn2"][0][0][0])
         assert f"{noise:.3g} mN" in seen.page.inner_text("#correlation-note")
 
@@ -201,12 +200,57 @@ def test_the_agreement_table_has_every_model(seen: Seen, local: str, result: dic
     entries = [_agreement(result["agreements"], first, source, quantity) for source in ("local", "global")]
     entries.append(_agreement(result["left_out"], first, "global", quantity))
     entries += [_agreement(result["agreements"], first, source, quantity) for source in ("average", "nominal")]
-    expected = [(f"{a['rmse_n']:.4f}", f"{a['rmse_percent']:.1f}", f"{a['correlation']:.2f}") for a in entries]
+    shown = seen.page.evaluate("[...document.querySelectorAll('#agreement thead th')].map((c) => c.textContent)")
+    assert "mN" in shown
+    expected = [(kept(1e3 * a["rmse_n"]), kept(a["rmse_percent"]), correlation(a["correlation"])) for a in entries]
     assert rows[first] == [cell for entry in expected for cell in entry]
     assert rows[force_data.HELD_OUT][:3] == ["–", "–", "–"]
     means = {row[0].removesuffix(" held out"): row[1:] for row in seen.rows("averages")}
-    shown = [f"{entries[0]['mean_recorded_n']:.4f}", *(f"{a['mean_modelled_n']:.4f}" for a in entries)]
-    assert means[first] == shown
+    forces = [entries[0]["mean_recorded_n"], *(a["mean_modelled_n"] for a in entries)]
+    assert means[first] == [kept(1e3 * force) for force in forces]
+    assert seen.page.inner_text("#averages-title") == "Average over the beat, mN"
+
+
+def test_forces_of_a_small_vehicle_keep_their_digits(seen: Seen, local: str) -> None:
+    def shrink(route: Route) -> None:
+        answer = route.fetch()
+        body = answer.json()
+        for one in [*body["agreements"], *body["left_out"]]:
+            for key in ("rmse_n", "mean_recorded_n", "mean_modelled_n"):
+                one[key] = 1e-4 * one[key]
+        for key in ("before_mn", "after_mn", "held_out_before_mn", "held_out_after_mn"):
+            body[key] = 1e-4 * body[key]
+        route.fulfill(response=answer, json=body)
+
+    seen.page.route("**/result", shrink)
+    seen.open(local)
+    seen.wait("document.querySelectorAll('#agreement tbody tr').length > 1")
+    assert "µN" in seen.page.inner_text("#agreement thead")
+    assert "µN" in seen.page.inner_text("#averages-title")
+    assert "µN" in seen.page.inner_text("#numbers")
+    for row in seen.rows("agreement")[:-1]:
+        assert all(len(cell.lstrip("0.").replace(".", "")) >= 3 for cell in row[1::3] if cell != "–"), row
+
+
+def test_tables_are_seen_in_full_and_axes_have_ticks(browser: Browser, api: Api, local: str) -> None:
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    seen = Seen.watched(context.new_page(), _base(api))
+    seen.open(local)
+    seen.wait(DRAWN.format("by-pitch", 8))
+    seen.wait(DRAWN.format("history", 1))
+    for table in ("law", "agreement", "averages"):
+        frame = f"document.getElementById('{table}').parentElement"
+        needed, there = seen.page.evaluate(f"[{frame}.scrollWidth, {frame}.clientWidth]")
+        assert needed <= there, table
+    for axis, least in (("x", 2), ("y", 3)):
+        layout = f"document.getElementById('history').layout.{axis}axis"
+        ticks, (low, high) = seen.page.evaluate(f"{layout}.tickvals"), seen.page.evaluate(f"{layout}.range")
+        inside = [t for t in ticks if low <= (t if axis == "x" else math.log10(t)) <= high]
+        assert len(inside) >= least, axis
+        shown = ".xtick" if axis == "x" else ".ytick"
+        names = seen.page.evaluate(f"[...document.querySelectorAll('#history {shown} text')].map((t) => t.textContent)")
+        assert len(set(names)) == len(names) >= least, names
+    context.close()
 
 
 def test_prediction_within_outside_and_far_outside(seen: Seen, api: Api, local: str) -> None:
@@ -222,7 +266,7 @@ def test_prediction_within_outside_and_far_outside(seen: Seen, api: Api, local: 
     assert not seen.page.is_visible("#prediction-warnings")
     assert seen.data("prediction-lift", 0, "y") == pytest.approx(expected["lift_n"])
     assert seen.data("prediction-x", 1, "y") == pytest.approx(expected["z_n"])
-    assert f"{expected['averages_n']['lift']:.3g}" in seen.page.inner_text("#prediction-numbers")
+    assert kept(1e3 * expected["averages_n"]["lift"]) in seen.page.inner_text("#prediction-numbers")
     seen.page.fill("[name=flap_frequency_hz]", "13.6")
     seen.page.click("#prediction-form [type=submit]")
     seen.wait("document.getElementById('prediction-warnings').textContent.includes('extrapolation')")

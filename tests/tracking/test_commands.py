@@ -192,6 +192,37 @@ def test_wrong_tables_are_told(
     assert all(word in err for word in expected), err
 
 
+def test_a_body_file_lacks_the_columns_of_angles(wingfit: Wingfit, flight: tuple[Path, Path]) -> None:
+    code, _, err = wingfit("kinematics", flight[1])
+    assert code == 1
+    assert "body.csv, line 1: there is no column 'time_s', no 'flap_angle_deg', no 'wing_pitch_deg'" in err
+    assert "known: marker, x_m, y_m, z_m" in err
+    code, _, err = wingfit("forces", flight[1], "--body", flight[1], "--mass-kg", 0.0174, "--flap-hz", FREQUENCY)
+    assert code == 1
+    assert "body.csv, line 1: there is no column 'time_s', no 'nose_x_m'" in err
+    assert "'nose_y_m', no 'nose_z_m', no 'trailing_x_m', no 'trailing_y_m', ...;" in err
+
+
+def test_angles_in_radians_are_remarked_on(wingfit: Wingfit, table: Path, tmp_path: Path) -> None:
+    assert "radians" not in wingfit("kinematics", table)[1]
+    rows = np.loadtxt(table, delimiter=",", skiprows=1)
+    rows[:, 1:] = np.radians(rows[:, 1:])
+    path = write(tmp_path / "radians.csv", ["time_s", "flap_angle_deg", "wing_pitch_deg"], rows)
+    code, shown, _ = wingfit("kinematics", path)
+    assert code == 0
+    assert "note: flap_angle_deg ranges over 0.6" in shown
+    assert "deg only; if these are radians, convert to degrees" in shown
+
+
+def test_tracks_in_millimetres_are_refused(wingfit: Wingfit, flight: tuple[Path, Path], tmp_path: Path) -> None:
+    rows = np.genfromtxt(flight[0], delimiter=",", skip_header=1)
+    rows[:, 1:] *= 1e3
+    path = write(tmp_path / "mm.csv", columns(NAMES), rows)
+    code, _, err = wingfit("forces", path, "--body", flight[1], "--mass-kg", 0.0174, "--flap-hz", FREQUENCY)
+    assert code == 1
+    assert "looks like millimetres in the tracks" in err
+
+
 @pytest.mark.parametrize(("name", "command"), [("kinematics", kinematics), ("forces", forces)])
 def test_help_holds_an_example(wingfit: Wingfit, name: str, command: Callable[..., None]) -> None:
     assert f"Example: wingfit {name}" in (command.__doc__ or "")

@@ -11,6 +11,7 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from records import LowPass
+from records.vehicle_file import VehicleRecordingFile
 from tests.tracking.signals import noise
 from tracking.free_flight import Body, FreeFlight, free_flight, recording
 from tracking.rigid_body import poses
@@ -228,3 +229,47 @@ def test_tracks_that_cannot_give_forces_are_refused(change: dict[str, Any], word
     with pytest.raises(ValueError, match=words[0]) as error:
         free_flight(t, tracks, Body(shape, CENTRE, 0.0174), LowPass(change.get("cutoff", 40.0)))
     assert all(word in str(error.value) for word in words)
+
+
+@pytest.mark.parametrize(
+    ("tracks", "body", "said"),
+    [
+        (1e3, 1.0, "1000 times as far apart as the body file says.*millimetres in the tracks"),
+        (1e2, 1.0, "100 times.*centimetres in the tracks"),
+        (10.0, 1.0, "10 times.*decimetres in the tracks"),
+        (3.2808, 1.0, "3.281 times.*the tracks or the body file are in another unit"),
+        (1.0, 10.0, "0.1 times.*decimetres in the body file"),
+        (1.0, 1e3, r"body file spread over 204\.5 m; it must be at most 10 m.*not millimetres"),
+        (0.7, 1.0, "0.7 times"),
+    ],
+)
+def test_other_units_than_metres_are_refused(tracks: float, body: float, said: str) -> None:
+    given = Body(body * MARKERS, body * CENTRE, 0.0174)
+    with pytest.raises(ValueError, match=said):
+        free_flight(times(120), tracks * still(120), given, FILTER)
+
+
+def test_a_scale_that_is_a_little_off_is_remarked_on() -> None:
+    said = [free_flight(times(120), scale * still(120), BODY, FILTER).remarks for scale in (1.0, 1.03, 1.1)]
+    assert said[:2] == [(), ()]
+    assert said[2][:1] == (
+        "the markers are seen 1.1 times as far apart as the body file says; check the cameras' scale",
+    )
+
+
+def test_swapped_markers_do_not_change_the_scale() -> None:
+    tracks = still(120)
+    tracks[:30, [0, 4]] = tracks[:30, [4, 0]]
+    assert not any("as far apart" in remark for remark in free_flight(times(120), tracks, BODY, FILTER).remarks)
+
+
+@pytest.mark.parametrize(("speed", "fine"), [(99.0, True), (101.0, False)])
+def test_nothing_flies_faster_than_a_dataset_takes(speed: float, fine: bool) -> None:
+    limits = VehicleRecordingFile.model_fields["airspeed_m_s"].metadata
+    assert any(getattr(limit, "high", None) == 100 for limit in limits), limits
+    tracks = seen_from(np.outer(times(120), [0, speed, 0]), np.broadcast_to(LEVEL, (120, 3, 3)))
+    if fine:
+        free_flight(times(120), tracks, BODY, FILTER)
+        return
+    with pytest.raises(ValueError, match=r"flies at 101 m/s; it must be at most 100 m/s.*metres.*seconds"):
+        free_flight(times(120), tracks, BODY, FILTER)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -152,3 +153,50 @@ def test_too_little_for_a_frequency_is_refused(change: dict[str, Any], words: tu
     with pytest.raises(ValueError, match=words[0]) as error:
         flap_frequency(seen.times, seen.flap)
     assert all(word in str(error.value) for word in words)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.9])
+@pytest.mark.parametrize("samples", [40, 600])
+def test_no_frequency_is_found_in_noise(decay: float, samples: int) -> None:
+    believed = 0
+    for seed in range(20):
+        draw = noise(np.random.default_rng(seed), (samples,), 0.005, 0.02 * (decay > 0), decay)
+        with contextlib.suppress(ValueError):
+            flap_frequency(np.arange(samples) / 1200, draw)
+            believed += 1
+    assert believed <= 1
+    with pytest.raises(ValueError, match=r"no flap frequency stands out: the strongest period, .* Hz, is what noise"):
+        flap_frequency(np.arange(samples) / 1200, np.random.default_rng(7).normal(0, 0.005, samples))
+
+
+def test_a_weak_motion_is_found_in_noise() -> None:
+    t = np.arange(1200) / 1200
+    for seed in range(5):
+        y = 0.02 * np.sin(2 * np.pi * FREQUENCY * t) + noise(np.random.default_rng(seed), t.shape, 0.03, 0, 0)
+        assert flap_frequency(t, y).hertz == pytest.approx(FREQUENCY, abs=0.2)
+
+
+@pytest.mark.parametrize("frequency", [None, 12.5])
+def test_constant_angles_are_no_motion(frequency: float | None) -> None:
+    still = Angles(np.arange(600) / 1200, np.full(600, 0.5), np.full(600, 1.2))
+    with pytest.raises(ValueError, match=r"28\.65 deg throughout: there is no motion"):
+        wing_motion(still, frequency)
+
+
+def test_a_constant_pitch_is_one() -> None:
+    given = angles()
+    found = wing_motion(Angles(given.times, given.flap, np.full_like(given.flap, 1.2)), FREQUENCY)
+    assert isinstance(found.motion.pitch, FourierPitch)
+    assert found.motion.pitch.mean == pytest.approx(1.2)
+
+
+def test_a_given_frequency_that_explains_little_is_remarked_on() -> None:
+    assert not any("explains" in remark for remark in wing_motion(angles(), FREQUENCY).remarks)
+    (remark,) = (r for r in wing_motion(angles(), 17.0).remarks if "explains" in r)
+    share = int(remark.partition("explains ")[2].split()[0])
+    assert share < 10
+    assert "given, 17 Hz" in remark
+    assert "shows 12.3" in remark
+    flat = noise(np.random.default_rng(3), (960,), 0.02, 0, 0)
+    (remark,) = (r for r in wing_motion(Angles(angles().times, flat, flat), 17.0).remarks if "explains" in r)
+    assert "shows none" in remark
