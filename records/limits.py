@@ -54,7 +54,7 @@ IMPLAUSIBLE_SPANS = 1.5
 MAX_OPEN_AT_START = 0.1
 """How far wings that clap may be open where the beat starts, as a part of the range of their flap angle."""
 
-IMPLAUSIBLE_WEIGHTS = 5
+IMPLAUSIBLE_WEIGHTS = 10
 """Forces along an axis above this many weights of the vehicle (root mean square) were not recorded in newtons."""
 
 NEGLIGIBLE_WEIGHTS = 1e-6

@@ -127,9 +127,9 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["there is no force"]),
     "decimal commas": (lambda: vehicle_csv("0.0,0.1", "0,0,0,1"), ["line 2"], ["5 cells", "decimal commas"]),
     "semicolons": (lambda: vehicle_csv(",", ";"), ["line 1"], ["semicolons"]),
-    "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 0.8532] N", "convert"]),
+    "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 1.706] N", "convert"]),
     "values in gf": (lambda: _scaled(101.97), [FORCES], ["force_x_n is typically", "looks like gram-force"]),
-    "weak values in gf": (lambda: _scaled(0.1 * 101.97), [FORCES], ["looks like gram-force"]),
+    "weak values in gf": (lambda: _scaled(0.2 * 101.97), [FORCES], ["looks like gram-force"]),
     "one axis in gf": (lambda: _axis(101.97), [FORCES], ["force_z_n is typically 3.", "looks like gram-force"]),
     "values in MN": (lambda: _scaled(1e-7), [FORCES], ["a much larger unit", "weighs 0.1706 N"]),
     "zero": (
