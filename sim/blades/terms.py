@@ -128,13 +128,13 @@ PRESETS = {
             "berman_wang",
             ("inertial", "translation", "rotation", "added_mass", "viscous"),
             BERMAN,
-            "single wings that do not meet; the seed's baseline",
+            "single wings that do not meet; the baseline of Armanini et al. (2016)",
         ),
         Preset(
             "dickinson",
             ("steady_curves", "rotation", "added_mass"),
             f"{DICKINSON}; {SANE}",
-            "measured steady curves, rotational circulation and added mass (Table 2 of the seed)",
+            "measured steady curves, rotational circulation and added mass (Table 2 of Armanini et al.)",
         ),
     )
 }
