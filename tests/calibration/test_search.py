@@ -13,17 +13,15 @@ from scipy.signal import lfilter
 from calibration.evaluator import as_batch, gather, run_unit, units
 from calibration.linearised import linearise, unit_at
 from calibration.noise import noise_distance
-from calibration.plan import prepared
 from calibration.problem import Evaluation, Problem, base_genome, misfit
 from calibration.result import compare, judge
 from calibration.search import CalibrationSpec, calibrate, found, plan, resolved
 from calibration.spec import wing_model
 from calibration.uncertainty import standing
-from records import Condition, Dataset, Gene, Genome, LowPass, Recording
+from records import Condition, Dataset, Gene, Genome, Recording
 from sim.flexible_wing import FlexibleWing
 from sim.rig import Tracking, _noise
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
-from tests.calibration.conftest import FORCE_TRUTHS
 
 SPEC = CalibrationSpec(division="4", population=16, max_generations=4, seed=7)
 THREE = ("E_r", "G_f", "L_a")
@@ -165,61 +163,6 @@ def test_cma_es_searches_too_and_resumes(small: tuple[Dataset, Genome]) -> None:
     for cut in (1, 4, 6):
         checkpoint = json.loads(json.dumps(whole[cut - 1].checkpoint, allow_nan=False))
         assert list(calibrate(spec, dataset, Here(), checkpoint)) == whole[cut:]
-
-
-def test_each_recording_of_forces_is_a_stage_of_its_own(forces: Dataset) -> None:
-    whole = list(calibrate(CalibrationSpec(), forces, Here()))
-    stages = [r.name for r in forces.fitted]
-    assert list(dict.fromkeys(g.stage for g in whole)) == [f"{name}, Gauss-Newton" for name in stages]
-    last = {g.stage: g for g in whole}
-    assert list(whole[-1].checkpoint["found"]) == stages
-    for recording, truth in zip(forces.fitted, FORCE_TRUTHS, strict=False):
-        end = last[f"{recording.name}, Gauss-Newton"]
-        assert whole[-1].checkpoint["found"][recording.name] == end.genome
-        for name, value in truth.items():
-            assert end.genome[name] == pytest.approx(value, rel=0.05), name
-        fitted = prepared(CalibrationSpec(), recording)
-        assert end.distance == pytest.approx(np.sqrt(end.best / fitted.valid[:, 0].sum()))
-    assert whole[-1].progress == 1
-    cut = len([g for g in whole if g.stage.startswith(stages[0])])
-    for k in (1, cut, cut + 1):
-        checkpoint = json.loads(json.dumps(whole[k - 1].checkpoint, allow_nan=False))
-        assert list(calibrate(CalibrationSpec(), forces, Here(), checkpoint)) == whole[k:]
-
-
-def test_forces_together_have_one_genome(forces: Dataset) -> None:
-    *_, last = calibrate(CalibrationSpec(mode="joint", axes=("x", "z")), forces, Here())
-    assert last.stage == "joint, Gauss-Newton"
-    low, high = sorted(truth["C_l"] for truth in FORCE_TRUTHS)
-    assert low - 0.05 < last.genome["C_l"] < high + 0.05
-    assert last.checkpoint["found"] == {"joint": last.genome}
-
-
-def test_forces_are_low_passed_before_they_are_fitted(forces: Dataset) -> None:
-    (first, _) = plan(CalibrationSpec(), forces)
-    (record,) = first.recordings
-    assert record.low_pass == LowPass(3.2 * 12.5)
-    assert (
-        np.nanmax(np.abs(np.diff(record.values, axis=0))) < np.abs(np.diff(forces.recordings[0].values, axis=0)).max()
-    )
-    (wide, _) = plan(CalibrationSpec(low_pass=67.0), forces)
-    assert wide.recordings[0].low_pass == LowPass(67.0)
-    (raw, _) = plan(CalibrationSpec(low_pass=0.0), forces)
-    assert raw.recordings[0] is forces.recordings[0]
-    assert plan(CalibrationSpec(low_pass=67.0), replace(forces, recordings=(record, forces.recordings[1])))[
-        0
-    ].recordings == (record,)
-
-
-def test_what_a_vehicle_searches_and_what_is_refused(forces: Dataset) -> None:
-    assert plan(CalibrationSpec(), forces)[0].free == ("C_l", "C_r", "C_F")
-    assert plan(CalibrationSpec(without=("clap_and_peel",)), forces)[0].free == ("C_l", "C_r")
-    assert plan(CalibrationSpec(genes=("C_D0", "C_l")), forces)[0].free == ("C_l", "C_D0")
-    refused(CalibrationSpec(preset="best"), forces, "unknown model 'best'")
-    refused(CalibrationSpec(without=("lift",)), forces, "no term 'lift' to leave out")
-    refused(CalibrationSpec(axes=("y",)), forces, "'y' is to be fitted, but recording")
-    blind = [replace(r, values=np.full_like(r.values, np.nan)) for r in forces.recordings]
-    refused(CalibrationSpec(low_pass=0.0), replace(forces, recordings=tuple(blind)), "nothing to compare")
 
 
 def test_history_is_monotone_and_complete(small: tuple[Dataset, Genome]) -> None:

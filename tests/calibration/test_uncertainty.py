@@ -45,6 +45,21 @@ def together(samples: int, channels: int, rng: np.random.Generator) -> Array:
     return np.asarray(noise @ np.array([[1.0, 0.6], [0.0, 0.8]]))
 
 
+def fitted(given: Problem) -> tuple[list[float], list[float]]:
+    """Values of the best genome, and their standard errors."""
+    *_, last = iterate(given, HERE, {})
+    known = uncertainty(replace(given, base=given.base.replace(last.values)), HERE)
+    return list(last.values.values()), list(known.standard_errors.values())
+
+
+def assert_covered(found: list[tuple[list[float], list[float]]]) -> None:
+    """90 % intervals hold the truth in 85 to 95 % of all cases, and of each gene in 80 % at least."""
+    values, errors = np.moveaxis(np.array(found), 1, 0)
+    covered = np.abs(values - list(TRUTH.values())) <= NINETY * errors
+    assert 0.85 <= covered.mean() <= 0.95
+    assert covered.mean(axis=0).min() > 0.8
+
+
 @pytest.mark.parametrize(
     ("noise", "samples", "axes"),
     [(remembering, 800, "x"), (low_passed, 1000, "x"), (together, 800, "xz")],
@@ -52,17 +67,9 @@ def together(samples: int, channels: int, rng: np.random.Generator) -> Array:
 )
 def test_intervals_of_forces_cover_what_they_say(noise: Noise, samples: int, axes: str) -> None:
     """90 % intervals over 200 repetitions; bounds for white noise would cover about half."""
-    rng, off, errors = np.random.default_rng(5), [], []
-    for _ in range(200):
-        record = recorded(0.03 * noise(samples, len(axes), rng), axes)
-        given = problem(record)
-        *_, last = iterate(given, HERE, {})
-        known = uncertainty(replace(given, base=given.base.replace(last.values)), HERE)
-        off.append([last.values[name] - TRUTH[name] for name in TRUTH])
-        errors.append(list(known.standard_errors.values()))
-    covered = np.abs(off) <= NINETY * np.array(errors)
-    assert 0.85 <= covered.mean() <= 0.95
-    assert covered.mean(axis=0).min() > 0.8
+    rng = np.random.default_rng(5)
+    draws = (recorded(0.03 * noise(samples, len(axes), rng), axes) for _ in range(200))
+    assert_covered([fitted(problem(draw)) for draw in draws])
 
 
 def by_beat(beats: int, samples: int, rng: np.random.Generator) -> Array:
@@ -75,32 +82,22 @@ def by_beat(beats: int, samples: int, rng: np.random.Generator) -> Array:
 @pytest.mark.parametrize(("recordings", "beats"), [(1, 40), (4, 12)])
 def test_noise_that_follows_the_force_is_judged_from_beat_to_beat(recordings: int, beats: int) -> None:
     """Formulas for stationary noise would cover two thirds of the third gene."""
-    rng, off, errors = np.random.default_rng(7), [], []
+    rng, found = np.random.default_rng(7), []
     for _ in range(200 // recordings):
         several = tuple(recorded(by_beat(beats, 80, rng)) for _ in range(recordings))  # 80 ms at 1 kHz
-        given = replace(problem(several[0]), recordings=several)
-        *_, last = iterate(given, HERE, {})
-        known = uncertainty(replace(given, base=given.base.replace(last.values)), HERE)
-        off.append([last.values[name] - TRUTH[name] for name in TRUTH])
-        errors.append(list(known.standard_errors.values()))
-    covered = np.abs(off) <= NINETY * np.array(errors)
-    assert 0.85 <= covered.mean() <= 0.95
-    assert covered.mean(axis=0).min() > 0.8
+        found.append(fitted(replace(problem(several[0]), recordings=several)))
+    assert_covered(found)
 
 
 @pytest.mark.parametrize("beats", [5, 14, 30])
 def test_misfit_that_repeats_is_no_noise(beats: int) -> None:
     """Half as large as the force, it moves the estimate; it does not make the estimate vary."""
-    rng, found, errors = np.random.default_rng(8), [], []
+    rng = np.random.default_rng(8)
     t = np.arange(80 * beats) / 80
     misfit = 0.05 * np.cos(6 * np.pi * t) + 0.05 * np.cos(4 * np.pi * t + 1)
-    for _ in range(100):
-        given = problem(recorded(misfit[:, None] + 0.01 * remembering(80 * beats, 1, rng)))
-        *_, last = iterate(given, HERE, {})
-        known = uncertainty(replace(given, base=given.base.replace(last.values)), HERE)
-        found.append(list(last.values.values()))
-        errors.append(list(known.standard_errors.values()))
-    ratio = np.median(errors, axis=0) / np.std(found, axis=0)
+    draws = (recorded(misfit[:, None] + 0.01 * remembering(80 * beats, 1, rng)) for _ in range(100))
+    values, errors = np.moveaxis(np.array([fitted(problem(draw)) for draw in draws]), 1, 0)
+    ratio = np.median(errors, axis=0) / np.std(values, axis=0)
     assert 0.8 < ratio.min() < ratio.max() < 1.5
 
 
