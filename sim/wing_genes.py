@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from records import Gene
+from records import EstimateError, Gene
 from sim.kernels import LANES
 from sim.kernels.integrate import Lanes
 from sim.kernels.memory import aligned
@@ -52,7 +52,7 @@ def group(name: str) -> Group:
 
 
 def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[Gene, ...]:
-    """All genes, bounded by ``factor`` around the estimates; ValueError for an unknown or non-positive estimate."""
+    """All genes, bounded by ``factor`` around the estimates; EstimateError for an unknown or implausible estimate."""
     rows = [*_STRUCTURE, *_AERODYNAMICS]
     for prefix, what in (("L", "lift"), ("ID", "induced drag")):
         for k, share in enumerate(_SHARES, 1):
@@ -60,10 +60,10 @@ def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[
     known = [row[0] for row in rows]
     for name, value in estimates.items():
         if name not in known:
-            raise ValueError(f"estimate for unknown gene {name!r}; the flexible wing has {', '.join(known)}")
+            raise EstimateError(f"estimate for unknown gene {name!r}; the flexible wing has {', '.join(known)}")
         unit, typical = next((row[1], row[2]) for row in rows if row[0] == name)
         if not (np.isfinite(value) and typical / UNIT_SLIP <= value <= typical * UNIT_SLIP):
-            raise ValueError(
+            raise EstimateError(
                 f"estimate of gene {name!r} is {value:g} {unit}; it must lie in "
                 f"[{typical / UNIT_SLIP:g}, {typical * UNIT_SLIP:g}] {unit}: check its unit"
             )

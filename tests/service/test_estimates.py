@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from records import load_dataset
 from service.app import create_app
 from service.settings import Settings
 from tests.service import force_data
 from tests.service.conftest import Api, serving
 from workers import make_evaluator
+
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "robird"
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +41,14 @@ def test_a_submission_names_the_estimate(api: Api, estimates: dict[str, float], 
         assert error["where"] == "dataset.vehicle.estimates"
         assert said in error["message"]
         assert "change vehicle.estimates in dataset.yaml" in error["message"]
+
+
+def test_a_wings_estimate_is_named_too(api: Api) -> None:
+    wing = load_dataset(EXAMPLE)
+    spoilt = replace(wing, rig=replace(wing.wing, estimates={"E_r": 180.0}))  # in gigapascal
+    dataset = api.client.post("/v1/datasets", files={"file": ("robird.zip", force_data.zipped(spoilt))}).json()
+    answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]})
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    assert error["where"] == "dataset.wing.estimates"
+    assert "check its unit" in error["message"]
