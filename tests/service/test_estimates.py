@@ -15,7 +15,6 @@ from tests.service import force_data
 from tests.service.conftest import Api, serving
 from workers import make_evaluator
 
-
 EXAMPLE = Path(__file__).parents[2] / "examples" / "robird"
 
 
