@@ -25,15 +25,17 @@ TAPER = np.array([1.0, 1.0, 1.0, 0.5])  # of lags 0, 1, 2, 3 beats
 WHOLE = 0.9  # of the samples that most beats have: what a beat must have to count
 
 
-def beat_scores(record: Recording, white: Array, sensitivity: Array) -> tuple[Array, float]:
-    """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], zero where not seen.
+def beat_scores(
+    record: Recording, white: Array, sensitivity: Array, seen: npt.NDArray[np.bool_]
+) -> tuple[Array, float]:
+    """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], 0 where not ``seen``.
 
     Also the share of all samples seen that lies in whole beats.
     """
     beat = _beats(record)
     scores = np.zeros((int(beat[-1]) + 1, sensitivity.shape[2]))
     np.add.at(scores, beat, np.einsum("tcp,tc->tp", sensitivity, white))
-    count = np.bincount(beat, weights=(white != 0.0).any(axis=1))
+    count = np.bincount(beat, weights=seen.any(axis=1))
     whole = count >= WHOLE * np.median(count[count > 0])
     return scores[whole], float(count[whole].sum() / count.sum())
 

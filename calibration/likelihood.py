@@ -239,7 +239,7 @@ def _better(
         after[[reason is not None for reason in evaluation.reasons]] = np.inf
         promised = -(steps @ slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, curvature, steps)
         decrease = 0.5 * (power - after)
-        good = decrease > np.maximum(LEAST_GAIN * promised, 0.0)
+        good = (promised > 0.0) & (decrease > LEAST_GAIN * promised)  # at a bound a step may be round-off alone
         if good.any():
             k = int(np.argmax(np.where(good, decrease, -np.inf)))
             return _Move(

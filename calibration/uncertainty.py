@@ -118,6 +118,9 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
     nothing but this, and the others are judged as if it were known.
     """
     told = np.flatnonzero(linear.told)
+    covariance = np.eye(len(problem.free)) * PRIOR**2
+    if not len(told):
+        return covariance, ()
     records = problem.recordings
     parts = [
         _Part.of(record, n, residual, slope[:, :, told])
@@ -130,7 +133,6 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
         meat = sum(part.from_beat_to_beat(bread) for part in parts) * widening(beats)
     else:
         meat = _from_samples(parts, bread)
-    covariance = np.eye(len(problem.free)) * PRIOR**2
     covariance[np.ix_(told, told)] = bread @ (meat + prior) @ bread
     few = [p for p in parts if p.record.kind == "forces" and len(p.scores) < FEWEST]
     return covariance, tuple(
@@ -158,7 +160,7 @@ class _Part:
         white, sensitivity = noise.whitened(residual)[:, kept], whitened_sensitivity(noise, slope)[:, kept]
         scores, used = np.empty((0, slope.shape[2])), 1.0
         if record.kind == "forces":
-            scores, used = beat_scores(record, white, sensitivity)
+            scores, used = beat_scores(record, white, sensitivity, seen)
         return cls(record, white, sensitivity, seen[:, kept], scores, used)
 
     @property

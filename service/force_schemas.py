@@ -107,7 +107,7 @@ class ForceResultOut(BaseModel):
     held_out: list[str]
 
 
-class ForcesOut(BaseModel):
+class BeatOut(BaseModel):
     """Recorded mean beat (with the standard deviation between beats) and modelled one, and their spectra.
 
     ``phase`` is t*: 0 where the wings are closest. ``spread_n`` is empty with a single beat, spectra with no gapless
@@ -115,30 +115,26 @@ class ForcesOut(BaseModel):
     """
 
     recording: str
+    phase: Series
+    recorded_n: ByQuantity
+    spread_n: ByQuantity
+    modelled_n: ByQuantity
+    frequency_hz: Series
+    recorded_spectrum_n2_hz: ByQuantity
+    modelled_spectrum_n2_hz: ByQuantity
+    remarks: list[str]
+
+
+class ForcesOut(BeatOut):
+    """A beat of a run's coefficients, from ``source``."""
+
     source: Source
-    phase: Series
-    recorded_n: ByQuantity
-    spread_n: ByQuantity
-    modelled_n: ByQuantity
-    frequency_hz: Series
-    recorded_spectrum_n2_hz: ByQuantity
-    modelled_spectrum_n2_hz: ByQuantity
-    remarks: list[str]
 
 
-class ForceSimulationOut(BaseModel):
-    """As :class:`ForcesOut`, of a genome of the caller's, with its agreement in every quantity."""
+class ForceSimulationOut(BeatOut):
+    """A genome of the caller's beside a recording, with its agreement in every quantity."""
 
-    recording: str
     source: Literal["given"]
-    phase: Series
-    recorded_n: ByQuantity
-    spread_n: ByQuantity
-    modelled_n: ByQuantity
-    frequency_hz: Series
-    recorded_spectrum_n2_hz: ByQuantity
-    modelled_spectrum_n2_hz: ByQuantity
-    remarks: list[str]
     agreements: list[AgreementOut]
 
 

@@ -116,6 +116,18 @@ def test_a_gene_at_its_bound_leaves_the_others_their_errors() -> None:
     assert not any("c cannot be judged" in remark for remark in stopped.remarks)
 
 
+@pytest.mark.parametrize("beats", [5, 12, 40])
+def test_where_bounds_stop_every_gene_there_is_still_an_answer(beats: int) -> None:
+    noise = 0.001 * np.random.default_rng(0).normal(size=(80 * beats, 1))
+    given = replace(problem(recorded(noise), Linear(upper=1.1)), free=("c",))
+    found = estimate(given, HERE, {})
+    assert found.values == {"c": pytest.approx(1.1)}
+    assert found.uncertainty.standard_errors == {"c": np.inf}
+    assert found.remarks == (
+        "c is at its upper bound 1.1: the best value may lie beyond; the errors of the others take it as known",
+    )
+
+
 def test_few_beats_are_said() -> None:
     short, long = (recorded(0.03 * remembering(80 * beats, 1, np.random.default_rng(9))) for beats in (5, 30))
     assert any("5 whole beats, and fewer than 8 hardly tell" in r for r in estimate(problem(short), HERE, {}).remarks)
