@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,9 @@ import numpy.typing as npt
 from records import Gene, Recording, Wing
 from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from sim.division import Division
+from sim.effects.contract import Effect
+from sim.effects.observation import Sampling, apply, observed
+from sim.effects.registry import chosen
 from sim.model import Observation, Solution, genome_batch
 from sim.numerics import Numerics
 from sim.simulate import Beat, periodic_beats
@@ -20,6 +23,7 @@ from sim.wing_genes import FACTOR, wing_genes
 Array = npt.NDArray[np.float64]
 
 LARGEST_SHIFT = 0.05  # rad, about 3 degrees of the beat
+_GRID = 96  # instants of a beat that effects of the observation see
 _HARMONICS = 30  # of the periodic tracks that are kept; the rest is below the integrator's error
 
 
@@ -28,22 +32,36 @@ class FlexibleWing:
     """Multi-body wing driven by two rods (thesis III) for markers seen by cameras.
 
     ``division`` as :meth:`sim.division.Division.parse` reads it; genes are bounded by ``bounds_factor`` around the
-    wing's estimates.
+    wing's estimates. ``effects`` are names of :data:`sim.effects.registry.EFFECTS` whose genes are appended.
     """
 
     wing: Wing
     division: str = "11"
     bounds_factor: float = FACTOR
     numerics: Numerics = field(default_factory=Numerics)
+    effects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        chosen(self.effects, self.wing)
 
     def __getstate__(self) -> dict[str, object]:
         """Pickle the definition only; whatever was built from it is built again."""
-        return {name: self.__dict__[name] for name in ("wing", "division", "bounds_factor", "numerics")}
+        return {name: self.__dict__[name] for name in ("wing", "division", "bounds_factor", "numerics", "effects")}
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Structural genes (thesis Eq. 18), then aerodynamic ones (Eq. 19)."""
-        return wing_genes(self.wing.estimates, self.bounds_factor)
+        """Structural genes (thesis Eq. 18), aerodynamic ones (Eq. 19), then those of the effects."""
+        own = wing_genes(self.wing.estimates, self.bounds_factor)
+        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing)))
+
+    @cached_property
+    def chosen(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they act."""
+        return chosen(self.effects, self.wing)
+
+    def with_effects(self, *names: str) -> FlexibleWing:
+        """The same wing with more effects; their genes are appended, switched off."""
+        return replace(self, effects=(*self.effects, *names))
 
     @property
     def searched(self) -> tuple[str, ...]:
@@ -73,21 +91,48 @@ class FlexibleWing:
         Beats are aligned by the upstroke crossing; what tracking noise leaves of a phase error is then fitted, the
         trigger of the cameras being unknown (docs/decisions/0001).
         """
-        beats = self.beats(genomes, recording)
-        names = [marker.name for marker in self.wing.markers]
-        columns = [names.index(name) for name in recording.markers]
-        series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])
+        batch = genome_batch(self.genes, genomes)
+        beats = self.beats(batch, recording)
+        series, times, added = self._seen(batch, recording, beats)
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
-        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-        since = psi - recorded_crossing(self.wing, recording)
+        since = 2 * np.pi * recording.condition.flap_frequency * times - recorded_crossing(self.wing, recording)
         reasons = tuple(
             beat.reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
             for beat, phase in zip(beats, own, strict=True)
         )
-        channels = np.stack([_laid_over(s, since + p, recording.values) for s, p in zip(series, own, strict=True)])
+        channels = np.stack(
+            [_laid_over(s, t + p, recording.values) for s, t, p in zip(series, since, own, strict=True)]
+        )
+        channels += added
         solutions = tuple(Solution(len(beat.tracks), beat.beats, beat.error) for beat in beats)
         return Observation(channels, reasons, solutions)
+
+    def _seen(
+        self, batch: Array, recording: Recording, beats: tuple[Beat, ...]
+    ) -> tuple[npt.NDArray[np.complex128], Array, Array]:
+        """What the cameras make of the beats: series [B, K + 1, C], instants [B, T] (s), what is added [B, T, C]."""
+        names = [marker.name for marker in self.wing.markers]
+        columns = [names.index(name) for name in recording.markers]
+        series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])
+        times, added = np.tile(recording.times, (len(batch), 1)), np.zeros((len(batch), *recording.values.shape))
+        effects = observed(self.chosen, self.genes, batch, "tracks")
+        if effects:
+            changed = [k for k, one in enumerate(batch) if observed(effects, self.genes, one[None], "tracks")]
+            beat = np.stack([_on_grid(beats[k].tracks) for k in changed])
+            sampling = Sampling(self.wing, recording, beat, times[changed], added[changed])
+            apply(effects, self.genes, batch[changed], sampling)
+            shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
+            series[changed] = [_series(one) for one in shown]
+            times[changed], added[changed] = sampling.times, sampling.added
+        return series, times, added
+
+
+def _on_grid(tracks: Array) -> Array:
+    """Periodic tracks [n, M, 3] at _GRID equal steps, by the harmonics that are kept."""
+    series = _series(tracks.reshape(len(tracks), -1))
+    series[1:] *= 0.5
+    return np.asarray(np.fft.irfft(series * _GRID, _GRID, axis=0)).reshape(_GRID, *tracks.shape[1:])
 
 
 def _laid_over(series: npt.NDArray[np.complex128], psi: Array, recorded: Array) -> Array:

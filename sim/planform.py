@@ -110,6 +110,12 @@ def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
     return [_body(planform, panel, extra) for panel, extra in zip(panels, lumps, strict=True)]
 
 
+def wing_mass(wing: Wing) -> float:
+    """Mass of a wing, kg, with its rods and markers."""
+    planform = Planform(wing)
+    return sum(body.mass for body in bodies(planform, planform.panels(Division((4, 4, 4, 4)))))
+
+
 def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) -> Body:
     materials = planform.wing.materials
     y = panel.y0 + (np.arange(_CELLS) + 0.5) / _CELLS * (panel.y1 - panel.y0)

@@ -1,0 +1,1 @@
+"""The physics that a recording may contain and a baseline model may lack: one file per effect, and a contract."""

@@ -1,0 +1,143 @@
+"""What every effect declares, and the three places where it may act: a wing, a vehicle, an observation.
+
+An effect has a size: parameters of which zero switches it off exactly. Its other parameters say where it acts and how;
+they have no meaning at size zero. All become genes, which a calibration searches like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Gene, Vehicle, Wing
+from records.genes import Scale
+from sim.planform import wing_mass
+
+if TYPE_CHECKING:
+    from sim.effects.observation import Sampling
+    from sim.effects.vehicle import VehicleScene
+    from sim.effects.wing import WingScene
+
+Array = npt.NDArray[np.float64]
+Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
+Port = Literal["inertia", "connector", "drive", "air", "observation"]
+Power = Literal["conservative", "dissipative", "any"]
+Measure = Literal["span", "chord", "mass"]
+Values = Mapping[str, Array]  # parameters of one effect by name, one value per individual
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of an effect.
+
+    Attributes:
+        name: short; the gene is called EFFECT.NAME.
+        unit: of the gene; "1" without dimension.
+        lower, upper: bounds, in ``unit`` or, where ``of`` is given, in parts of that measure of the rig.
+        typical: a size that is met in practice; of the other parameters, their nominal value. As the bounds.
+        description: what it is.
+        of: the measure of the rig that bounds and typical value are parts of: its span (m), its mean chord (m) or the
+            mass of the wing (kg).
+        place: whether it says where on the wing the effect acts.
+        scale: how a search spreads over the bounds.
+    """
+
+    name: str
+    unit: str
+    lower: float
+    upper: float
+    typical: float
+    description: str
+    of: Measure | None = None
+    place: bool = False
+    scale: Scale = "linear"
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One piece of physics, or one fault of a measurement.
+
+    Attributes:
+        name: of the file as well, and of the page docs/effects/NAME.md.
+        title: for people.
+        family: what kind of thing it is.
+        port: where it enters the model.
+        size: zero of all of these switches it off exactly.
+        shape: the other parameters.
+        power: what it may do with energy: only keep it, only lose it, or either (air and drive give energy).
+        memory: its internal states in words; empty where it has none.
+        source: where the law is from (author, year, equation).
+        signature: one line: what it looks like in a recording.
+        confused_with: names of effects that look alike.
+        wing, vehicle: what it does to a scene before it is simulated; None where it does not apply.
+        observe: what it does to a simulated beat on its way into the recording; None where nothing.
+        observed: kinds of recording that ``observe`` acts on.
+    """
+
+    name: str
+    title: str
+    family: Family
+    port: Port
+    size: tuple[Parameter, ...]
+    source: str
+    signature: str
+    confused_with: tuple[str, ...]
+    shape: tuple[Parameter, ...] = ()
+    power: Power = "any"
+    memory: str = ""
+    wing: Callable[[WingScene, Values], None] | None = None
+    vehicle: Callable[[VehicleScene, Values], None] | None = None
+    observe: Callable[[Sampling, Values], None] | None = None
+    observed: tuple[Literal["tracks", "forces"], ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All: sizes, then the others."""
+        return (*self.size, *self.shape)
+
+    def applies_to(self, rig: Wing | Vehicle) -> bool:
+        """Whether a model of ``rig`` can contain it."""
+        if isinstance(rig, Wing):
+            return self.wing is not None or "tracks" in self.observed
+        return self.vehicle is not None or "forces" in self.observed
+
+    def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
+        """Genes for ``rig``: switched off, all else at its typical value."""
+        return tuple(self._gene(parameter, rig) for parameter in self.parameters)
+
+    def typical(self, rig: Wing | Vehicle) -> dict[str, float]:
+        """Values of the genes for ``rig`` at which the effect is as large as it is met in practice."""
+        return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters}
+
+    def values(self, genes: tuple[Gene, ...], genomes: Array) -> dict[str, Array]:
+        """Parameters by their short names [B], from ``genomes`` [B, G] in the order of ``genes``."""
+        column = {gene.name: k for k, gene in enumerate(genes)}
+        return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
+
+    def off(self, values: Values) -> npt.NDArray[np.bool_]:
+        """Which individuals [B] it is switched off for."""
+        return np.asarray(np.all([values[p.name] == 0.0 for p in self.size], axis=0))
+
+    def _gene(self, parameter: Parameter, rig: Wing | Vehicle) -> Gene:
+        unit = measure(rig, parameter.of)
+        nominal = 0.0 if parameter in self.size else parameter.typical * unit
+        lower, upper = parameter.lower * unit, parameter.upper * unit
+        name = f"{self.name}.{parameter.name}"
+        return Gene(name, parameter.unit, nominal, lower, upper, parameter.scale, parameter.description)
+
+
+def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
+    """A length (m) or mass (kg) of ``rig``; 1 for None."""
+    if of is None:
+        return 1.0
+    if isinstance(rig, Vehicle):
+        r, chords = [s.r for s in rig.stations], [s.chord for s in rig.stations]
+        span, area, mass = rig.span, float(np.trapezoid(chords, r)), rig.wing_mass
+    else:
+        y, chords = [s.y for s in rig.stations], [s.chord for s in rig.stations]
+        span, area, mass = y[-1] - y[0], float(np.trapezoid(chords, y)), wing_mass(rig)
+    return {"span": span, "chord": area / span, "mass": mass}[of]
