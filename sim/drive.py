@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,39 @@ Array = npt.NDArray[np.float64]
 
 _SAMPLES = 512
 _HARMONICS = 40
+
+
+@dataclass
+class RodDrive:
+    """Flap angles of the front and the rear rod for W individuals, as series of the drive phase.
+
+    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi); the rear rod's lag is in it.
+    """
+
+    series: npt.NDArray[np.complex128]
+
+    @classmethod
+    def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
+        """The drive of a wing, its rear rod ``lag`` (rad) late, the same for all ``lanes``."""
+        own = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
+        k = max(len(own.cosine), len(own.sine))
+        series = np.array([own.mean, *(_padded(own.cosine, k) - 1j * _padded(own.sine, k))], np.complex128)
+        both = np.stack([series, series * np.exp(-1j * lag * np.arange(k + 1))], axis=1)
+        return cls(np.repeat(both[:, :, None], lanes, axis=2))
+
+    def lengthened(self, harmonics: int) -> None:
+        """Make room for ``harmonics`` of the flap frequency."""
+        lacking = max(harmonics + 1 - len(self.series), 0)
+        self.series = np.concatenate([self.series, np.zeros((lacking, *self.series.shape[1:]))])
+
+    def angles(self, psi: Array) -> Array:
+        """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad)."""
+        k = np.arange(len(self.series))
+        turn = np.exp(1j * k * psi.ravel()[:, None])
+        derived = ((1j * k) ** np.arange(5)[:, None])[:, :, None, None] * self.series  # [4, K + 1, 2, W]
+        stacked = np.moveaxis(derived, 0, 2).reshape(len(k), -1)
+        found = turn.real @ stacked.real - turn.imag @ stacked.imag
+        return np.asarray(found.reshape(*psi.shape, 2, 5, self.series.shape[2]))
 
 
 def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:

@@ -14,6 +14,9 @@ import numpy.typing as npt
 Index = npt.NDArray[np.int64]
 
 
+_NONE: frozenset[tuple[int, int]] = frozenset()
+
+
 @dataclass(frozen=True)
 class Elimination:
     """Blocks and products of the factorisation, numbered as in ``sim.kernels.linear``.
@@ -39,9 +42,11 @@ class Elimination:
     position: dict[tuple[int, int], int]
 
 
-def eliminate(n: int, pairs: set[tuple[int, int]]) -> Elimination:
-    """Elimination of n bodies of which the ``pairs`` are joined (either way round)."""
-    columns = _minimum_degree(n, pairs)
+def eliminate(
+    n: int, pairs: set[tuple[int, int]], beside: frozenset[tuple[int, int]] | set[tuple[int, int]] = _NONE
+) -> Elimination:
+    """Elimination of n bodies of which ``pairs`` are joined by connectors (either way round), and others ``beside``."""
+    columns = _minimum_degree(n, pairs | beside)
     count = sum(len(rows) for _, rows in columns)
     position = {(k, k): k for k in range(n)}
     for column, rows in columns:

@@ -8,17 +8,20 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from records import Gene, Recording, Wing
+from records import Condition, Gene, Recording, Wing
 from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from sim.division import Division
 from sim.effects.contract import Effect
 from sim.effects.observation import Sampling, apply, observed
 from sim.effects.registry import chosen
+from sim.effects.wing import WingScene
+from sim.kernels import LANES
 from sim.model import Observation, Solution, genome_batch
 from sim.numerics import Numerics
+from sim.settle import Subject
 from sim.simulate import Beat, periodic_beats
 from sim.structure import Structure, build
-from sim.wing_genes import FACTOR, wing_genes
+from sim.wing_genes import FACTOR, lanes, wing_genes
 
 Array = npt.NDArray[np.float64]
 
@@ -73,12 +76,45 @@ class FlexibleWing:
         """Bodies and connectors."""
         return build(self.wing, Division.parse(self.division))
 
+    @cached_property
+    def _immersed(self) -> Structure:
+        """The same, with room in the matrix for air that the bodies of a strip move together."""
+        return build(self.wing, Division.parse(self.division), whole_strips=True)
+
+    def subject(self, effects: tuple[Effect, ...], condition: Condition) -> Subject:
+        """What is simulated where some of the effects are on."""
+        moves_air = any(effect.port == "inertia" and effect.family == "aerodynamics" for effect in effects)
+        structure = self._immersed if moves_air else self.structure
+
+        def scene(genomes: Array) -> WingScene:
+            found = WingScene.of(structure, condition, lanes(structure, self.genes, genomes))
+            filled = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
+            for effect in effects:
+                if effect.wing:
+                    effect.wing(found, effect.values(self.genes, filled))
+            return found
+
+        return Subject(structure, condition, scene)
+
+    def switched_on(self, genome: Array) -> tuple[Effect, ...]:
+        """The effects on the wing itself that are on in ``genome`` [G]."""
+        return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
+
     def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
-        """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies."""
+        """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
+
+        Individuals with the same effects on are simulated together: one that is off costs nothing and changes nothing.
+        """
         batch = genome_batch(self.genes, genomes)
-        return periodic_beats(
-            self.structure, self.genes, batch, recording.condition, self.numerics, with_motion=with_motion
-        )
+        alike: dict[tuple[str, ...], list[int]] = {}
+        for k, one in enumerate(batch):
+            alike.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
+        found: dict[int, Beat] = {}
+        for rows in alike.values():
+            subject = self.subject(self.switched_on(batch[rows[0]]), recording.condition)
+            beats = periodic_beats(subject, batch[rows], self.numerics, with_motion=with_motion)
+            found.update(zip(rows, beats, strict=True))
+        return tuple(found[k] for k in range(len(batch)))
 
     def beat(self, genome: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
         """The same for a single genome [G]."""

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from sim.kernels.integrate import State
+from sim.kernels.arrays import State
 
 Array = npt.NDArray[np.float64]
 
@@ -39,6 +39,7 @@ class Secants:
     about: State
     angular_rate: float
     kept: int
+    sizes: Array  # [Z]: states of effects times these are comparable with metres
     starts: list[Array] = field(default_factory=list)
     ends: list[Array] = field(default_factory=list)
     columns: list[tuple[Array, Array]] = field(default_factory=list)
@@ -115,20 +116,21 @@ class Secants:
         n = len(state.V) - 2
         R0, R = self.about.R[:n].reshape(n, 3, 3), state.R[:n].reshape(n, 3, 3)
         if not np.all(np.isfinite(R)):
-            return np.full(12 * n, np.nan)
+            return np.full(12 * n + len(self.sizes), np.nan)
         turn = Rotation.from_matrix(np.swapaxes(R0, 1, 2) @ R).as_rotvec() * _LENGTH
         twist = state.V[:n] / self.angular_rate
         parts = [turn, state.p[:n] - self.about.p[:n], twist[:, :3] * _LENGTH, twist[:, 3:]]
-        return np.concatenate(parts, axis=1).ravel()
+        return np.concatenate([np.concatenate(parts, axis=1).ravel(), state.z * self.sizes])
 
     def _state(self, coordinates: Array, rods: State) -> State:
         """The state at ``coordinates``, the driving rods as in ``rods``."""
         n = len(rods.V) - 2
-        x = coordinates.reshape(n, 12)
+        x = coordinates[: 12 * n].reshape(n, 12)
         found = State(*(array.copy() for array in rods))
         R0 = self.about.R[:n].reshape(n, 3, 3)
         found.R[:n] = (R0 @ Rotation.from_rotvec(x[:, :3] / _LENGTH).as_matrix()).reshape(n, 9)
         found.p[:n] = self.about.p[:n] + x[:, 3:6]
         found.V[:n, :3] = x[:, 6:9] / _LENGTH * self.angular_rate
         found.V[:n, 3:] = x[:, 9:12] * self.angular_rate
+        found.z[:] = coordinates[12 * n :] / self.sizes
         return found

@@ -7,29 +7,38 @@ import numpy.typing as npt
 
 from records import Condition
 from sim.atmosphere import density
-from sim.drive import flap_angle
+from sim.drive import RodDrive
 from sim.kernels import LANES
-from sim.kernels.integrate import NODES, PORTS, SLOPES, Setting, State, Trace
-from sim.kernels.memory import zeros
+from sim.kernels.arrays import PORTS, STAGES, Setting, State, Trace
+from sim.kernels.integrate import NODES, SLOPES
+from sim.kernels.memory import aligned, zeros
 from sim.numerics import Numerics
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
 
-def drive_table(structure: Structure, condition: Condition, numerics: Numerics, n: int, beat: int) -> Array:
-    """[n, STAGES, 2, 3]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
+def drive_table(
+    rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, giving_way: bool = False
+) -> Array:
+    """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
 
     The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
+    A drive that gives way asks for two more derivatives.
     """
-    omega = 2 * np.pi * condition.flap_frequency
-    beats = beat + (np.arange(n)[:, None, None] + NODES[None, :, None]) / n
-    phase = 2 * np.pi * (beats - beat) - np.array([0.0, condition.phase_lag])
-    angle = flap_angle(structure.wing.drive, phase) * np.array([1.0, omega, omega**2, omega**3])
+    omega = 2 * np.pi * frequency
+    beats = beat + (np.arange(n)[:, None] + NODES) / n
+    angle = rods.angles(2 * np.pi * (beats - beat)) * omega ** np.arange(5.0)[:, None]
     if beat < numerics.ramp_beats:
-        angle = _ramped(angle, beats / numerics.ramp_beats, condition.flap_frequency / numerics.ramp_beats)
-    slope = SLOPES[:, None] / (n * condition.flap_frequency)
-    return np.stack([angle[..., 0], angle[..., 1], angle[..., 2] + slope * angle[..., 3]], axis=-1)
+        angle[..., :4, :] = _ramped(
+            angle, beats[..., None, None] / numerics.ramp_beats, frequency / numerics.ramp_beats
+        )
+        angle[..., 4, :] = 0.0
+    slope = SLOPES[:, None, None] / (n * frequency)
+    table = zeros((n, STAGES, 2, 5 if giving_way else 3, LANES))
+    table[...] = angle[..., : table.shape[3], :]
+    table[:, :, :, 2] += slope * angle[:, :, :, 3]
+    return table
 
 
 def _ramped(angle: Array, x: Array, rate: float) -> Array:
@@ -39,16 +48,17 @@ def _ramped(angle: Array, x: Array, rate: float) -> Array:
     e1 = rate * 30 * x**2 * (1 - x) ** 2
     e2 = rate**2 * 60 * x * (1 - x) * (1 - 2 * x)
     e3 = rate**3 * 60 * (1 - 6 * x + 6 * x**2) * (x < 1)
-    a, a1, a2, a3 = np.moveaxis(angle, -1, 0)
+    a, a1, a2, a3, _ = np.moveaxis(angle, -2, 0)
     return np.stack(
-        [e * a, e * a1 + e1 * a, e * a2 + 2 * e1 * a1 + e2 * a, e * a3 + 3 * (e1 * a2 + e2 * a1) + e3 * a], axis=-1
+        [e * a, e * a1 + e1 * a, e * a2 + 2 * e1 * a1 + e2 * a, e * a3 + 3 * (e1 * a2 + e2 * a1) + e3 * a], axis=-2
     )
 
 
-def at_rest(structure: Structure) -> State:
-    """All bodies at their rest pose, not moving, the rods horizontal."""
+def at_rest(structure: Structure, states: int = 0) -> State:
+    """All bodies at their rest pose, not moving, the rods horizontal, the effects' ``states`` zero."""
     n = len(structure.bodies)
-    state = State(zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
+    motion = (zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
+    state = State(*motion, zeros((states, LANES)))
     state.R[:, [0, 4, 8]] = 1.0
     hinge = structure.wing.hinge
     state.p[:n] = np.array([body.centre for body in structure.bodies])[:, :, None]
@@ -61,10 +71,11 @@ def setting(condition: Condition, steps: int) -> Setting:
     a = condition.angle_of_attack
     wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
     step = 1.0 / (condition.flap_frequency * steps)
-    return Setting(density(condition.pressure, condition.temperature), wind, condition.gravity, step)
+    rho = np.full(LANES, density(condition.pressure, condition.temperature))
+    return Setting(aligned(rho), aligned(np.repeat(wind[:, None], LANES, axis=1)), condition.gravity, step)
 
 
-def new_trace(structure: Structure, steps: int, *, with_motion: bool = False) -> Trace:
+def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
     """Empty arrays for one beat; those of the motion have no room unless asked for."""
     kept, bodies = steps if with_motion else 0, len(structure.bodies) + 2
     return Trace(
@@ -76,4 +87,5 @@ def new_trace(structure: Structure, steps: int, *, with_motion: bool = False) ->
         R=zeros((kept, bodies, 9, LANES)),
         p=zeros((kept, bodies, 3, LANES)),
         V=zeros((kept, bodies, 6, LANES)),
+        z=zeros((kept, states, LANES)),
     )

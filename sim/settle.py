@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Gene
+from records import Condition
+from sim.effects.wing import WingScene
 from sim.kernels import LANES
-from sim.kernels.integrate import State, Trace, advance, new_work
+from sim.kernels.arrays import State, Trace, new_work
+from sim.kernels.integrate import advance
 from sim.kernels.memory import aligned
 from sim.numerics import Numerics
 from sim.periodic import Secants
-from sim.scene import at_rest, drive_table, new_trace, setting
+from sim.scene import at_rest, drive_table, new_trace
 from sim.structure import Structure
-from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 
@@ -59,36 +62,39 @@ class Course:
     done: bool = False
 
 
+class Subject(NamedTuple):
+    """What is simulated: a structure under a condition, and how up to LANES genomes make a scene of it."""
+
+    structure: Structure
+    condition: Condition
+    scene: Callable[[Array], WingScene]
+
+
 class _Group:
     """Up to LANES individuals side by side under a condition, all at rest or all under way."""
 
-    def __init__(
-        self,
-        structure: Structure,
-        genes: tuple[Gene, ...],
-        courses: list[Course],
-        condition: Condition,
-        steps: int,
-        with_motion: bool = False,
-    ) -> None:
-        self.structure, self.courses = structure, courses
-        self.angular_rate = 2 * np.pi * condition.flap_frequency
-        self.lanes, self.here = (
-            lanes(structure, genes, np.array([c.genome for c in courses])),
-            setting(condition, steps),
-        )
-        self.work, self.trace = (
-            new_work(structure.wiring, self.lanes),
-            new_trace(structure, steps, with_motion=with_motion),
-        )
+    def __init__(self, subject: Subject, courses: list[Course], steps: int, with_motion: bool = False) -> None:
+        structure, self.courses = subject.structure, courses
+        self.angular_rate = 2 * np.pi * subject.condition.flap_frequency
+        self.scene = subject.scene(np.array([c.genome for c in courses]))
+        self.wiring, self.lanes, self.here = structure.wiring, self.scene.frozen(), self.scene.setting(steps)
+        self.sizes = self.lanes.laws.size
+        states = len(self.sizes)
+        self.work = new_work(self.wiring, self.here, self.lanes)
+        self.trace = new_trace(structure, steps, with_motion=with_motion, states=states)
         moving = [course.state for course in courses if course.state is not None]
-        self.state = _stacked(moving) if moving else at_rest(structure)
+        self.state = _stacked(moving) if moving else at_rest(structure, states)
         self.alive = np.ones(LANES, bool)
+
+    def table(self, numerics: Numerics, steps: int, beat: int) -> Array:
+        """The drive of a beat."""
+        frequency, giving_way = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
+        return drive_table(self.scene.rods, frequency, numerics, steps, beat, giving_way=giving_way)
 
     def beat(self, table: Array) -> State:
         """One beat under a drive; the state from which it started."""
         start = State(*(array.copy() for array in self.state))
-        advance(self.structure.wiring, self.here, self.lanes, table, self.work, self.state, self.trace, self.alive)
+        advance(self.wiring, self.here, self.lanes, table, self.work, self.state, self.trace, self.alive)
         return start
 
     def learn(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
@@ -102,7 +108,7 @@ class _Group:
         elif beat >= numerics.ramp_beats:
             before, after = _lane(start, lane), _lane(self.state, lane)
             if course.secants is None:
-                course.secants = Secants(before, self.angular_rate, numerics.window)
+                course.secants = Secants(before, self.angular_rate, numerics.window, self.sizes)
             course.state, course.distance = course.secants.add(before, after)
             _put(self.state, lane, course.state)
             if course.distance <= numerics.settled:
@@ -110,19 +116,11 @@ class _Group:
                 course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
 
 
-def settle(
-    structure: Structure,
-    genes: tuple[Gene, ...],
-    courses: list[Course],
-    condition: Condition,
-    numerics: Numerics,
-    steps: int,
-    with_motion: bool,
-) -> None:
+def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: int, with_motion: bool) -> None:
     """Run up to LANES individuals with ``steps`` a beat until each is periodic, whatever its neighbours do."""
-    group = _Group(structure, genes, courses, condition, steps, with_motion)
+    group = _Group(subject, courses, steps, with_motion)
     first = 0 if courses[0].state is None else numerics.ramp_beats
-    tables = [drive_table(structure, condition, numerics, steps, beat) for beat in range(numerics.ramp_beats + 1)]
+    tables = [group.table(numerics, steps, beat) for beat in range(numerics.ramp_beats + 1)]
     for course in courses:
         course.reason, course.trace = None, None
         if course.secants is not None:
@@ -142,16 +140,14 @@ def settle(
         )
 
 
-def measure_growth(
-    structure: Structure, genes: tuple[Gene, ...], courses: list[Course], condition: Condition, steps: int
-) -> None:
+def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
     """Let up to LANES settled individuals go on for GROWING beats, and see whether what is left of transients grows.
 
     What the secants tell of it is mixed with the beats on which the motion was still far from periodic.
     """
-    group, numerics = _Group(structure, genes, courses, condition, steps), Numerics(steps=steps)
-    table = drive_table(structure, condition, numerics, steps, numerics.ramp_beats)
-    watched = [Secants(_lane(group.state, k), group.angular_rate, 0) for k in range(len(courses))]
+    group, numerics = _Group(subject, courses, steps), Numerics(steps=steps)
+    table = group.table(numerics, steps, numerics.ramp_beats)
+    watched = [Secants(_lane(group.state, k), group.angular_rate, 0, group.sizes) for k in range(len(courses))]
     left = np.zeros((GROWING, len(courses)))
     for beat in range(GROWING):
         start = group.beat(table)

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Gene
 from sim.kernels import LANES
-from sim.kernels.integrate import State, Trace
+from sim.kernels.arrays import State, Trace
 from sim.numerics import LADDER, Numerics, estimated_error
 from sim.scene import new_trace
-from sim.settle import Course, measure_growth, settle
+from sim.settle import Course, Subject, measure_growth, settle
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -52,31 +51,25 @@ class Beat:
 
 
 def periodic_beats(
-    structure: Structure,
-    genes: tuple[Gene, ...],
-    genomes: Array,
-    condition: Condition,
-    numerics: Numerics,
-    *,
-    with_motion: bool = False,
+    subject: Subject, genomes: Array, numerics: Numerics, *, with_motion: bool = False
 ) -> tuple[Beat, ...]:
-    """Simulate ``genomes`` [B, G] under ``condition`` until each is periodic and accurate; groups of LANES at a time.
+    """Simulate ``genomes`` [B, G] until each is periodic and accurate; groups of LANES at a time.
 
     An individual's numbers do not depend on its neighbours: each has its own steps, beats and end.
     """
     courses = [Course(genome) for genome in genomes]
-    ladder = numerics.ladder(condition)
+    ladder = numerics.ladder(subject.condition)
     for rung, steps in enumerate(ladder):
         under_way = [course for course in courses if not course.done]
         for group in _groups(under_way):
-            settle(structure, genes, group, condition, numerics, steps, with_motion)
+            settle(subject, group, numerics, steps, with_motion)
             for course in group:
                 _judge(course, numerics, steps, last=rung == len(ladder) - 1)
         suspect = [c for c in under_way if c.done and c.reason is None and c.growth > FLUTTER]
         for group in _groups(suspect):
-            measure_growth(structure, genes, group, condition, steps)
+            measure_growth(subject, group, steps)
             _refuse_flutter(group)
-    return tuple(_beat(structure, course, with_motion) for course in courses)
+    return tuple(_beat(subject.structure, course, with_motion) for course in courses)
 
 
 def _groups(courses: list[Course]) -> list[list[Course]]:
@@ -130,7 +123,7 @@ def _beat(structure: Structure, course: Course, with_motion: bool) -> Beat:
         trace = Trace(
             *(np.full(a.shape[:-1], np.nan) for a in new_trace(structure, LADDER[0], with_motion=with_motion))
         )
-    motion = State(trace.R, trace.p, trace.V) if with_motion else None
+    motion = State(trace.R, trace.p, trace.V, trace.z) if with_motion else None
     return Beat(
         trace.tracks,
         trace.rods,

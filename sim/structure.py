@@ -10,7 +10,7 @@ import numpy.typing as npt
 from records import Rod, Wing
 from sim.division import Division
 from sim.elimination import eliminate
-from sim.kernels.integrate import Wiring
+from sim.kernels.arrays import Wiring
 from sim.planform import Body, Panel, Planform, bodies, marker_carriers
 from sim.sections import Rectangle, round_area, round_second_moment
 
@@ -62,7 +62,7 @@ def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array)
 
 @dataclass(frozen=True)
 class Structure:
-    """A wing cut into bodies."""
+    """A wing cut into bodies. ``position``: number of the matrix's block for two bodies that it joins."""
 
     wing: Wing
     division: Division
@@ -71,10 +71,14 @@ class Structure:
     bodies: tuple[Body, ...]
     connectors: tuple[Connector, ...]
     wiring: Wiring
+    position: dict[tuple[int, int], int]
 
 
-def build(wing: Wing, division: Division) -> Structure:
-    """Cut ``wing``; ValueError when a driven rod does not reach the root."""
+def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Structure:
+    """Cut ``wing``; ValueError when a driven rod does not reach the root.
+
+    With ``whole_strips`` the matrix joins all bodies of a strip, as the air that they move together does.
+    """
     planform = Planform(wing)
     panels = planform.panels(division)
     parts = bodies(planform, panels)
@@ -83,8 +87,8 @@ def build(wing: Wing, division: Division) -> Structure:
         *_along_chord(planform, division, panels, parts),
         *_at_root(planform, division, parts),
     ]
-    wiring = _wiring(planform, division, panels, parts, connectors)
-    return Structure(wing, division, planform, tuple(panels), tuple(parts), tuple(connectors), wiring)
+    wiring, position = _wiring(planform, division, panels, parts, connectors, whole_strips)
+    return Structure(wing, division, planform, tuple(panels), tuple(parts), tuple(connectors), wiring, position)
 
 
 def _twisting(planform: Planform, y: float) -> float:
@@ -235,8 +239,13 @@ def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[
 
 
 def _wiring(
-    planform: Planform, division: Division, panels: list[Panel], parts: list[Body], connectors: list[Connector]
-) -> Wiring:
+    planform: Planform,
+    division: Division,
+    panels: list[Panel],
+    parts: list[Body],
+    connectors: list[Connector],
+    whole_strips: bool,
+) -> tuple[Wiring, dict[tuple[int, int], int]]:
     n = len(parts)
     hinge = np.array([0.0, planform.wing.hinge.y, planform.wing.hinge.z])
     first = np.array([c.first if c.first >= 0 else n - 1 - c.first for c in connectors], np.int64)
@@ -246,14 +255,17 @@ def _wiring(
     joined = [(int(i), int(j)) for i, j in zip(first, second, strict=True) if i < n]
     if len(set(joined)) < len(joined):
         raise AssertionError("two connectors between the same bodies: their blocks would overwrite each other")
-    work = eliminate(n, set(joined))
-    outer, last = len(first) - len(joined), n + 2 * len(work.below)
     starts = np.concatenate([[0], np.cumsum(division.bodies)]).astype(np.int64)
+    beside = {
+        (i, j) for k in range(len(starts) - 1) for j in range(starts[k], starts[k + 1]) for i in range(starts[k], j)
+    }
+    work = eliminate(n, set(joined), beside if whole_strips else set())
+    outer, last = len(first) - len(joined), n + 2 * len(work.below)
     area = np.array([part.area for part in parts])
     strip_area = np.add.reduceat(area, starts[:-1])
     markers = planform.wing.markers
     carriers = marker_carriers(planform, panels, markers)
-    return Wiring(
+    wiring = Wiring(
         mass=np.array([part.mass for part in parts]),
         inertia=np.array([part.inertia.ravel() for part in parts]),
         first=first,
@@ -273,7 +285,16 @@ def _wiring(
         strip_start=starts,
         weight=area / np.repeat(strip_area, division.bodies),
         centroid=np.array([(part.centroid - part.centre)[:2] for part in parts]),
-        area=strip_area,
+        geometry=_geometry(planform, division, strip_area),
         markers=np.array([np.array(m.position) - parts[k].centre for m, k in zip(markers, carriers, strict=True)]),
         carrier=carriers,
     )
+    return wiring, work.position
+
+
+def _geometry(planform: Planform, division: Division, area: Array) -> Array:
+    """[S, GEOMETRY] of the strips."""
+    edges = planform.strips(division)
+    width = np.diff(edges)
+    station = (0.5 * (edges[1:] + edges[:-1]) - edges[0]) / (edges[-1] - edges[0])
+    return np.stack([area, area / width, width, station], axis=1)

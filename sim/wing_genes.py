@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from records import EstimateError, Gene
 from sim.kernels import LANES
-from sim.kernels.integrate import Lanes
+from sim.kernels.arrays import Lanes, Laws
 from sim.kernels.memory import aligned
 from sim.structure import Structure, spring_constants
 
@@ -37,6 +37,11 @@ _AERODYNAMICS = (
     ("ID_b", "1", 0.08, "induced-drag coefficient at zero angle of attack"),
 )
 _SHARES = (0.4, 0.3, 0.2, 0.1)
+
+_NO_LAW = np.zeros((0, 6), np.int64)
+NO_LAWS = Laws(
+    _NO_LAW, _NO_LAW, np.zeros(0, np.int64), np.zeros((0, LANES)), np.zeros(0), np.zeros((0, LANES))
+)  # fmt: skip
 
 STRUCTURAL = tuple(row[0] for row in _STRUCTURE)
 AERODYNAMIC = (
@@ -91,7 +96,7 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
     )
     stiffness = spring_constants(structure.connectors, foam, rod)
     damping = np.array([c.foam[:, None] * lost[list(c.modulus)] for c in structure.connectors])
-    shares, places = {}, {}
+    shares, places, hinge = {}, {}, structure.wing.hinge
     for prefix in ("L", "ID"):
         weights = np.array([value(f"{prefix}_{k}") for k in range(1, QUARTERS + 1)])
         shares[prefix], places[prefix] = _distribute(structure, weights / weights.sum(axis=0))
@@ -103,6 +108,12 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
         lift_x=aligned(places["L"]),
         drag_share=aligned(shares["ID"]),
         drag_x=aligned(places["ID"]),
+        hinge=aligned(np.repeat([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, hinge.y, hinge.z], LANES).reshape(9, LANES)),
+        coupling=np.zeros((0, 9, LANES)),
+        pairs=np.zeros((0, 3), np.int64),
+        masses=np.zeros((0, 36, LANES)),
+        weighing=0,
+        laws=NO_LAWS,
     )
 
 

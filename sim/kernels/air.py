@@ -15,8 +15,28 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.kernels import LANES
+from sim.kernels.arrays import (
+    ALPHA,
+    AREA,
+    CHORD_X,
+    CIRCULATION,
+    DRAG,
+    DRAG_SLOPE,
+    FORWARD,
+    LIFT_SLOPE,
+    NORMAL_X,
+    PITCH_RATE,
+    PLACE_X,
+    PUSH_C,
+    PUSH_M,
+    PUSH_N,
+    SPEED,
+    STREAM_C,
+    STREAM_N,
+)
 from sim.kernels.jit import kernel
-from sim.kernels.vector import Vector, greatest, least, load, load0, load1, magnitude, root, store, store0, store1
+from sim.kernels.lanewise import angle
+from sim.kernels.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -25,47 +45,28 @@ STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
 @kernel
-def angle(y: Vector, x: Vector) -> Vector:
-    """atan2 lane by lane: there is no vector instruction for it."""
-    scratch = np.empty((2, LANES))
-    store1(scratch, 0, y)
-    store1(scratch, 1, x)
-    for w in range(LANES):
-        scratch[0, w] = math.atan2(scratch[0, w], scratch[1, w])
-    return load1(scratch, 0)
-
-
-@kernel
-def strip_forces(
+def strip_flow(
     start: Index,
     weight: Array,
     centroid: Array,
-    area: Array,
-    density: float,
     wind: Array,
     coefficients: Array,
-    lift_share: Array,
-    lift_x: Array,
-    drag_share: Array,
-    drag_x: Array,
+    induced: Array,
     R: Array,
+    p: Array,
     V: Array,
-    wrench: Array,
-    damping: Array,
-    power: Array,
-    force: Array,
+    flow: Array,
+    loads: Array,
 ) -> None:
-    """Add the air's wrench to every body.
+    """The airflow of every strip, ``flow`` [S, FLOW, W], and what the affine laws make of it, ``loads`` [S, LOADS, W].
 
     ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
-    centroid in the body frame; ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b. ``lift_x``, ``drag_x`` [N, W]: where the
-    shares act along the chord, in the body frame. Also out: ``damping`` [N, W], force per normal speed of the body (for
-    the linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
+    centroid in the body frame; ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b; ``induced`` [S, 3, W]: velocity of the
+    air on top of the wind, or empty, and then the strip's place and pitch rate are not asked for either.
     """
-    flow = np.empty((9, LANES))
-    lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
-    for s in range(len(area)):
-        flow[:] = 0.0
+    mean = np.empty((9, LANES))
+    for s in range(len(start) - 1):
+        mean[:] = 0.0
         for n in range(start[s], start[s + 1]):
             g, x, y = weight[n], centroid[n, 0], centroid[n, 1]
             oz = load(V, n, 2)
@@ -73,39 +74,106 @@ def strip_forces(
             vz = load(V, n, 5) + load(V, n, 0) * y - load(V, n, 1) * x
             for i in range(3):
                 world = load(R, n, 3 * i) * vx + load(R, n, 3 * i + 1) * vy + load(R, n, 3 * i + 2) * vz
-                store1(flow, i, load1(flow, i) + g * world)
-                store1(flow, 3 + i, load1(flow, 3 + i) + g * load(R, n, 3 * i))
-                store1(flow, 6 + i, load1(flow, 6 + i) + g * load(R, n, 3 * i + 2))
-        scale = 0.5 * density * area[s]
-        cx, cy, cz = load1(flow, 3), load1(flow, 4), load1(flow, 5)
+                store1(mean, i, load1(mean, i) + g * world)
+                store1(mean, 3 + i, load1(mean, 3 + i) + g * load(R, n, 3 * i))
+                store1(mean, 6 + i, load1(mean, 6 + i) + g * load(R, n, 3 * i + 2))
+        cx, cy, cz = load1(mean, 3), load1(mean, 4), load1(mean, 5)
         r = 1.0 / root(cx * cx + cy * cy + cz * cz)
         cx, cy, cz = cx * r, cy * r, cz * r
-        nx, ny, nz = load1(flow, 6), load1(flow, 7), load1(flow, 8)
+        nx, ny, nz = load1(mean, 6), load1(mean, 7), load1(mean, 8)
         r = nx * cx + ny * cy + nz * cz
         nx, ny, nz = nx - r * cx, ny - r * cy, nz - r * cz
         r = 1.0 / root(nx * nx + ny * ny + nz * nz)
         nx, ny, nz = nx * r, ny * r, nz * r
-        ux, uy, uz = wind[0] - load1(flow, 0), wind[1] - load1(flow, 1), wind[2] - load1(flow, 2)
+        ux, uy, uz = load1(wind, 0) - load1(mean, 0), load1(wind, 1) - load1(mean, 1), load1(wind, 2) - load1(mean, 2)
+        if len(induced):
+            ux, uy, uz = ux + load(induced, s, 0), uy + load(induced, s, 1), uz + load(induced, s, 2)
+            _whereabouts(s, start, weight, centroid, R, p, V, flow)
         uc = ux * cx + uy * cy + uz * cz
         un = ux * nx + uy * ny + uz * nz
         q = root(uc * uc + un * un + STILL * STILL)
         x = least(greatest(uc / (REVERSAL * q), -1.0), 1.0)
         forward = 0.5 * x * (3.0 - x * x)
         alpha = angle(un, uc * forward)
+        for i, value in enumerate((cx, cy, cz)):
+            store(flow, s, CHORD_X + i, value)
+        for i, value in enumerate((nx, ny, nz)):
+            store(flow, s, NORMAL_X + i, value)
+        store(flow, s, STREAM_C, uc)
+        store(flow, s, STREAM_N, un)
+        store(flow, s, SPEED, q)
+        store(flow, s, ALPHA, alpha)
+        store(flow, s, FORWARD, forward)
         cl = load1(coefficients, 0) * alpha + load1(coefficients, 1)
         cd = load1(coefficients, 2) * magnitude(alpha) + load1(coefficients, 3)
-        fl = scale * q * cl * forward
-        fd = scale * q * cd
-        store1(lift, 0, fl * (uc * nx - un * cx))
-        store1(lift, 1, fl * (uc * ny - un * cy))
-        store1(lift, 2, fl * (uc * nz - un * cz))
-        store1(lift, 3, scale * q * load1(coefficients, 0))
-        store1(drag, 0, fd * (uc * cx + un * nx))
-        store1(drag, 1, fd * (uc * cy + un * ny))
-        store1(drag, 2, fd * (uc * cz + un * nz))
-        store1(drag, 3, scale * q * (cd + load1(coefficients, 2)))
+        store(loads, s, CIRCULATION, q * cl * forward)
+        store(loads, s, DRAG, q * cd)
+        store(loads, s, LIFT_SLOPE, q * load1(coefficients, 0))
+        store(loads, s, DRAG_SLOPE, q * (cd + load1(coefficients, 2)))
+        for i in (PUSH_N, PUSH_C, PUSH_M):
+            store(loads, s, i, 0.0)
+
+
+@kernel
+def _whereabouts(
+    s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
+) -> None:
+    """Where the strip's area is in the world, and how fast it pitches."""
+    for i in (PLACE_X, PLACE_X + 1, PLACE_X + 2, PITCH_RATE):
+        store(flow, s, i, 0.0)
+    for n in range(start[s], start[s + 1]):
+        g, x, y = weight[n], centroid[n, 0], centroid[n, 1]
         for i in range(3):
+            place = load(p, n, i) + load(R, n, 3 * i) * x + load(R, n, 3 * i + 1) * y
+            store(flow, s, PLACE_X + i, load(flow, s, PLACE_X + i) + g * place)
+        store(flow, s, PITCH_RATE, load(flow, s, PITCH_RATE) + g * load(V, n, 1))
+
+
+@kernel
+def strip_forces(
+    start: Index,
+    weight: Array,
+    centroid: Array,
+    geometry: Array,
+    density: Array,
+    lift_share: Array,
+    lift_x: Array,
+    drag_share: Array,
+    drag_x: Array,
+    flow: Array,
+    loads: Array,
+    spread: bool,
+    R: Array,
+    V: Array,
+    wrench: Array,
+    damping: Array,
+    power: Array,
+    force: Array,
+) -> None:
+    """Add the air's wrench to every body, from the ``loads`` of its strip.
+
+    ``lift_x``, ``drag_x`` [N, W]: where the shares act along the chord, in the body frame; ``spread``: whether
+    there are loads that are spread evenly. Also out: ``damping`` [N, W], force per normal speed of the body (for the
+    linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
+    """
+    lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
+    push = np.empty((4, LANES))
+    for s in range(len(start) - 1):
+        scale = load0(density) * (0.5 * geometry[s, AREA])
+        uc, un = load(flow, s, STREAM_C), load(flow, s, STREAM_N)
+        fl, fd = scale * load(loads, s, CIRCULATION), scale * load(loads, s, DRAG)
+        for i in range(3):
+            c, n_ = load(flow, s, CHORD_X + i), load(flow, s, NORMAL_X + i)
+            store1(lift, i, fl * (uc * n_ - un * c))
+            store1(drag, i, fd * (uc * c + un * n_))
             store1(force, i, load1(force, i) + load1(lift, i) + load1(drag, i))
+            if spread:
+                store1(push, i, scale * (load(loads, s, PUSH_C) * c + load(loads, s, PUSH_N) * n_))
+                store1(force, i, load1(force, i) + load1(push, i))
+        store1(lift, 3, scale * load(loads, s, LIFT_SLOPE))
+        store1(drag, 3, scale * load(loads, s, DRAG_SLOPE))
+        if spread:
+            store1(push, 3, scale * load(loads, s, PUSH_M))
         for n in range(start[s], start[s + 1]):
             y = centroid[n, 1]
             a, b = load1(lift_share, n), load1(drag_share, n)
@@ -117,13 +185,22 @@ def strip_forces(
             dz = b * (load(R, n, 2) * load1(drag, 0) + load(R, n, 5) * load1(drag, 1) + load(R, n, 8) * load1(drag, 2))
             tx, ty = y * (lz + dz), -load1(lift_x, n) * lz - load1(drag_x, n) * dz
             tz = load1(lift_x, n) * ly + load1(drag_x, n) * dy - y * (lx + dx)
+            fx, fy, fz = lx + dx, ly + dy, lz + dz
+            if spread:
+                g, x = weight[n], centroid[n, 0]
+                px = load(R, n, 0) * load1(push, 0) + load(R, n, 3) * load1(push, 1) + load(R, n, 6) * load1(push, 2)
+                py = load(R, n, 1) * load1(push, 0) + load(R, n, 4) * load1(push, 1) + load(R, n, 7) * load1(push, 2)
+                pz = load(R, n, 2) * load1(push, 0) + load(R, n, 5) * load1(push, 1) + load(R, n, 8) * load1(push, 2)
+                tx, ty = tx + (g * y) * pz, ty - (g * x) * pz + g * load1(push, 3)
+                tz = tz + g * (x * py - y * px)
+                fx, fy, fz = fx + g * px, fy + g * py, fz + g * pz
             store(wrench, n, 0, load(wrench, n, 0) + tx)
             store(wrench, n, 1, load(wrench, n, 1) + ty)
             store(wrench, n, 2, load(wrench, n, 2) + tz)
-            store(wrench, n, 3, load(wrench, n, 3) + lx + dx)
-            store(wrench, n, 4, load(wrench, n, 4) + ly + dy)
-            store(wrench, n, 5, load(wrench, n, 5) + lz + dz)
+            store(wrench, n, 3, load(wrench, n, 3) + fx)
+            store(wrench, n, 4, load(wrench, n, 4) + fy)
+            store(wrench, n, 5, load(wrench, n, 5) + fz)
             store1(damping, n, a * load1(lift, 3) + b * load1(drag, 3))
             turning = tx * load(V, n, 0) + ty * load(V, n, 1) + tz * load(V, n, 2)
-            moving = (lx + dx) * load(V, n, 3) + (ly + dy) * load(V, n, 4) + (lz + dz) * load(V, n, 5)
+            moving = fx * load(V, n, 3) + fy * load(V, n, 4) + fz * load(V, n, 5)
             store0(power, load0(power) + turning + moving)

@@ -23,6 +23,7 @@ from sim.kernels.matrices import (
     load_matrix,
     load_vector,
     product,
+    scaled,
     times,
     trace_minus,
     transposed,
@@ -142,6 +143,7 @@ def connect(
     K: Array,
     D: Array,
     coupling: Array,
+    more: Array,
     Q_: Array,
     d_: Array,
     V: Array,
@@ -152,17 +154,18 @@ def connect(
     """Add spring and damper wrenches to both bodies; power lost in dampers and energy in springs go to the lanes.
 
     K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling
-    [C, 9, W]: the symmetric K_c between them, row by row, or empty where there is none.
+    [C, 9, W]: the symmetric K_c between them, row by row, and ``more`` [C, 6, W]: another wrench on the second body,
+    both empty where there is none.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
         Q, d = load_matrix(Q_, c), load_vector(d_, c, 0)
         t, f, energy = spring_wrench(Q, d, load_vector(K, c, 0), load_vector(K, c, 3))
         if len(coupling):
-            more = coupling_wrench(product(Q, co_stiffness_matrix(load_matrix(coupling, c))), d)
-            t = (t[0] + more[0][0], t[1] + more[0][1], t[2] + more[0][2])
-            f = (f[0] + more[1][0], f[1] + more[1][1], f[2] + more[1][2])
-            energy = energy + more[2]
+            joint = coupling_wrench(product(Q, co_stiffness_matrix(load_matrix(coupling, c))), d)
+            t = (t[0] + joint[0][0], t[1] + joint[0][1], t[2] + joint[0][2])
+            f = (f[0] + joint[1][0], f[1] + joint[1][1], f[2] + joint[1][2])
+            energy = energy + joint[2]
         e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
         arm = times(Q, (b[c, 0], b[c, 1], b[c, 2]))
         turning = times(Q, load_vector(V, j, 0))
@@ -174,12 +177,44 @@ def connect(
         loss += loss_f[0] * slide[0] + loss_f[1] * slide[1] + loss_f[2] * slide[2]
         t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
         f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
+        if len(more):
+            t = (t[0] + load(more, c, 0), t[1] + load(more, c, 1), t[2] + load(more, c, 2))
+            f = (f[0] + load(more, c, 3), f[1] + load(more, c, 4), f[2] + load(more, c, 5))
         store0(dissipated, load0(dissipated) + loss)
         store0(stored, load0(stored) + energy)
         m = cross(e, f)
         add_wrench(wrench, i, (-t[0] - m[0], -t[1] - m[1], -t[2] - m[2]), (-f[0], -f[1], -f[2]))
         m = cross(arm, f)
         back = transposed(Q)
+        add_wrench(wrench, j, times(back, (t[0] + m[0], t[1] + m[1], t[2] + m[2])), times(back, f))
+
+
+@kernel
+def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, out: Array) -> None:
+    """Twist [C, 6, W] of each second body relative to the first at o_B, in A's axes: J V."""
+    for c in range(len(first)):
+        i, j = first[c], second[c]
+        q, x = load_matrix(Q, c), load_vector(d, c, 0)
+        e, arm = (a[c, 0] + x[0], a[c, 1] + x[1], a[c, 2] + x[2]), times(q, (b[c, 0], b[c, 1], b[c, 2]))
+        rate, slide = relative_twist(
+            q, e, arm, load_vector(V, i, 0), load_vector(V, i, 3), times(q, load_vector(V, j, 0)), load_vector(V, j, 3)
+        )
+        for k in range(3):
+            store(out, c, k, rate[k])
+            store(out, c, 3 + k, slide[k])
+
+
+@kernel
+def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
+    """Subtract J^T times ``push`` [C, 6, W] from the wrenches: ``push`` resists on the second body."""
+    for c in range(len(first)):
+        i, j = first[c], second[c]
+        q, x = load_matrix(Q, c), load_vector(d, c, 0)
+        e, arm = (a[c, 0] + x[0], a[c, 1] + x[1], a[c, 2] + x[2]), times(q, (b[c, 0], b[c, 1], b[c, 2]))
+        t, f = load_vector(push, c, 0), load_vector(push, c, 3)
+        m = cross(e, f)
+        add_wrench(wrench, i, (t[0] + m[0], t[1] + m[1], t[2] + m[2]), f)
+        m, back = cross(arm, f), scaled(-1.0, transposed(q))
         add_wrench(wrench, j, times(back, (t[0] + m[0], t[1] + m[1], t[2] + m[2])), times(back, f))
 
 

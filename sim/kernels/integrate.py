@@ -9,27 +9,28 @@ step's start.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
 from sim.kernels import LANES
-from sim.kernels.air import strip_forces
+from sim.kernels.air import strip_flow, strip_forces
+from sim.kernels.arrays import AIR, DAMPERS, FRONT_MOTOR, STAGES, Lanes, Setting, State, Trace, Wiring, Work
 from sim.kernels.bodies import inertial, kinetic_and_height, move, track
-from sim.kernels.connectors import connect, relative_pose, tangent
+from sim.kernels.connectors import connect, relative_pose, tangent, twists
 from sim.kernels.jit import kernel
+from sim.kernels.lanewise import cosine_and_sine
+from sim.kernels.laws import AFTER, BEFORE, call
 from sim.kernels.linear import factor, solve, subtract_column
-from sim.kernels.memory import aligned, zeros
-from sim.kernels.stages import combine, coupled_rates, keep_stage
+from sim.kernels.masses import add_energies, add_mass_blocks, add_mass_terms, add_momentum
+from sim.kernels.matrices import cross, times
+from sim.kernels.motor import give_way, rods_of
+from sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
+from sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
 from sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
-from sim.kernels.vector import load, load0, load3, store, store1
+from sim.kernels.vector import load, load0, load1, load3, store, store1
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
-STAGES = 6
 GAMMA = 0.25
 NODES = np.array([0.0, 0.75, 0.321448134013046, 0.519745732277726, 1.0, 1.0])
 # Sum of the gammas of each stage: how much of the drive's change of acceleration it sees.
@@ -58,179 +59,41 @@ COUPLING = np.array(
     ]
 )
 
-NO_COUPLING = np.zeros((0, 9, LANES))
-
-# Ports through which power enters the wing.
-DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
 MAX_ROTATION = 1.0  # rad in one step; beyond, the individual has diverged
 
 
-class Wiring(NamedTuple):
-    """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
-
-    Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
-    (``sim.kernels.tangents``); order to fill are that of ``sim.elimination``.
-    """
-
-    mass: Array
-    inertia: Array
-    first: Index
-    second: Index
-    lower: Index
-    upper: Index
-    driven: int
-    a: Array
-    b: Array
-    order: Index
-    start: Index
-    below: Index
-    row: Index
-    products: Index
-    product_start: Index
-    fill: Index
-    strip_start: Index
-    weight: Array
-    centroid: Array
-    area: Array
-    markers: Array
-    carrier: Index
-
-
-class Setting(NamedTuple):
-    """One condition: air density (kg/m^3), wind (m/s), gravity (m/s^2), step (s)."""
-
-    density: float
-    wind: Array
-    gravity: float
-    step: float
-
-
-class Lanes(NamedTuple):
-    """What differs between individuals.
-
-    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W], and
-    the stiffness [C, 9, W] that couples rotation with translation, or none.
-    """
-
-    stiffness: Array
-    damping: Array
-    coefficients: Array
-    lift_share: Array
-    lift_x: Array
-    drag_share: Array
-    drag_x: Array
-    coupling: Array = NO_COUPLING
-
-
-class State(NamedTuple):
-    """Motion of all lanes: rotation [N+2, 9, W], position [N+2, 3, W], twist [N+2, 6, W]."""
-
-    R: Array
-    p: Array
-    V: Array
-
-
-class Work(NamedTuple):
-    """Scratch of one group of lanes; see :func:`new_work` for the shapes."""
-
-    R: Array
-    p: Array
-    V: Array
-    xi: Array
-    r_xi: Array
-    known: Array
-    U_xi: Array
-    U_V: Array
-    wrench: Array
-    lead: Array
-    Q: Array
-    d: Array
-    Q0: Array
-    d0: Array
-    against: Array
-    blocks: Array
-    normal_damping: Array
-    drag0: Array
-    V0: Array
-    lost: Array
-    stored: Array
-    air_power: Array
-    air_force: Array
-
-
-class Trace(NamedTuple):
-    """What a beat leaves behind, per step.
-
-    tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
-    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational. R, p, V: the motion
-    of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty where nobody asked.
-    """
-
-    tracks: Array
-    rods: Array
-    air: Array
-    power: Array
-    energy: Array
-    R: Array
-    p: Array
-    V: Array
-
-
 @kernel
-def set_rods(rods: Array, state: State) -> None:
-    """Put the driving rods at angle and rate ``rods`` [2, 3] (angle, rate, acceleration) about the hinge."""
+def set_rods(rods: Array, hinge: Array, state: State) -> None:
+    """Put the driving rods at angle and rate ``rods`` [2, 3, W] (angle, rate, acceleration) about the hinge.
+
+    R = c I + s u~ + (1 - c) u u^T about the axis u; with the hinge ``off`` from where the rods have it, that point
+    circles round the hinge's true place: p = place - R off, v = -u rate x off.
+    """
     n = len(state.R) - 2
+    u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
     for k in range(2):
-        c, s = math.cos(rods[k, 0]), math.sin(rods[k, 0])
+        c, s = cosine_and_sine(load(rods, k, 0))
+        rate = load(rods, k, 1)
+        a = (u[0] * (1.0 - c), u[1] * (1.0 - c), u[2] * (1.0 - c))
+        R = (
+            c + a[0] * u[0], a[0] * u[1] - s * u[2], a[0] * u[2] + s * u[1],
+            a[1] * u[0] + s * u[2], c + a[1] * u[1], a[1] * u[2] - s * u[0],
+            a[2] * u[0] - s * u[1], a[2] * u[1] + s * u[0], c + a[2] * u[2],
+        )  # fmt: skip
+        moved, sweep = times(R, off), cross(u, off)
         for i in range(9):
-            store(state.R, n + k, i, 0.0)
-        for i in range(6):
-            store(state.V, n + k, i, 0.0)
-        store(state.R, n + k, 0, 1.0)
-        store(state.R, n + k, 4, c)
-        store(state.R, n + k, 5, -s)
-        store(state.R, n + k, 7, s)
-        store(state.R, n + k, 8, c)
-        store(state.V, n + k, 0, rods[k, 1])
-
-
-def new_work(wiring: Wiring, lanes: Lanes) -> Work:
-    """Scratch arrays for a group of lanes."""
-    n, c = len(wiring.mass), len(wiring.first)
-    motion, stages = (n + 2, 6, LANES), (STAGES, n + 2, 6, LANES)
-    blocks = n + 2 * len(wiring.below) + c - wiring.driven
-    return Work(
-        R=zeros((n + 2, 9, LANES)),
-        p=zeros((n + 2, 3, LANES)),
-        V=zeros(motion),
-        xi=zeros(motion),
-        r_xi=zeros(motion),
-        known=zeros(motion),
-        U_xi=zeros(stages),
-        U_V=zeros(stages),
-        wrench=zeros(motion),
-        lead=zeros(motion),
-        Q=zeros((c, 9, LANES)),
-        d=zeros((c, 3, LANES)),
-        Q0=zeros((c, 9, LANES)),
-        d0=zeros((c, 3, LANES)),
-        against=aligned(-lanes.damping),
-        blocks=zeros((blocks, 36, LANES)),
-        normal_damping=zeros((n, LANES)),
-        drag0=zeros((n, LANES)),
-        V0=zeros(motion),
-        lost=zeros((LANES,)),
-        stored=zeros((LANES,)),
-        air_power=zeros((LANES,)),
-        air_force=zeros((3, LANES)),
-    )
+            store(state.R, n + k, i, R[i])
+        for i in range(3):
+            store(state.p, n + k, i, load1(hinge, 6 + i) - moved[i])
+            store(state.V, n + k, i, u[i] * rate)
+            store(state.V, n + k, 3 + i, -(sweep[i] * rate))
 
 
 @kernel
 def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Wrenches on all bodies and rods at the pose and twist in ``work``."""
+    """Wrenches on all bodies and rods, and rates of the effects' states, at pose, twist and states in ``work``."""
     n = len(wiring.mass)
-    w_, Q, d = work.wrench, work.Q, work.d
+    w_, Q, d, laws = work.wrench, work.Q, work.d, lanes.laws
     relative_pose(wiring.first, wiring.second, wiring.a, wiring.b, work.R, work.p, Q, d)
     inertial(wiring.mass, wiring.inertia, work.R, work.V, setting.gravity, w_)
     w_[n:] = 0.0
@@ -238,19 +101,45 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     work.stored[:] = 0.0
     work.air_power[:] = 0.0
     work.air_force[:] = 0.0
+    if len(lanes.pairs):
+        add_momentum(lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.V, w_)
+    if len(laws.connector):
+        twists(wiring.first, wiring.second, wiring.a, wiring.b, Q, d, work.V, work.twist)
+        work.more[:] = 0.0
+        work.more_k[:] = 0.0
+        work.more_d[:] = 0.0
+        for k in range(len(laws.connector)):
+            call(laws.connector[k, 0], work.connector_frames[k].ctypes.data, AFTER)
     connect(
         wiring.first, wiring.second, wiring.a, wiring.b, lanes.stiffness, lanes.damping,
-        lanes.coupling, Q, d, work.V, w_, work.lost, work.stored,
+        lanes.coupling, work.more, Q, d, work.V, w_, work.lost, work.stored,
     )  # fmt: skip
+    airflow(wiring, setting, lanes, work)
     strip_forces(
-        wiring.strip_start, wiring.weight, wiring.centroid, wiring.area, setting.density, setting.wind,
-        lanes.coefficients, lanes.lift_share, lanes.lift_x, lanes.drag_share, lanes.drag_x,
+        wiring.strip_start, wiring.weight, wiring.centroid, wiring.geometry, setting.density,
+        lanes.lift_share, lanes.lift_x, lanes.drag_share, lanes.drag_x,
+        work.flow, work.loads, len(laws.strip) > 0,
         work.R, work.V, w_, work.normal_damping, work.air_power, work.air_force,
     )  # fmt: skip
 
 
 @kernel
-def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> None:
+def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
+    """Flow and loads of all strips."""
+    laws = lanes.laws
+    work.induced[:] = 0.0
+    for k in range(len(laws.strip)):
+        call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, BEFORE)
+    strip_flow(
+        wiring.strip_start, wiring.weight, wiring.centroid, setting.wind, lanes.coefficients,
+        work.induced, work.R, work.p, work.V, work.flow, work.loads,
+    )  # fmt: skip
+    for k in range(len(laws.strip)):
+        call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, AFTER)
+
+
+@kernel
+def note(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
     """Write down the motion, the rods' load, the air's force, powers and energies at the start of step ``t``.
 
     Powers are taken here and not at the stages, where stiff springs are far from their values at the step's ends.
@@ -258,18 +147,27 @@ def note(wiring: Wiring, setting: Setting, work: Work, trace: Trace, t: int) -> 
     n, power = len(wiring.mass), trace.power[t]
     store1(power, DAMPERS, -load0(work.lost))
     store1(power, AIR, load0(work.air_power))
-    store1(power, FRONT_MOTOR, -load(work.wrench, n, 0) * load(work.V, n, 0))
-    store1(power, REAR_MOTOR, -load(work.wrench, n + 1, 0) * load(work.V, n + 1, 0))
+    for rod in range(2):
+        given = load(work.wrench, n + rod, 0) * load(work.V, n + rod, 0)
+        for i in range(1, 6):
+            given += load(work.wrench, n + rod, i) * load(work.V, n + rod, i)
+        store1(power, FRONT_MOTOR + rod, -given)
     trace.rods[t] = work.wrench[n:]
     trace.air[t] = work.air_force
     track(wiring.markers, wiring.carrier, work.R, work.p, trace.tracks[t])
     energy = trace.energy[t]
     kinetic_and_height(wiring.mass, wiring.inertia, work.p, work.V, setting.gravity, energy[0], energy[2])
     energy[1] = work.stored
+    if len(lanes.pairs):
+        add_energies(
+            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.p, work.V,
+            energy[0], energy[2],
+        )  # fmt: skip
     if len(trace.R):
         trace.R[t] = work.R
         trace.p[t] = work.p
         trace.V[t] = work.V
+        trace.z[t] = work.z
 
 
 @kernel
@@ -280,17 +178,31 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
     work.d0[:] = work.d
     work.drag0[:] = work.normal_damping
     work.V0[:] = work.V
+    work.R0[:] = work.R
+    work.more0[:] = work.more
+    work.more_k0[:] = work.more_k
+    work.more_d0[:] = work.more_d
+    if len(work.z):
+        keep_tangents(lanes.laws, wiring, hg, work)
+    for c in range(len(work.more_d0)):
+        for i in range(6):
+            store(work.against, c, i, -load(lanes.damping, c, i) - load(work.more_d0, c, i))
     start_blocks(wiring.mass, wiring.inertia, work.drag0, work.R, work.V, setting.gravity, hg, wiring.fill, work.blocks)
     add_connectors(
         wiring.first, wiring.second, wiring.lower, wiring.upper, wiring.a, wiring.b,
-        lanes.stiffness, lanes.damping, lanes.coupling, work.Q0, work.d0, work.V, hg, work.blocks,
+        lanes.stiffness, lanes.damping, lanes.coupling, work.more0, work.more_k0, work.more_d0,
+        work.Q0, work.d0, work.V, hg, work.blocks,
     )  # fmt: skip
+    if len(lanes.pairs):
+        add_mass_blocks(
+            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R0, work.V0, hg, work.blocks
+        )
     factor(wiring.order, wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
 @kernel
-def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage: int) -> None:
-    """Solve the stage for U_V and U_xi; ``rods`` [2, 3] as in the drive.
+def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods: Array, stage: int) -> None:
+    """Solve the stage for U_V, U_xi and U_z; ``rods`` [2, 3, W] as in the drive.
 
     With r = f + sum of COUPLING U / h, the unknown Y = U_xi / (h gamma) meets S Y = M (r_V + r_xi / (h gamma)) -
     dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi. The rods' Y is known, their acceleration being prescribed.
@@ -299,30 +211,38 @@ def solve_stage(wiring: Wiring, setting: Setting, work: Work, rods: Array, stage
     r_xi, wrench, known = work.r_xi, work.wrench, work.known
     coupled_rates(work.xi, work.V, work.U_xi, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, r_xi, work.lead)
     for rod in range(n, n + 2):
-        turn = hg * (load(work.lead, rod, 0) + rods[rod - n, 2])
-        store(known, rod, 0, turn + load(r_xi, rod, 0))
-        for j in range(1, 6):
-            store(known, rod, j, load(r_xi, rod, j))
+        place_rod(rod, load(rods, rod - n, 2), hg, lanes.hinge, work.lead, r_xi, known)
     add_own_terms(wiring.mass, wiring.inertia, work.drag0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
+    if len(lanes.pairs):
+        add_mass_terms(
+            lanes.pairs, lanes.masses, lanes.weighing, setting.wind, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench
+        )
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)
+    if len(work.z):
+        start_states(wiring, lanes.laws, setting.step, COUPLING[stage], stage, work)
     for c in range(k, len(wiring.first)):
         subtract_column(wiring.second[c], wiring.lower[c], work.blocks, known, wiring.first[c], wrench)
     solve(wiring.order, wiring.start, wiring.below, wiring.row, work.blocks, wrench)
     known[:n] = wrench[:n]
     keep_stage(known, r_xi, work.V0, hg, work.U_xi[stage], work.U_V[stage])
+    if len(work.z):
+        finish_states(wiring, lanes.laws, work, stage)
 
 
 @kernel
 def _to_stage(work: Work, state: State, stage: int) -> None:
-    """Local coordinates, twist and pose of a stage."""
+    """Local coordinates, twist, states and pose of a stage."""
     if stage < STAGES - 1:
         combine(0.0, state.V, work.U_xi, STAGE[stage], stage, work.xi)
         combine(1.0, state.V, work.U_V, STAGE[stage], stage, work.V)
+        combine_states(state.z, work.U_z, STAGE[stage], stage, work.z)
     else:
         for i in range(work.xi.shape[0]):
             for k in range(6):
                 store(work.xi, i, k, load(work.xi, i, k) + load3(work.U_xi, stage - 1, i, k))
                 store(work.V, i, k, load(work.V, i, k) + load3(work.U_V, stage - 1, i, k))
+        for i in range(len(work.z)):
+            store1(work.z, i, load1(work.z, i) + load(work.U_z, stage - 1, i))
     move(state.R, state.p, work.xi, work.R, work.p)
 
 
@@ -333,6 +253,7 @@ def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
     state.R[:] = work.R
     state.p[:] = work.p
     state.V[:] = work.V
+    state.z[:] = work.z
     for i in range(len(work.xi)):
         for w in range(LANES):
             x, y, z = work.xi[i, 0, w], work.xi[i, 1, w], work.xi[i, 2, w]
@@ -353,22 +274,34 @@ def advance(
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 
-    ``drive`` [n, STAGES, 2, 3]: angle, rate and acceleration of both rods at the stages of every step; angle and rate
-    are taken at its start only, in between they follow from the acceleration. A lane whose bodies turn more than
+    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (two more
+    derivatives for a drive that gives way); angle and
+    rate are taken at its start only, in between they follow from the acceleration. A lane whose bodies turn more than
     MAX_ROTATION in a step, or become NaN, is marked dead in ``alive`` and runs on, ignored.
     """
     for t in range(len(drive)):
-        set_rods(drive[t, 0], state)
+        rods = drive[t, 0]
+        if len(lanes.laws.motor):
+            rods_of(drive[t, 0], state.z, work.z_rate, work.rods)
+            rods = work.rods
+        set_rods(rods, lanes.hinge, state)
         work.xi[:] = 0.0
         work.R[:] = state.R
         work.p[:] = state.p
         work.V[:] = state.V
+        work.z[:] = state.z
         for stage in range(STAGES):
             if stage > 0:
                 _to_stage(work, state, stage)
             forces(wiring, setting, lanes, work)
+            if len(lanes.laws.motor):
+                give_way(lanes.laws.motor, work)
             if stage == 0:
-                note(wiring, setting, work, trace, t)
+                note(wiring, setting, lanes, work, trace, t)
                 linearise(wiring, setting, lanes, work)
-            solve_stage(wiring, setting, work, drive[t, stage], stage)
+            rods = drive[t, stage]
+            if len(lanes.laws.motor):
+                rods_of(drive[t, stage], work.z, work.z_rate, work.rods)
+                rods = work.rods
+            solve_stage(wiring, setting, lanes, work, rods, stage)
         finish_step(work, state, alive)

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -40,6 +40,13 @@ def kernel(function: F) -> F:
     return cast(F, compiled)
 
 
+def callback(function: F, signature: Any) -> Any:
+    """Compile a function to be called by address, cached on disk by the content of its own file and of all kernels."""
+    folder = _cache_folder(Path(inspect.getfile(function)).resolve())
+    with _cached_in(folder):
+        return numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
+
+
 def inlined(function: F) -> F:
     """Compile a small function into each kernel that calls it."""
     return cast(F, numba.njit(forceinline=True, fastmath={"contract"}, error_model="numpy")(function))
@@ -47,15 +54,22 @@ def inlined(function: F) -> F:
 
 @cache
 def _cache_folder(source: Path) -> Path:
-    """Where the kernels of the folder ``source`` are cached: named after its content and that of this one."""
+    """Where the kernels of ``source`` are cached: named after its content and this folder's.
+
+    Of a folder all files count; beside a file those that it may share code with, whose names start with an underscore.
+    """
     digest = hashlib.sha256()
-    for file in sorted({*source.glob("*.py"), *Path(__file__).resolve().parent.glob("*.py")}):
+    alone = source.is_file()
+    own = {source, *source.parent.glob("_*.py")} if alone else set(source.glob("*.py"))
+    for file in sorted({*own, *Path(__file__).resolve().parent.glob("*.py")}):
         digest.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
+    home = source.parent if alone else source
     places = (
-        Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else source / "__pycache__",
+        Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else home / "__pycache__",
         Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wingfit",
     )
-    for place in places:
+    for base in places:
+        place = base / source.stem if alone else base
         folder = place / f"kernels-{digest.hexdigest()[:16]}"
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)

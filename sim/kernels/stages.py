@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sim.kernels.bodies import body_rate
 from sim.kernels.jit import kernel
 from sim.kernels.matrices import cross, load_vector
-from sim.kernels.vector import load, load3, store
+from sim.kernels.vector import Vector, load, load1, load3, store
 
 Array = npt.NDArray[np.float64]
 
@@ -53,3 +53,14 @@ def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V:
             store(U_xi, i, 3 + k, length * z)
             store(U_V, i, k, y - load(rate, i, k) - (0.5 * length) * a[k])
             store(U_V, i, 3 + k, z - load(rate, i, 3 + k) - length * b[k])
+
+
+@kernel
+def place_rod(rod: int, turning: Vector, length: float, hinge: Array, lead: Array, rate: Array, known: Array) -> None:
+    """Y of a driving rod that turns about the hinge with the acceleration ``turning``; l is ``length``."""
+    u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
+    sweep = cross(u, off)
+    for j in range(3):
+        store(known, rod, j, length * (load(lead, rod, j) + u[j] * turning) + load(rate, rod, j))
+        moved = length * (load(lead, rod, 3 + j) - sweep[j] * turning)
+        store(known, rod, 3 + j, moved + load(rate, rod, 3 + j))

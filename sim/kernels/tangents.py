@@ -205,6 +205,9 @@ def add_connectors(
     K: Array,
     D: Array,
     coupling: Array,
+    more: Array,
+    more_k: Array,
+    more_d: Array,
     Q_: Array,
     d_: Array,
     V: Array,
@@ -215,6 +218,8 @@ def add_connectors(
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
     driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.
+    ``more`` as in :func:`sim.kernels.connectors.connect`, ``more_k`` and ``more_d`` [C, 6, W] minus its derivatives by
+    displacement and twist along its own axes, or empty.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -236,6 +241,14 @@ def add_connectors(
             f = (f[0] + pull_f[0], f[1] + pull_f[1], f[2] + pull_f[2])
         t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
         f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
+        if len(more):
+            t = (t[0] + load(more, c, 0), t[1] + load(more, c, 1), t[2] + load(more, c, 2))
+            f = (f[0] + load(more, c, 3), f[1] + load(more, c, 4), f[2] + load(more, c, 5))
+            extra_o, extra_t = load_vector(more_k, c, 0), load_vector(more_k, c, 3)
+            K_ = (with_diagonal(K_[0], extra_o), K_[1], K_[2], with_diagonal(K_[3], extra_t))
+            extra_o, extra_t = load_vector(more_d, c, 0), load_vector(more_d, c, 3)
+            do = (do[0] + extra_o[0], do[1] + extra_o[1], do[2] + extra_o[2])
+            dt = (dt[0] + extra_t[0], dt[1] + extra_t[1], dt[2] + extra_t[2])
         sweep = cross(omega, e)
         g = (slide[0] + velocity[0] + sweep[0], slide[1] + velocity[1] + sweep[1], slide[2] + velocity[2] + sweep[2])
         B = twist_tangent(g, omega, turning)

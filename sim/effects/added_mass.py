@@ -1,0 +1,95 @@
+"""Air that a wing must accelerate with itself, as inertia."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.effects.contract import Effect, Parameter, Values
+from sim.effects.wing import WingScene
+from sim.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+_MODES = 64  # of the flow about a section
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    scale = values["k"] * scene.density
+    structure = scene.structure
+    for strip, count in enumerate(structure.division.bodies):
+        joined = strip_matrix(structure, strip)
+        for i in range(count):
+            for j in range(count):
+                block = np.zeros((6, 6, len(scale)))
+                block += joined[6 * i : 6 * i + 6, 6 * j : 6 * j + 6, None] * scale
+                first, second = structure.division.index(strip, i), structure.division.index(strip, j)
+                scene.add_air(first, second, block)
+
+
+def strip_matrix(structure: Structure, strip: int) -> Array:
+    """[6 n, 6 n] (m^3 to m^5): twice the kinetic energy of air of density one that a strip of n bodies moves.
+
+    A section of chord c = 2 b whose points move along the normal with w(x) moves the air about it with the kinetic
+    energy of a potential jump sqrt(1 - x^2) sum_k W_k U_k(x), x = cos t from edge to edge; with w = sum_k w_k U_k that
+    is W_k = 2 b w_k / (k + 1) (thin airfoil theory; Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955), sect. 5-6).
+    So a section that heaves moves rho pi c^2 / 4 of air, one that pitches about its middle rho pi c^4 / 128.
+    """
+    division = structure.division
+    count, panels = division.bodies[strip], structure.panels
+    total = np.zeros((6 * count, 6 * count))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    first = panels[division.index(strip, 0)]
+    for node, weight in zip(nodes, weights, strict=True):
+        y = 0.5 * (first.y0 + first.y1) + 0.5 * (first.y1 - first.y0) * node
+        width = 0.5 * (first.y1 - first.y0) * weight
+        chord, edge = float(structure.planform.chord(y)), float(structure.planform.leading_edge(y))
+        modes = np.zeros((_MODES, 6 * count))
+        for i in range(count):
+            body = structure.bodies[division.index(strip, i)]
+            for column, constant, slope in _normal_motion(y, edge + 0.5 * chord, body.centre):
+                modes[:, 6 * i + column] = _modes(i / count, (i + 1) / count, constant, slope * 0.5 * chord)
+        k = np.arange(1, _MODES + 1)
+        total += width * 2 * (0.5 * chord) ** 2 * (0.5 * math.pi) * modes.T @ (modes / k[:, None])
+    return total
+
+
+def _normal_motion(y: float, middle: float, centre: Array) -> list[tuple[int, float, float]]:
+    """Velocity along the normal of a body's points at span ``y`` per component of its twist: at mid-chord, and by x."""
+    return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
+
+
+def _modes(s0: float, s1: float, constant: float, slope: float) -> Array:
+    """Coefficients by U_k of constant + slope x between two fractions of the chord, zero elsewhere; x in -1..1.
+
+    w_k = 2 / pi times the integral of w U_k sqrt(1 - x^2), with x = cos t that of w sin((k + 1) t) sin t.
+    """
+    t0, t1 = math.acos(max(min(2 * s1 - 1, 1.0), -1.0)), math.acos(max(min(2 * s0 - 1, 1.0), -1.0))
+    m = np.arange(1, _MODES + 1)
+
+    def cosines(n: npt.NDArray[np.int64]) -> Array:
+        """Integral of cos(n t)."""
+        safe = np.where(n == 0, 1, n)
+        return np.where(n == 0, t1 - t0, (np.sin(safe * t1) - np.sin(safe * t0)) / safe)
+
+    even = 0.5 * (cosines(m - 1) - cosines(m + 1))
+    odd = 0.25 * (cosines(m - 2) - cosines(m + 2))  # times cos t
+    return np.asarray(2 / math.pi * (constant * even + slope * odd))
+
+
+EFFECT = Effect(
+    name="added_mass",
+    title="Added mass",
+    family="aerodynamics",
+    port="inertia",
+    size=(Parameter("k", "1", 0.0, 3.0, 1.0, "air carried along, as a part of that of plates in unbounded flow"),),
+    power="conservative",
+    source="Lamb, Hydrodynamics (1932), sections 71 and 124; Sedov (1965); Ellington, Philosophical Transactions B 305, "
+    "17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
+    signature="swings later and wider, as if the wing were heavier across its plane; grows with density and the "
+    "acceleration, not with the airspeed",
+    confused_with=("lumped_mass", "rotational_circulation"),
+    wing=_wing,
+)

@@ -1,0 +1,278 @@
+"""What the kernels are given and what they leave behind: all arrays of a group of lanes, with their shapes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels import LANES
+from sim.kernels.memory import aligned, zeros
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+STAGES = 6
+# Ports through which power enters the wing.
+DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
+# What is known of a strip's flow before the laws of the air are asked.
+(
+    CHORD_X, CHORD_Y, CHORD_Z,  # unit vector from leading to trailing edge, in the world
+    NORMAL_X, NORMAL_Y, NORMAL_Z,  # unit vector out of the upper side
+    PLACE_X, PLACE_Y, PLACE_Z,  # of the strip's area in the world, m; only where laws of effects ask
+    STREAM_C, STREAM_N,  # velocity of the air relative to the strip, m/s
+    SPEED, ALPHA, FORWARD,  # its size; the angle of attack; 1 in flow from ahead, -1 from behind
+    PITCH_RATE,  # of the strip about the span, nose up, rad/s
+    FLOW,
+) = range(16)  # fmt: skip
+# What the laws of the air make of it; forces are these times density times area / 2.
+(
+    CIRCULATION,  # speed times lift coefficient, m/s: a force across the stream, shared out as lift
+    DRAG,  # speed times drag coefficient, m/s: a force along the stream, shared out as drag
+    LIFT_SLOPE, DRAG_SLOPE,  # their changes with the angle of attack, for the linearisation
+    PUSH_N, PUSH_C,  # m^2/s^2: force along normal and chord, spread evenly over the strip
+    PUSH_M,  # m^3/s^2: moment about the span, nose up, spread evenly
+    LOADS,
+) = range(8)  # fmt: skip
+# Derivatives that the step needs of each state of an effect (sim.kernels.laws).
+DECAY, DRIVE, PULL = range(3)
+FRAME = 17  # numbers in a law's frame: places, parameters and states per place, then addresses
+# Geometry of a strip.
+AREA, MEAN_CHORD, WIDTH, STATION, GEOMETRY = range(5)  # m^2, m, m, part of the span from root to tip
+
+
+class Wiring(NamedTuple):
+    """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
+
+    Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
+    (``sim.kernels.tangents``); order to fill are that of ``sim.elimination``. ``geometry`` [S, GEOMETRY].
+    """
+
+    mass: Array
+    inertia: Array
+    first: Index
+    second: Index
+    lower: Index
+    upper: Index
+    driven: int
+    a: Array
+    b: Array
+    order: Index
+    start: Index
+    below: Index
+    row: Index
+    products: Index
+    product_start: Index
+    fill: Index
+    strip_start: Index
+    weight: Array
+    centroid: Array
+    geometry: Array
+    markers: Array
+    carrier: Index
+
+
+class Setting(NamedTuple):
+    """One condition: air density [W] (kg/m^3), wind [3, W] (m/s), gravity (m/s^2), step (s)."""
+
+    density: Array
+    wind: Array
+    gravity: float
+    step: float
+
+
+class Laws(NamedTuple):
+    """Compiled laws of the effects chosen.
+
+    ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, where in
+    ``parameters`` [., W] and in the states [Z, W] they start, where in ``axes`` its states' axes start. ``axes``: of
+    each state per connector, 0..5 as in stiffness. ``size`` [Z]: a state times this is comparable with metres.
+    ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`sim.kernels.motor`), whose states are the last.
+    """
+
+    strip: Index
+    connector: Index
+    axes: Index
+    parameters: Array
+    size: Array
+    motor: Array
+
+
+class Lanes(NamedTuple):
+    """What differs between individuals.
+
+    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W],
+    ``hinge`` [9, W]: axis of the driving rods, how far its true place is from where the rods have it, and that place
+    (m). Then what only some wings have, and empty elsewhere: the stiffness [C, 9, W] that couples rotation with
+    translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their block in the matrix, whose momentum is
+    joined by ``masses`` [P, 36, W], the first ``weighing`` of them of weight, the others of air moved along; and the
+    laws of effects, see :mod:`sim.kernels.laws`.
+    """
+
+    stiffness: Array
+    damping: Array
+    coefficients: Array
+    lift_share: Array
+    lift_x: Array
+    drag_share: Array
+    drag_x: Array
+    hinge: Array
+    coupling: Array
+    pairs: Index
+    masses: Array
+    weighing: int
+    laws: Laws
+
+
+class State(NamedTuple):
+    """Motion of all lanes: rotation [N+2, 9, W], position [N+2, 3, W], twist [N+2, 6, W], effects' states [Z, W]."""
+
+    R: Array
+    p: Array
+    V: Array
+    z: Array
+
+
+class Work(NamedTuple):
+    """Scratch of one group of lanes; see :func:`new_work` for the shapes."""
+
+    R: Array
+    p: Array
+    V: Array
+    z: Array
+    xi: Array
+    r_xi: Array
+    known: Array
+    U_xi: Array
+    U_V: Array
+    U_z: Array
+    wrench: Array
+    lead: Array
+    Q: Array
+    d: Array
+    Q0: Array
+    d0: Array
+    against: Array
+    blocks: Array
+    flow: Array
+    loads: Array
+    induced: Array
+    normal_damping: Array
+    drag0: Array
+    V0: Array
+    R0: Array
+    lost: Array
+    stored: Array
+    air_power: Array
+    air_force: Array
+    z_rate: Array
+    z_tangent: Array
+    z_tangent0: Array
+    z_known: Array
+    twist: Array
+    more: Array
+    more0: Array
+    more_k: Array
+    more_d: Array
+    more_k0: Array
+    more_d0: Array
+    push: Array
+    rods: Array
+    strip_frames: Index
+    connector_frames: Index
+
+
+class Trace(NamedTuple):
+    """What a beat leaves behind, per step.
+
+    tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
+    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational. R, p, V, z: the
+    motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty where nobody asked.
+    """
+
+    tracks: Array
+    rods: Array
+    air: Array
+    power: Array
+    energy: Array
+    R: Array
+    p: Array
+    V: Array
+    z: Array
+
+
+def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
+    """Scratch arrays for a group of lanes."""
+    n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
+    z, laws = len(lanes.laws.size), lanes.laws
+    motion, stages = (n + 2, 6, LANES), (STAGES, n + 2, 6, LANES)
+    joints = (c if len(laws.connector) else 0, 6, LANES)
+    blocks = n + 2 * len(wiring.below) + c - wiring.driven
+    work = Work(
+        R=zeros((n + 2, 9, LANES)),
+        p=zeros((n + 2, 3, LANES)),
+        V=zeros(motion),
+        z=zeros((z, LANES)),
+        xi=zeros(motion),
+        r_xi=zeros(motion),
+        known=zeros(motion),
+        U_xi=zeros(stages),
+        U_V=zeros(stages),
+        U_z=zeros((STAGES, z, LANES)),
+        wrench=zeros(motion),
+        lead=zeros(motion),
+        Q=zeros((c, 9, LANES)),
+        d=zeros((c, 3, LANES)),
+        Q0=zeros((c, 9, LANES)),
+        d0=zeros((c, 3, LANES)),
+        against=aligned(-lanes.damping),
+        blocks=zeros((blocks, 36, LANES)),
+        flow=zeros((s, FLOW, LANES)),
+        loads=zeros((s, LOADS, LANES)),
+        induced=zeros((s if len(laws.strip) else 0, 3, LANES)),
+        normal_damping=zeros((n, LANES)),
+        drag0=zeros((n, LANES)),
+        V0=zeros(motion),
+        R0=zeros((n + 2, 9, LANES)),
+        lost=zeros((LANES,)),
+        stored=zeros((LANES,)),
+        air_power=zeros((LANES,)),
+        air_force=zeros((3, LANES)),
+        z_rate=zeros((z, LANES)),
+        z_tangent=zeros((3, z, LANES)),
+        z_tangent0=zeros((3, z, LANES)),
+        z_known=zeros((z, LANES)),
+        twist=zeros(joints),
+        more=zeros(joints),
+        more0=zeros(joints),
+        more_k=zeros(joints),
+        more_d=zeros(joints),
+        more_k0=zeros(joints),
+        more_d0=zeros(joints),
+        push=zeros(joints),
+        rods=zeros((2, 3, LANES)),
+        strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
+        connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
+    )
+    _frame_laws(wiring, setting, laws, work)
+    return work
+
+
+def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
+    """Tell every law where its arrays are."""
+    air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind)
+    joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
+    for k, row in enumerate(laws.strip):
+        own = (laws.parameters[row[3] :], work.z[row[4] :], work.z_rate[row[4] :], work.z_tangent[DECAY, row[4] :])
+        work.strip_frames[k] = _frame(len(wiring.geometry), row, (*own, *air))
+    for k, row in enumerate(laws.connector):
+        tangents = (work.z_tangent[kind, row[4] :] for kind in (DECAY, DRIVE, PULL))
+        states = (work.z[row[4] :], work.z_rate[row[4] :], *tangents)
+        work.connector_frames[k] = _frame(len(wiring.first), row, (laws.parameters[row[3] :], *states, *joints))
+
+
+def _frame(places: int, row: Index, arrays: tuple[Array, ...]) -> list[int]:
+    """What a law is given: how many places, parameters and states, then where the arrays are."""
+    found = [places, int(row[1]), int(row[2]), *(array.ctypes.data for array in arrays)]
+    return found + [0] * (FRAME - len(found))

@@ -1,0 +1,158 @@
+"""Compiled laws of effects, called by address: the integrator is compiled once, whichever effects are on.
+
+A law is a function ``law(frame, moment)`` that is compiled by itself, cached by the content of its own file and of the
+kernels, and only where it is used (:func:`address`). ``strip_port(frame)`` or ``connector_port(frame)`` opens what it
+may read and add to; arrays end in the lanes, to be used with the functions of :mod:`sim.kernels.vector`. Laws of the
+air are called at two moments of every stage: BEFORE the flow of the strips is known, when they may set the induced
+velocity from their states, and AFTER it, when they change the loads and give the rates of their states. Laws of
+connectors are called once, AFTER.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from llvmlite import ir
+from numba import carray, types
+from numba.extending import intrinsic
+
+from sim.kernels import LANES
+from sim.kernels.arrays import FLOW, GEOMETRY, LOADS
+from sim.kernels.jit import callback, inlined
+
+Array = npt.NDArray[np.float64]
+Law = Callable[[Any, int], None]
+
+BEFORE, AFTER = 0, 1
+SIGNATURE = types.void(types.CPointer(types.int64), types.int64)
+
+
+class StripPort(NamedTuple):
+    """What a law of the air sees. S strips; parameters [P, S, W] and states [K, S, W] are its own.
+
+    Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s). Add to or
+    change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Give,
+    AFTER: ``rate`` [K, S, W] of the states, and ``decay`` [K, S, W], minus its derivative by the state itself (1/s).
+    """
+
+    places: int
+    parameters: Array
+    state: Array
+    rate: Array
+    decay: Array
+    flow: Array
+    loads: Array
+    induced: Array
+    geometry: Array
+    density: Array
+    wind: Array
+
+
+class ConnectorPort(NamedTuple):
+    """What a law of the connectors sees. C connectors; parameters [P, C, W] and states [K, C, W] are its own.
+
+    Read: ``Q`` [C, 9, W] and ``d`` [C, 3, W], the pose of the second frame in the first; ``twist`` [C, 6, W] of the
+    second relative to the first (rad/s, m/s), about the axes of the first. Add to: ``wrench`` [C, 6, W] on the second
+    body in the axes of the first; ``stiffness`` and ``damping`` [C, 6, W], minus its derivatives by displacement and
+    twist; ``lost`` and ``stored`` [W], power lost (W) and energy kept (J). Give of each state its ``rate``, ``decay``
+    as for a strip, ``drive``, the derivative of the rate by the twist along the state's axis, and ``pull``, minus the
+    derivative of the wrench along that axis by the state.
+    """
+
+    places: int
+    parameters: Array
+    state: Array
+    rate: Array
+    decay: Array
+    drive: Array
+    pull: Array
+    Q: Array
+    d: Array
+    twist: Array
+    wrench: Array
+    stiffness: Array
+    damping: Array
+    lost: Array
+    stored: Array
+
+
+@intrinsic
+def _doubles(typingctx: Any, address: Any) -> Any:  # noqa: ARG001
+    """An address as a pointer to floats."""
+    kind = types.CPointer(types.float64)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
+        return builder.inttoptr(args[0], context.get_value_type(kind))
+
+    return kind(types.int64), codegen
+
+
+@intrinsic
+def call(typingctx: Any, function: Any, frame: Any, moment: Any) -> Any:  # noqa: ARG001
+    """Call the law at address ``function`` with the frame at address ``frame``."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
+        long = ir.IntType(64)
+        kind = ir.FunctionType(ir.VoidType(), [long.as_pointer(), long])
+        pointer = builder.inttoptr(args[0], kind.as_pointer())
+        builder.call(pointer, [builder.inttoptr(args[1], long.as_pointer()), args[2]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), codegen
+
+
+@inlined
+def strip_port(frame: Any) -> StripPort:
+    """Open the frame of a law of the air."""
+    S, P, K = frame[0], frame[1], frame[2]
+    return StripPort(
+        S,
+        carray(_doubles(frame[3]), (P, S, LANES)),
+        carray(_doubles(frame[4]), (K, S, LANES)),
+        carray(_doubles(frame[5]), (K, S, LANES)),
+        carray(_doubles(frame[6]), (K, S, LANES)),
+        carray(_doubles(frame[7]), (S, FLOW, LANES)),
+        carray(_doubles(frame[8]), (S, LOADS, LANES)),
+        carray(_doubles(frame[9]), (S, 3, LANES)),
+        carray(_doubles(frame[10]), (S, GEOMETRY)),
+        carray(_doubles(frame[11]), (LANES,)),
+        carray(_doubles(frame[12]), (3, LANES)),
+    )
+
+
+@inlined
+def connector_port(frame: Any) -> ConnectorPort:
+    """Open the frame of a law of the connectors."""
+    C, P, K = frame[0], frame[1], frame[2]
+    return ConnectorPort(
+        C,
+        carray(_doubles(frame[3]), (P, C, LANES)),
+        carray(_doubles(frame[4]), (K, C, LANES)),
+        carray(_doubles(frame[5]), (K, C, LANES)),
+        carray(_doubles(frame[6]), (K, C, LANES)),
+        carray(_doubles(frame[7]), (K, C, LANES)),
+        carray(_doubles(frame[8]), (K, C, LANES)),
+        carray(_doubles(frame[9]), (C, 9, LANES)),
+        carray(_doubles(frame[10]), (C, 3, LANES)),
+        carray(_doubles(frame[11]), (C, 6, LANES)),
+        carray(_doubles(frame[12]), (C, 6, LANES)),
+        carray(_doubles(frame[13]), (C, 6, LANES)),
+        carray(_doubles(frame[14]), (C, 6, LANES)),
+        carray(_doubles(frame[15]), (LANES,)),
+        carray(_doubles(frame[16]), (LANES,)),
+    )
+
+
+@cache
+def compiled(law: Law) -> Any:
+    """A law, compiled or taken from the cache; one must keep it as long as its address is used."""
+    return callback(law, SIGNATURE)
+
+
+def address(law: Law) -> int:
+    """Where the compiled law is in this process."""
+    return int(compiled(law).address)

@@ -1,0 +1,237 @@
+"""Momentum of masses that effects add: fixed to a body, or of air that the bodies of a strip move together.
+
+The kinetic energy is half the sum of X_i . M_ij X_j over pairs of bodies, M_ij constant in their frames. X is the
+twist; for air it is taken relative to the wind, so that a plate that drifts with it feels nothing. With
+(h, p) = M_ij X_j the law of motion is h' = h x omega + p x v, p' = p x omega (Kirchhoff 1869; Lamb, Hydrodynamics,
+section 124), which keeps the energy exactly. All of it enters as inertia: fed back as a force, air that outweighs the wing would make the
+step unstable.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.connectors import add_wrench
+from sim.kernels.jit import inlined, kernel
+from sim.kernels.matrices import (
+    Nine,
+    Three,
+    add_to_block,
+    cross,
+    load_vector,
+    plus,
+    product,
+    scaled,
+    skew,
+    skew_times,
+    times,
+    times_skew,
+)
+from sim.kernels.vector import load, load0, load1, store0
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Six = tuple[Nine, Nine, Nine, Nine]
+
+
+@inlined
+def _quarter(masses: Array, k: int, at: int) -> Nine:
+    """Three rows and columns of matrix k from element ``at`` on."""
+    return (
+        load(masses, k, at), load(masses, k, at + 1), load(masses, k, at + 2),
+        load(masses, k, at + 6), load(masses, k, at + 7), load(masses, k, at + 8),
+        load(masses, k, at + 12), load(masses, k, at + 13), load(masses, k, at + 14),
+    )  # fmt: skip
+
+
+@inlined
+def _matrix(masses: Array, k: int) -> Six:
+    return _quarter(masses, k, 0), _quarter(masses, k, 3), _quarter(masses, k, 18), _quarter(masses, k, 21)
+
+
+@inlined
+def _times(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
+    a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2])
+
+
+@inlined
+def _in_body(R: Array, n: int, wind: Array) -> Three:
+    """The wind in the frame of body n."""
+    x, y, z = load1(wind, 0), load1(wind, 1), load1(wind, 2)
+    return (
+        load(R, n, 0) * x + load(R, n, 3) * y + load(R, n, 6) * z,
+        load(R, n, 1) * x + load(R, n, 4) * y + load(R, n, 7) * z,
+        load(R, n, 2) * x + load(R, n, 5) * y + load(R, n, 8) * z,
+    )
+
+
+@inlined
+def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
+    """Velocity of body n, for air relative to the wind."""
+    v = load_vector(V, n, 3)
+    if air:
+        w = _in_body(R, n, wind)
+        return v[0] - w[0], v[1] - w[1], v[2] - w[2]
+    return v
+
+
+@kernel
+def add_momentum(
+    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, wrench: Array
+) -> None:
+    """Add what turning does to the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
+    for k in range(len(pairs)):
+        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
+        M, omega = _matrix(masses, k), load_vector(V, i, 0)
+        own = _relative(V, R, i, wind, air)
+        h, p = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+        t, s, f = cross(h, omega), cross(p, own), cross(p, omega)
+        add_wrench(wrench, i, (t[0] + s[0], t[1] + s[1], t[2] + s[2]), f)
+        if air:  # the wind turns in the frame of the body
+            turn, w = load_vector(V, j, 0), _in_body(R, j, wind)
+            a, b = _times(M, scaled_vector(0.0, turn), cross(turn, w))
+            add_wrench(wrench, i, scaled_vector(-1.0, a), scaled_vector(-1.0, b))
+        else:
+            t, f = _weight(M, gravity, R, i)
+            add_wrench(wrench, i, t, f)
+
+
+@inlined
+def scaled_vector(factor: float, x: Three) -> Three:
+    """``factor`` times x."""
+    return factor * x[0], factor * x[1], factor * x[2]
+
+
+@inlined
+def _first_moment(M: Six) -> Three:
+    """Mass times place, from the coupling of moment and velocity, which is its cross product."""
+    return M[1][7], M[1][2], M[1][3]
+
+
+@inlined
+def _weight(M: Six, gravity: float, R: Array, i: int) -> tuple[Three, Three]:
+    g = (-gravity * load(R, i, 6), -gravity * load(R, i, 7), -gravity * load(R, i, 8))
+    return cross(_first_moment(M), g), times(M[3], g)
+
+
+@kernel
+def add_mass_blocks(
+    pairs: Index,
+    masses: Array,
+    weighing: int,
+    gravity: float,
+    wind: Array,
+    R: Array,
+    V: Array,
+    length: float,
+    blocks: Array,
+) -> None:
+    """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`sim.kernels.tangents`)."""
+    for k in range(len(pairs)):
+        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
+        M = _matrix(masses, k)
+        v_j = _relative(V, R, j, wind, air)
+        h, p = _times(M, load_vector(V, j, 0), v_j)
+        A = _by_twist(M, load_vector(V, i, 0), _relative(V, R, i, wind, air), 1.0 / length)
+        add_to_block(blocks, pairs[k, 2], _with_motion(A, V, j, length))
+        zero = scaled(0.0, M[0])
+        own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
+        add_to_block(blocks, i, _with_motion(own, V, i, length))
+        if not air:
+            up = skew((load(R, i, 6), load(R, i, 7), load(R, i, 8)))
+            turned = scaled(length * gravity, up)
+            add_to_block(blocks, i, (skew_times(_first_moment(M), turned), zero, product(M[3], turned), zero))
+
+
+@inlined
+def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
+    """``factor`` M + [[omega~, v~], [0, omega~]] M."""
+    return (
+        plus(scaled(factor, M[0]), plus(skew_times(omega, M[0]), skew_times(v, M[2]))),
+        plus(scaled(factor, M[1]), plus(skew_times(omega, M[1]), skew_times(v, M[3]))),
+        plus(scaled(factor, M[2]), skew_times(omega, M[2])),
+        plus(scaled(factor, M[3]), skew_times(omega, M[3])),
+    )
+
+
+@inlined
+def _with_motion(A: Six, V: Array, j: int, length: float) -> Six:
+    """A (I - l A_j), A_j being that of body j: I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]]."""
+    omega, v = load_vector(V, j, 0), load_vector(V, j, 3)
+    half = 0.5 * length
+    return (
+        plus(A[0], plus(scaled(half, times_skew(A[0], omega)), scaled(length, times_skew(A[1], v)))),
+        A[1],
+        plus(A[2], plus(scaled(half, times_skew(A[2], omega)), scaled(length, times_skew(A[3], v)))),
+        A[3],
+    )
+
+
+@kernel
+def add_mass_terms(
+    pairs: Index,
+    masses: Array,
+    weighing: int,
+    wind: Array,
+    R: Array,
+    V: Array,
+    factor: float,
+    lead: Array,
+    X: Array,
+    wrench: Array,
+) -> None:
+    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
+    for k in range(len(pairs)):
+        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
+        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), _relative(V, R, i, wind, air)
+        x, y = load_vector(X, j, 0), load_vector(X, j, 3)
+        u, w = load_vector(lead, j, 0), load_vector(lead, j, 3)
+        a, b = _times(
+            M,
+            (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]),
+            (w[0] + factor * y[0], w[1] + factor * y[1], w[2] + factor * y[2]),
+        )
+        c, d = _times(M, x, y)
+        e, f, g = cross(omega, c), cross(v, d), cross(omega, d)
+        h, p = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+        x, y = load_vector(X, i, 0), load_vector(X, i, 3)
+        q, r, s = cross(h, x), cross(p, y), cross(p, x)
+        add_wrench(
+            wrench,
+            i,
+            (
+                a[0] + e[0] + f[0] - q[0] - r[0],
+                a[1] + e[1] + f[1] - q[1] - r[1],
+                a[2] + e[2] + f[2] - q[2] - r[2],
+            ),
+            (b[0] + g[0] - s[0], b[1] + g[1] - s[1], b[2] + g[2] - s[2]),
+        )
+
+
+@kernel
+def add_energies(
+    pairs: Index,
+    masses: Array,
+    weighing: int,
+    gravity: float,
+    wind: Array,
+    R: Array,
+    p: Array,
+    V: Array,
+    kinetic: Array,
+    potential: Array,
+) -> None:
+    """Add the kinetic energy of all pairs and the height of those of weight."""
+    for k in range(len(pairs)):
+        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
+        M, own = _matrix(masses, k), _relative(V, R, i, wind, air)
+        h, q = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+        omega = load_vector(V, i, 0)
+        work = h[0] * omega[0] + h[1] * omega[1] + h[2] * omega[2] + q[0] * own[0] + q[1] * own[1] + q[2] * own[2]
+        store0(kinetic, load0(kinetic) + 0.5 * work)
+        if not air:
+            s = _first_moment(M)
+            height = load(R, i, 6) * s[0] + load(R, i, 7) * s[1] + load(R, i, 8) * s[2] + M[3][8] * load(p, i, 2)
+            store0(potential, load0(potential) + gravity * height)

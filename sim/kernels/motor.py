@@ -1,0 +1,59 @@
+"""A motor that gives way to its load: speed drops where power is drawn, and the rods come late.
+
+Its crank runs the time tau ahead of an even one: tau' = sigma, the relative error of its speed, with
+
+    sigma' = -(d (P - P_m) + sigma) / T - k tau,     P_m' = (P - P_m) f,
+
+P being the power drawn, d the speed lost per power (1/W), T the time in which the motor follows (s), k how fast what
+holds the mean speed takes back a lead (1/s^2), f the flap frequency: of the mean load nothing is seen. The rods follow
+the same profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the last three.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.arrays import DECAY, Work
+from sim.kernels.jit import kernel
+from sim.kernels.vector import load, load1, store, store1
+
+Array = npt.NDArray[np.float64]
+
+DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, f
+
+
+@kernel
+def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> None:
+    """Angle, rate and acceleration ``out`` [2, 3, W] of both rods from ``profile`` [2, 5, W], four derivatives by time.
+
+    ``tau_sigma`` [Z, W]: all states; ``turning`` [Z, W]: their rates.
+    """
+    z = len(tau_sigma) - 3
+    tau, pace, quickening = load1(tau_sigma, z), load1(tau_sigma, z + 1) + 1.0, load1(turning, z + 1)
+    for rod in range(2):
+        jerk, snap = load(profile, rod, 3), load(profile, rod, 4)
+        a = load(profile, rod, 2) + tau * (jerk + 0.5 * tau * snap)
+        v = load(profile, rod, 1) + tau * (load(profile, rod, 2) + tau * (0.5 * jerk + tau * snap * (1.0 / 6.0)))
+        x = load(profile, rod, 2) + tau * (jerk * (1.0 / 3.0) + tau * snap * (1.0 / 12.0))
+        store(out, rod, 0, load(profile, rod, 0) + tau * (load(profile, rod, 1) + 0.5 * tau * x))
+        store(out, rod, 1, pace * v)
+        store(out, rod, 2, pace * pace * a + quickening * v)
+
+
+@kernel
+def give_way(motor: Array, work: Work) -> None:
+    """Rates of the motor's states under the load of the rods; ``motor`` [MOTOR, W]."""
+    n, z = len(work.V) - 2, len(work.z) - 3
+    tau, sigma, mean = load1(work.z, z), load1(work.z, z + 1), load1(work.z, z + 2)
+    drawn = tau * 0.0
+    for rod in range(n, n + 2):
+        for i in range(6):
+            drawn -= load(work.wrench, rod, i) * load(work.V, rod, i)
+    more, following = drawn - mean, load1(motor, FOLLOWING)
+    store1(work.z_rate, z, sigma)
+    store1(work.z_rate, z + 1, -(load1(motor, DROOP) * more + sigma) * following - load1(motor, HOLDING) * tau)
+    store1(work.z_rate, z + 2, more * load1(motor, AVERAGING))
+    store(work.z_tangent, DECAY, z, tau * 0.0)
+    store(work.z_tangent, DECAY, z + 1, following)
+    store(work.z_tangent, DECAY, z + 2, load1(motor, AVERAGING))

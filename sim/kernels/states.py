@@ -1,0 +1,85 @@
+"""Internal states of effects within a step: solved beside the motion, and eliminated where they pull on a connector.
+
+A state z of a connector's axis grows with the relative twist r along it, z' = g(z, r), and pulls on it with a wrench
+-f(z). With u = dg/dr, b = -dg/dz, k = df/dz at the start of the step and theta = 1 / (1 / (h gamma) + b), its stage is
+U_z = theta (r_z + u U_r), r_z being its rate with the coupling to earlier stages. Put into the equation of motion that
+is a damper k theta u, and a wrench k theta r_z against the axis. States of the air act through forces that change
+little within a step: theirs is U_z = theta r_z.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
+from sim.kernels.connectors import push_apart, twists
+from sim.kernels.jit import kernel
+from sim.kernels.vector import load, load1, store, store1
+
+Array = npt.NDArray[np.float64]
+
+
+@kernel
+def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
+    """States [Z, W] of a stage."""
+    for i in range(len(out)):
+        total = load1(base, i)
+        for s in range(count):
+            total += coefficient[s] * load(U, s, i)
+        store1(out, i, total)
+
+
+@kernel
+def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None:
+    """Keep the states' derivatives at the start of the step; DECAY becomes theta. Add the dampers that they make."""
+    work.z_tangent0[:] = work.z_tangent
+    for i in range(len(work.z)):
+        store(work.z_tangent0, DECAY, i, 1.0 / (load(work.z_tangent, DECAY, i) + 1.0 / length))
+    count = len(wiring.first)
+    for law in laws.connector:
+        for k in range(law[2]):
+            axis, at = laws.axes[law[5] + k], law[4] + k * count
+            for c in range(count):
+                damper = load(work.z_tangent0, PULL, at + c) * load(work.z_tangent0, DECAY, at + c)
+                damper = damper * load(work.z_tangent0, DRIVE, at + c)
+                store(work.more_d0, c, axis, load(work.more_d0, c, axis) + damper)
+
+
+@kernel
+def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage: int, work: Work) -> None:
+    """The known part of the states' stage, and what it pulls with."""
+    for i in range(len(work.z)):
+        total = load1(work.z_rate, i)
+        for s in range(stage):
+            total += (coupling[s] / step) * load(work.U_z, s, i)
+        store1(work.z_known, i, total)
+    if len(laws.connector) == 0:
+        return
+    work.push[:] = 0.0
+    count = len(wiring.first)
+    for law in laws.connector:
+        for k in range(law[2]):
+            axis, at = laws.axes[law[5] + k], law[4] + k * count
+            for c in range(count):
+                pull = load(work.z_tangent0, PULL, at + c) * load(work.z_tangent0, DECAY, at + c)
+                store(work.push, c, axis, load(work.push, c, axis) + pull * load1(work.z_known, at + c))
+    push_apart(wiring.first, wiring.second, wiring.a, wiring.b, work.Q0, work.d0, work.push, work.wrench)
+
+
+@kernel
+def finish_states(wiring: Wiring, laws: Laws, work: Work, stage: int) -> None:
+    """The states' stage, the motion's being known."""
+    for i in range(len(work.z)):
+        store(work.U_z, stage, i, load(work.z_tangent0, DECAY, i) * load1(work.z_known, i))
+    if len(laws.connector) == 0:
+        return
+    count = len(wiring.first)
+    twists(wiring.first, wiring.second, wiring.a, wiring.b, work.Q0, work.d0, work.U_V[stage], work.push)
+    for law in laws.connector:
+        for k in range(law[2]):
+            axis, at = laws.axes[law[5] + k], law[4] + k * count
+            for c in range(count):
+                driven = load(work.z_tangent0, DECAY, at + c) * load(work.z_tangent0, DRIVE, at + c)
+                more = driven * load(work.push, c, axis)
+                store(work.U_z, stage, at + c, load(work.U_z, stage, at + c) + more)
