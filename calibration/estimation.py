@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from calibration.beats import FEWEST_MEAN, without_mean_beat
 from calibration.cutting import Cut
+from calibration.effects import absent
 from calibration.evaluation import POINTS, agreements, comparison, quantities
 from calibration.evaluator import Evaluator
 from calibration.force_result import (
@@ -188,7 +189,11 @@ def _judge(
         noise=tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in known.noise),
         cost=known.cost,
         converged=last.step <= STEP,
-        remarks=(*at_bounds(free_genes(problem), values), *known.remarks),
+        remarks=(
+            *at_bounds(free_genes(problem), values),
+            *absent(genome.as_dict(), stage.free),
+            *known.remarks,
+        ),
     )
     return _Judged(stage, genome, known, estimate)
 

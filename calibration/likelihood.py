@@ -8,7 +8,7 @@ least-squares problem, for several Levenberg-Marquardt dampings at once; the bes
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from calibration.covariance import Noise, whitened_sensitivity
+from calibration.effects import is_size
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, linearise, residuals_of, stopped, unit_at, values_at
+from calibration.placing import placed
 from calibration.problem import Problem
 from calibration.uncertainty import Uncertainty, uncertainty
 from records import Gene
@@ -123,17 +125,20 @@ def iterate(
 
     Ends when no step is better, when a step is smaller than STEP and gains less than COST of the cost, when two in
     succession gain as little (what then still moves is not told by the data), or after ``iterations``. Resumed equals
-    uninterrupted, bit for bit. ValueError when the start cannot be simulated.
+    uninterrupted, bit for bit. ValueError when the start cannot be simulated. Effects that are switched off start so,
+    at the place that promises most (:mod:`calibration.placing`).
     """
-    genes = free_genes(problem)
+    genes, before = free_genes(problem), 0
     if checkpoint is None:
         first = unit_at(genes, np.array([start.get(gene.name, problem.base[gene.name]) for gene in genes]))
+        first, before = placed(problem, evaluator, first)
         state = _State(tuple(first.tolist()))
     else:
         state = _State(**(checkpoint | {"unit": tuple(checkpoint["unit"])}))
     while not state.converged and state.index + 1 < iterations:
         step, state = _iteration(problem, evaluator, genes, state)
-        yield step
+        yield replace(step, evaluations=step.evaluations + before)
+        before = 0
 
 
 def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float]) -> Estimate:
@@ -164,7 +169,8 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
 
 
 def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Remarks on genes that the box stopped."""
+    """Remarks on genes that the box stopped; a size of zero is no stop, but an effect's absence."""
+    genes = [gene for gene in genes if values[gene.name] != 0.0 or not is_size(gene.name)]
     found = np.array([values[gene.name] for gene in genes])
     return tuple(
         f"{gene.name} is at its {'lower' if value <= gene.lower else 'upper'} bound {value:.4g}: the best value may "

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.cutting import Cut
+from calibration.effects import group_of, refuse_idle
 from calibration.problem import base_genome, compared
 from calibration.spec import CalibrationSpec, model_for, resolved
 from records import Dataset, LowPass, Recording
 from sim.alignment import recorded_crossing
 from sim.filtering import default_cutoff, low_passed
-from sim.wing_genes import group
 
 VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
 
@@ -47,6 +47,7 @@ def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
     free = tuple(name for name in known if name in wanted and name not in spec.fixed)
     if not free:
         raise ValueError("nothing to calibrate: every gene is fixed, or the model has none that is searched by itself")
+    refuse_idle(spec.effects, free, spec.fixed)
     recordings = tuple(prepared(spec, recording) for recording in recordings)
     if spec.mode == "joint":
         return (Stage("joint", free, recordings),)
@@ -63,11 +64,14 @@ def prepared(spec: CalibrationSpec, recording: Recording) -> Recording:
 
 
 def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    """Vacuum recordings fit the structure, the others then the aerodynamics (thesis Fig. 2)."""
+    """Vacuum recordings fit the structure, the others then the aerodynamics (thesis Fig. 2).
+
+    Effects that are not aerodynamic act in vacuum as well, and are fitted there.
+    """
     vacuum = tuple(r for r in recordings if r.condition.airspeed == 0 and r.condition.pressure <= VACUUM_LIMIT)
     air = tuple(r for r in recordings if r not in vacuum)
-    structural = tuple(name for name in free if group(name) == "structure")
-    aerodynamic = tuple(name for name in free if group(name) == "aerodynamics")
+    structural = tuple(name for name in free if group_of(name) == "structure")
+    aerodynamic = tuple(name for name in free if group_of(name) == "aerodynamics")
     if (structural and not vacuum) or (aerodynamic and not air):
         lacking, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
         raise ValueError(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from calibration.effects import absent
 from calibration.evaluator import Evaluator
 from calibration.noise import noise_distance
 from calibration.plan import Stage, plan
@@ -142,6 +143,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
             f"tracking noise leaves: the search was cut short, or the model (its division, say) lacks something. "
             f"Standard errors count on a misfit of at most {ADEQUATE:g} times the noise, so no gene is called told"
         )
+    remarks += absent(best.as_dict(), [name for stage in stages for name in stage.free])
     return Result(
         genes=_genes(model, stages, nominal, best, evaluator, adequate),
         recordings=recordings,

@@ -43,6 +43,8 @@ class CalibrationSpec:
         low_pass: cut-off in Hz through which forces go before they are fitted. None: 3.2 times the flap frequency, the
             seed's 40 Hz at 12.5 Hz; 0: none. Recordings that say that they have been filtered stay as they are.
         peel_width: beats over which the end of the peel is smoothed.
+        effects: names of effects (:data:`sim.effects.registry.EFFECTS`) that the model contains; their genes start
+            switched off and are searched, within bounds of their own, by default.
     """
 
     division: str = "11"
@@ -64,6 +66,7 @@ class CalibrationSpec:
     axes: tuple[str, ...] = ("x",)
     low_pass: float | None = None
     peel_width: float = 0.0
+    effects: tuple[str, ...] = ()
 
 
 def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
@@ -87,15 +90,17 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
 
 
 def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
-    """The model of a dataset of a wing, solved to ``spec.accuracy``; ValueError when wing or division is not one."""
-    model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, Numerics(accuracy=spec.accuracy))
+    """The model of a dataset of a wing, solved to ``spec.accuracy``; ValueError where one of them is impossible."""
+    numerics = Numerics(accuracy=spec.accuracy)
+    model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, numerics, spec.effects)
     _ = model.structure, model.genes
     return model
 
 
 def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:
-    """The model of a dataset of a vehicle; ValueError for a term that there is not."""
-    model = BladeElementWing(dataset.vehicle, chosen(spec.preset, spec.without), peel_width=spec.peel_width)
+    """The model of a dataset of a vehicle; ValueError for a term or effect that there is not."""
+    terms = chosen(spec.preset, spec.without)
+    model = BladeElementWing(dataset.vehicle, terms, peel_width=spec.peel_width, effects=spec.effects)
     _ = model.genes
     return model
 

@@ -20,14 +20,14 @@ from service import problems
 from service.database import Database
 from service.engine import Engine
 from service.guard import Guard
-from service.routes import datasets, forces, outcomes, runs, system
+from service.routes import datasets, effects, forces, outcomes, runs, system
 from service.schemas import ProblemOut
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"
-ROUTERS = (system.router, datasets.router, runs.router, outcomes.router, forces.router)
+ROUTERS = (system.router, datasets.router, runs.router, outcomes.router, forces.router, effects.router)
 METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
 DESCRIPTION = (
     "Calibrates flapping-wing simulations on recordings of tracked markers or of forces. Upload a dataset, submit a "

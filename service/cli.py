@@ -1,4 +1,4 @@
-"""The command line: ``wingfit serve | datasets | runs | simulate | models``, and what prepares data.
+"""The command line: ``wingfit serve | datasets | runs | simulate | models | effects``, and what prepares data.
 
 Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a wrong use of the command, 130 Ctrl-C.
 """
@@ -11,7 +11,7 @@ import sys
 import typer
 
 from service.client import WingfitError
-from service.commands import datasets, force_runs, freeflight, kinematics, rig, runs, serve, simulate
+from service.commands import datasets, effects, force_runs, freeflight, kinematics, rig, runs, serve, simulate
 from service.commands.output import note
 
 ERROR = 1
@@ -32,6 +32,7 @@ app.add_typer(datasets.app, name="datasets")
 app.add_typer(runs.app, name="runs")
 app.command()(simulate.simulate)
 app.command()(force_runs.models)
+app.command()(effects.effects)
 
 
 def main() -> None:

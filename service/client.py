@@ -24,6 +24,7 @@ import httpx
 
 from service import answers as a
 from service import force_answers as f
+from service.effect_answers import Effect
 from service.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -115,8 +116,8 @@ class Client(Transport):
     def submit_run(self, dataset_id: str, **spec: Any) -> a.Run:
         """Submit a calibration.
 
-        ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, name;
-        of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
+        ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
+        name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
         peel_width_beats. What is left out takes the server's default.
         """
         body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
@@ -191,6 +192,14 @@ class Client(Transport):
         """List the blade-element models of vehicles and their terms."""
         return cast(f.Models, self._json("GET", "/v1/models"))
 
+    def effects(self) -> list[Effect]:
+        """List the effects that a run or a simulation can include."""
+        return cast(list[Effect], self._json("GET", "/v1/effects")["effects"])
+
+    def effect(self, name: str) -> Effect:
+        """Fetch one effect."""
+        return cast(Effect, self._json("GET", f"/v1/effects/{_part(name)}"))
+
     def comparison(
         self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
     ) -> a.Comparison:
@@ -262,6 +271,7 @@ class Client(Transport):
         genome: Mapping[str, float] | None = None,
         accuracy_mm: float | None = None,
         outputs: bool | Sequence[str] = False,
+        effects: Sequence[str] = (),
     ) -> a.Simulation:
         """Simulate one recording of a wing; genes not named in ``genome`` keep their nominal value.
 
@@ -275,6 +285,7 @@ class Client(Transport):
             "division": division,
             "genome": dict(genome or {}),
             "outputs": outputs if isinstance(outputs, bool) else list(outputs),
+            "effects": list(effects),
         } | given(accuracy_mm=accuracy_mm)
         return cast(a.Simulation, self._simulated("/v1/simulations", body))
 
@@ -288,6 +299,7 @@ class Client(Transport):
         without: Sequence[str] = (),
         low_pass_hz: float | None = None,
         peel_width_beats: float = 0.0,
+        effects: Sequence[str] = (),
     ) -> f.ForceSimulation:
         """Compute the forces of one recording of a vehicle; genes not named in ``genome`` keep their nominal value.
 
@@ -301,6 +313,7 @@ class Client(Transport):
             "preset": preset,
             "without": list(without),
             "peel_width_beats": peel_width_beats,
+            "effects": list(effects),
         } | given(low_pass_hz=low_pass_hz)
         return cast(f.ForceSimulation, self._simulated("/v1/simulations", body))
 
@@ -314,6 +327,7 @@ class Client(Transport):
         genome: Mapping[str, float] | None = None,
         accuracy_mm: float | None = None,
         outputs: Sequence[str] | None = None,
+        effects: Sequence[str] = (),
     ) -> a.Loads:
         """Simulate a genome for its loads, where ``condition`` may change the recording's.
 
@@ -326,6 +340,7 @@ class Client(Transport):
             "division": division,
             "genome": dict(genome or {}),
             "outputs": True if outputs is None else list(outputs),
+            "effects": list(effects),
         } | given(accuracy_mm=accuracy_mm)
         return cast(a.Loads, self._simulated("/v1/loads", body))
 

@@ -38,9 +38,9 @@ class ProblemError(Exception):
         )
 
 
-def not_found(what: str, name: str) -> ProblemError:
+def not_found(what: str, name: str, remedy: str = "") -> ProblemError:
     """There is no ``what`` called ``name``."""
-    return ProblemError(404, "not-found", f"there is no {what} {shown(name)!r}")
+    return ProblemError(404, "not-found", f"there is no {what} {shown(name)!r}{'; ' if remedy else ''}{remedy}")
 
 
 def conflict(detail: str, **extra: Any) -> ProblemError:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from service.load_schemas import ConditionIn, Number, OutputsOut, Wanted
-from service.spec_schemas import DATASET_ID, SPEC, Accuracy, Division, Name, SpecOut, VehicleModel
+from service.spec_schemas import DATASET_ID, SPEC, Accuracy, Division, Effects, Name, SpecOut, VehicleModel
 from workers.jobs import State
 
 Kind = Literal["tracks", "forces"]
@@ -282,6 +282,7 @@ class WingIn(BaseModel):
     recording: Name
     division: Division = "11"
     genome: Annotated[dict[str, Number], Field(max_length=1000)] = {}
+    effects: Effects = []
     accuracy_mm: Accuracy = 0.1
     outputs: Wanted = False
 

@@ -85,6 +85,11 @@ Axes = Annotated[
     ),
 ]
 
+Effects = Annotated[
+    list[Name],
+    Field(max_length=100, description="effects that the model contains as well, see /v1/effects; fitted like others"),
+]
+
 SPEC: dict[str, Any] = {
     "method": "genetic",
     "mode": "staged",
@@ -98,6 +103,7 @@ SPEC: dict[str, Any] = {
     "accuracy_mm": 0.1,
     "recordings": [],
     "genes": [],
+    "effects": [],
     "finish": False,
     "preset": "proposed",
     "without": [],
@@ -136,6 +142,7 @@ class Spec(VehicleModel):
     genes: Annotated[
         list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
     ] = []
+    effects: Effects = []
     finish: Annotated[StrictBool, Field(description="Gauss-Newton after the search of each stage")] = False
     axes: Axes = ["x"]
 

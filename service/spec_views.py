@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -14,6 +14,7 @@ from service.problems import ErrorItem, error_item, invalid
 from service.spec_parts import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
 from service.spec_schemas import RunIn, SpecOut, VehicleModel
 from service.units import MM, tidy_mm
+from sim.effects.registry import chosen
 
 # A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
 WIDEST_BOUNDS = 100.0
@@ -41,18 +42,22 @@ def of_run(body: RunIn) -> CalibrationSpec:
         accuracy=body.accuracy_mm / MM,
         recordings=tuple(body.recordings),
         genes=tuple(body.genes),
+        effects=tuple(body.effects),
         finish=body.finish,
         axes=tuple(body.axes),
         **_vehicle(body),
     )
 
 
-def of_simulation(division: str, accuracy_mm: float, vehicle: VehicleModel | None = None) -> CalibrationSpec:
+def of_simulation(
+    division: str, accuracy_mm: float, effects: Iterable[str], vehicle: VehicleModel | None = None
+) -> CalibrationSpec:
     """The model that a request for a simulation asks for."""
     return CalibrationSpec(
         division=division,
         bounds_factor=WIDEST_BOUNDS,
         accuracy=accuracy_mm / MM,
+        effects=tuple(effects),
         **(_vehicle(vehicle) if vehicle else {}),
     )
 
@@ -67,6 +72,18 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
                 "give more than that, 0 for no filter, or leave it out for 3.2 times the flap frequency"
             )
             raise invalid("the low-pass does not fit", [error_item("body.low_pass_hz", low_pass_hz, message)])
+
+
+def refuse_effects(names: Sequence[str], dataset: Dataset) -> None:
+    """A 422 for effects that are unknown, named twice, or of no use to what the dataset describes."""
+    faults = []
+    for place, name in enumerate(names):
+        try:
+            chosen([name] * names[: place + 1].count(name), dataset.rig)
+        except ValueError as error:
+            faults.append(error_item(f"body.effects.{place}", name, str(error)))
+    if faults:
+        raise invalid("the model cannot contain these effects; GET /v1/effects lists them all", faults)
 
 
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
@@ -93,6 +110,8 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
     model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
+    if spec.effects:
+        model += f" with {', '.join(spec.effects)}"
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:

@@ -166,7 +166,7 @@ def spec(row: RunRow) -> CalibrationSpec:
 def spec_from(values: dict[str, Any]) -> CalibrationSpec:
     """A specification from its JSON form."""
     tuples: dict[str, Any] = {
-        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes") if name in values
+        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes", "effects") if name in values
     }
     return CalibrationSpec(**(BEFORE_METHODS | values | tuples))
 

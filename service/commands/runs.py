@@ -11,6 +11,7 @@ import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
+from service.commands.effects import With, names
 from service.commands.force_runs import RunId, force_result, forces, predict
 from service.commands.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
 from service.commands.rounding import with_unit
@@ -77,6 +78,7 @@ def submit(
     ] = None,
     recording: Annotated[list[str] | None, typer.Option(help="Fit only this recording; repeatable.")] = None,
     gene: Annotated[list[str] | None, typer.Option(help="Search only this gene; repeatable.")] = None,
+    with_: With = None,
     preset: Annotated[
         str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; proposed if left out.")
     ] = None,
@@ -115,6 +117,7 @@ def submit(
             accuracy_mm=accuracy_mm,
             recordings=recording or None,
             genes=gene or None,
+            effects=names(with_),
             preset=preset,
             without=without or None,
             axes=axis or None,

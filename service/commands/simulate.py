@@ -13,6 +13,7 @@ import typer
 
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
+from service.commands.effects import With, names
 from service.commands.force_runs import given_forces, write_files
 from service.commands.loads import check_file, summary, write_loads, write_plot
 from service.commands.output import AsJson, Url, mm, note, number, print_json, progress, say, table
@@ -52,6 +53,7 @@ def simulate(
             "flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg."
         ),
     ] = None,
+    with_: With = None,
     preset: Annotated[
         str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; proposed if left out.")
     ] = None,
@@ -86,7 +88,7 @@ def simulate(
         "--low-pass-hz": low_pass_hz,
         "--peel-width-beats": peel_width_beats,
     }
-    asked: dict[str, Any] = {"genome": read_genome(genome or [])}
+    asked: dict[str, Any] = {"genome": read_genome(genome or []), "effects": names(with_) or ()}
     condition = read_condition(at or [])
     with Client(url) as client:
         described = client.dataset(dataset)

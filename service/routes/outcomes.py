@@ -167,7 +167,8 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     check_recording(dataset, body.recording, "body.recording")
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body)
+    spec_views.refuse_effects(body.effects, dataset)
+    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects, body)
     values = _asked(service, dataset, spec, body)
     try:
         simulated = _tracks if dataset.kind == "tracks" else _forces
@@ -184,7 +185,8 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     if dataset.kind != "tracks":
         item = error_item("body.dataset_id", body.dataset_id, "describes a vehicle; loads inside the wing need a wing")
         raise invalid("there are no such loads", [item])
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm)
+    spec_views.refuse_effects(body.effects, dataset)
+    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects)
     values = _asked(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))

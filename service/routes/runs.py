@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
 from starlette.responses import Response
 
+from calibration.effects import effect_of
 from calibration.search import CalibrationSpec
 from records import Dataset, EstimateError
 from service import http, spec_views, store, views
@@ -39,6 +40,7 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
     dataset = load(service, body.dataset_id)
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
+    spec_views.refuse_effects(body.effects, dataset)
     spec = _checked(service, spec_views.of_run(body), dataset)
     spec_views.refuse_idle(body, spec.method)
     name = body.name or spec_views.run_name(dataset, spec)
@@ -143,9 +145,16 @@ def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> Calib
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
 
 
+def _remedy(name: str, known: tuple[str, ...]) -> str:
+    effect = effect_of(name)
+    if effect:
+        return f"belongs to effect {effect.name!r}, which the request does not include; name it in 'effects'"
+    return f"unknown; known are {', '.join(known)}"
+
+
 def _unknown(key: str, names: tuple[str, ...], known: tuple[str, ...]) -> list[dict[str, object]]:
     return [
-        error_item(f"body.{key}.{place}", name, f"unknown; known are {', '.join(known)}")
+        error_item(f"body.{key}.{place}", name, _remedy(name, known))
         for place, name in enumerate(names)
         if name not in known
     ]

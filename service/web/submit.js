@@ -7,6 +7,7 @@ import { isForces, METHODS, MODES, PRESETS, spoken } from "./words.js";
 
 let datasets = [];
 let models = null;
+let effects = null;
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");
@@ -35,6 +36,7 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   form.dataset_id.addEventListener("change", () => suit(form));
   form.method.addEventListener("change", () => suitMethod(form));
   form.preset.addEventListener("change", () => suitPreset(form));
+  $("effects").addEventListener("change", sayEffects);
   $("submit-close").addEventListener("click", () => $("submit-dialog").close());
   $("submit-curl").addEventListener("click", () => copy(curl("runs", values(form))));
   $("pick-file").addEventListener("click", () => $("file").click());
@@ -63,6 +65,7 @@ function values(form) {
   const forces = isForces(chosenDataset(form));
   if (forces) Object.assign(body, { preset: form.preset.value, without: unticked("terms"), axes: ticked("axes") });
   else body.division = form.division.value;
+  if (ticked("effects").length) body.effects = ticked("effects");
   if (searches(form)) body.finish = form.finish.checked;
   // What is not a number goes to the server as it was typed: it knows what to say about it.
   for (const name of numbers(form, forces)) if (form[name].value !== "") body[name] = Number(form[name].value);
@@ -88,6 +91,7 @@ async function suit(form) {
   options(form.method, METHODS, forces ? ["gauss_newton", "genetic", "cma_es"] : ["genetic", "cma_es", "gauss_newton"]);
   options(form.mode, MODES, forces ? ["local", "joint"] : ["staged", "joint", "local"]);
   suitMethod(form);
+  await suitEffects(form, forces ? "vehicle" : "wing");
   if (!forces) return;
   const recorded = new Set(dataset.recordings.flatMap((recording) => recording.channels.map((name) => name.replace("force_", ""))));
   $("axes").replaceChildren(...[...recorded].map((axis) => tick(axis, axis, axis === "x" || recorded.size === 1)));
@@ -103,6 +107,28 @@ async function suit(form) {
 
 function suitMethod(form) {
   for (const node of form.querySelectorAll("[data-search]")) node.hidden = !searches(form);
+}
+
+// Effects that apply to what the dataset describes, family by family; none is ticked.
+async function suitEffects(form, rig) {
+  try {
+    effects ??= (await get("effects")).effects;
+  } catch (error) {
+    showErrors(form, $("submit-errors"), error);
+    return;
+  }
+  const fitting = effects.filter((effect) => effect.applies_to.includes(rig));
+  const families = [...new Set(fitting.map((effect) => effect.family))];
+  $("effects").replaceChildren(...families.map((family) => el("div", { className: "family" },
+    el("p", { className: "quiet" }, family),
+    ...fitting.filter((effect) => effect.family === family).map((effect) => tick(effect.name, effect.title, false, effect.signature)))));
+  $("effects-part").hidden = !fitting.length;
+  sayEffects();
+}
+
+function sayEffects() {
+  const count = ticked("effects").length;
+  $("effects-summary").textContent = count ? `Effects: ${ticked("effects").map(spoken).join(", ")}` : "Effects: none included";
 }
 
 function suitPreset(form) {

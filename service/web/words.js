@@ -48,9 +48,12 @@ export function setup(run) {
   const method = METHODS[spec.method] ?? spec.method ?? "genetic";
   const search = spec.method === "gauss_newton" ? null : `population ${spec.population}, seed ${spec.seed}`;
   const how = `${spec.mode}, ${method}${spec.finish && search ? " finished by Gauss-Newton" : ""}`;
-  return [modelOf(run), ...(isForces(run) ? forceSetup(spec) : []), how, search,
+  return [modelOf(run), withEffects(spec), ...(isForces(run) ? forceSetup(spec) : []), how, search,
     isForces(run) ? null : `solved to ${spec.accuracy_mm} mm`].filter(Boolean);
 }
+
+// Runs stored before there were effects name none.
+const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
 
 function forceSetup(spec) {
   const cut = spec.low_pass_hz;

@@ -22,6 +22,7 @@ from records import Dataset, save_dataset
 from service import cli
 from service.commands.output import duration, mm, number
 from service.commands.simulate import marker_distances
+from sim.effects.registry import EFFECTS
 from sim.rig import blank_recording, robird_wing, vacuum
 from tests.service import toy
 from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
@@ -88,7 +89,7 @@ def test_the_commands_are_those_promised() -> None:
     ]
     data = ["list", "upload", "show", "download", "delete", "check"]
     expected = (
-        {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models"}
+        {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects"}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
     )
@@ -100,6 +101,28 @@ def test_every_command_has_an_example_and_options_with_help(name: str) -> None:
     command = COMMANDS[name]
     assert f"Example: wingfit {name}" in command.help
     assert all(getattr(p, "help", None) for p in command.params if p.name != "help"), name
+
+
+def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id: str) -> None:
+    listed = wingfit("effects")[1]
+    assert all(name in listed for name in EFFECTS)
+    assert [one["name"] for one in json.loads(wingfit("effects", "--json")[1])] == list(EFFECTS)
+    shown = wingfit("effects", "camera_shift")[1]
+    assert EFFECTS["camera_shift"].signature in shown
+    row = next(line for line in shown.splitlines() if line.startswith("camera_shift.y"))
+    assert "[-0.2, 0.2]" in row
+    assert "x chord" in row
+    code, _, err = wingfit("effects", "added_moss")
+    assert (code, "there are" in err) == (1, True)
+    words = ["runs", "submit", dataset_id, "--max-generations", "1", "--with", "camera_shift, clock_offset"]
+    run = json.loads(wingfit(*words, "--with", "scale_error", "--json")[1])
+    assert run["spec"]["effects"] == ["camera_shift", "clock_offset", "scale_error"]
+    settings = " ".join(wingfit("runs", "show", run["id"])[1].split())
+    assert "effects camera_shift clock_offset scale_error" in settings
+    code, _, err = wingfit(*words[:-1], "camera_shift,")
+    assert (code, "effects.1" in err) == (1, True)
+    code, _, err = wingfit("simulate", "--dataset", dataset_id, "--with", "balance_offset")
+    assert (code, "does not apply to a wing" in err) == (1, True)
 
 
 def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:

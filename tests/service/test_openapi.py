@@ -56,7 +56,7 @@ def test_every_reference_leads_somewhere(specification: Specification) -> None:
 def test_every_call_is_in_the_documentation_and_every_documented_one_exists(specification: Specification) -> None:
     text = DOCS.read_text()
     documented = {
-        (method, path.split("?")[0].replace("{id}", "{}"))
+        (method, re.sub(r"{\w+}", "{}", path.split("?")[0]))
         for method, path in re.findall(r"`(GET|POST|DELETE) (/v1/[^`\s]*)", text)
     }
     for action in ("pause", "resume"):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sim.effects.registry import EFFECTS
 from tests.service import toy
 from tests.service.browsing import DRAWN, Seen, chromium
 from tests.service.processes import ServerProcess
@@ -163,11 +164,17 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     seen.wait("document.getElementById('submit-errors').textContent.includes('at least 0.02 mm')")
     assert seen.page.get_attribute("[name=accuracy_mm]", "aria-invalid") == "true"
     seen.page.fill("[name=accuracy_mm]", "0.05")
+    seen.page.click("#effects-summary")
+    offered = seen.page.evaluate("[...document.querySelectorAll('#effects input')].map((i) => i.value)")
+    assert sorted(offered) == sorted(name for name, effect in EFFECTS.items() if effect.applies_to(toy._wing()))
+    seen.page.check("#effects input[value=camera_shift]")
+    assert seen.page.inner_text("#effects-summary") == "Effects: camera shift"
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
     run_id = seen.page.evaluate("location.hash").removeprefix("#run=")
     spec = server.api.run(run_id)["spec"]
-    assert (spec["seed"], spec["accuracy_mm"]) == (4, 0.05)
+    assert (spec["seed"], spec["accuracy_mm"], spec["effects"]) == (4, 0.05, ["camera_shift"])
+    seen.wait("document.getElementById('run-about').textContent.includes('with camera shift')")
     seen.page.wait_for_selector("#copy-curl")
     seen.page.click("#copy-curl")
     seen.wait("!document.getElementById('toast').hidden")

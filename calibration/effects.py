@@ -1,0 +1,59 @@
+"""Effects in a calibration: where their genes are fitted, and which words an absent effect is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from sim.effects.contract import Effect
+from sim.effects.registry import EFFECTS
+from sim.wing_genes import Group, group
+
+
+def effect_of(gene: str) -> Effect | None:
+    """The effect that a gene belongs to; None for a gene of the model itself."""
+    name, _, short = gene.partition(".")
+    effect = EFFECTS.get(name)
+    return effect if effect and any(p.name == short for p in effect.parameters) else None
+
+
+def sizes(effect: Effect) -> tuple[str, ...]:
+    """Genes of which zero switches ``effect`` off."""
+    return tuple(f"{effect.name}.{parameter.name}" for parameter in effect.size)
+
+
+def is_size(gene: str) -> bool:
+    """Whether zero of a gene helps to switch an effect off."""
+    effect = effect_of(gene)
+    return effect is not None and gene in sizes(effect)
+
+
+def group_of(gene: str) -> Group:
+    """Whether a staged calibration fits a gene of a wing with the structure or with the aerodynamics."""
+    effect = effect_of(gene)
+    if effect is None:
+        return group(gene)
+    return "aerodynamics" if effect.family == "aerodynamics" else "structure"
+
+
+def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[str, float]) -> None:
+    """ValueError for an effect that stays switched off because none of its sizes is searched or fixed."""
+    for name in names:
+        mine = sizes(EFFECTS[name])
+        if not any(size in free or fixed.get(size) for size in mine):
+            raise ValueError(
+                f"effect {name!r} would stay switched off: none of {', '.join(mine)} is searched; "
+                "name one among the genes, or leave the effect out"
+            )
+
+
+def absent(genome: Mapping[str, float], free: Collection[str]) -> tuple[str, ...]:
+    """Remarks on effects that are switched off in ``genome``: what their other genes say means nothing."""
+    found = {effect.name: effect for name in free if (effect := effect_of(name))}
+    remarks = []
+    for effect in found.values():
+        if any(genome[size] != 0.0 for size in sizes(effect)):
+            continue
+        idle = [name for name in free if effect_of(name) is effect and name not in sizes(effect)]
+        without = f", and {', '.join(idle)} are not determined" if idle else ""
+        remarks.append(f"effect {effect.name!r} is switched off in the best genome{without}")
+    return tuple(remarks)

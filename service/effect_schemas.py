@@ -1,0 +1,53 @@
+"""Effects that a model can contain, on the wire."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel
+
+Applies = Literal["wing", "vehicle"]
+
+
+class ParameterOut(BaseModel):
+    """One gene of an effect; ``name`` is the gene's.
+
+    With ``of``, ``lower``, ``upper`` and ``typical`` are parts of that measure of what is calibrated: its span, its
+    mean chord, or the mass of its wing. A run's genes have them in ``unit``.
+    """
+
+    name: str
+    unit: str
+    of: Literal["span", "chord", "mass"] | None
+    lower: float
+    upper: float
+    typical: float
+    scale: Literal["log", "linear"]
+    size: bool
+    place: bool
+    description: str
+
+
+class EffectOut(BaseModel):
+    """One piece of physics, or one fault of a measurement, that a model can contain.
+
+    It is switched off where all its parameters that are a ``size`` are zero, as in every nominal genome.
+    """
+
+    name: str
+    title: str
+    family: Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
+    port: Literal["inertia", "connector", "drive", "air", "observation"]
+    power: Literal["conservative", "dissipative", "any"]
+    memory: str | None
+    source: str
+    signature: str
+    confused_with: list[str]
+    applies_to: list[Applies]
+    parameters: list[ParameterOut]
+
+
+class EffectsOut(BaseModel):
+    """All effects, in the order in which they act."""
+
+    effects: list[EffectOut]

@@ -1,0 +1,57 @@
+"""Effects from the registry to the wire."""
+
+from __future__ import annotations
+
+from service.effect_schemas import Applies, EffectOut, EffectsOut, ParameterOut
+from service.problems import not_found
+from sim.effects.contract import Effect, Parameter
+from sim.effects.registry import EFFECTS
+
+
+def effects() -> EffectsOut:
+    """All effects."""
+    return EffectsOut(effects=[_effect(one) for one in EFFECTS.values()])
+
+
+def effect(name: str) -> EffectOut:
+    """The effect called ``name``, or a 404."""
+    if name not in EFFECTS:
+        raise not_found("effect", name, f"there are {', '.join(EFFECTS)}")
+    return _effect(EFFECTS[name])
+
+
+def _effect(found: Effect) -> EffectOut:
+    return EffectOut(
+        name=found.name,
+        title=found.title,
+        family=found.family,
+        port=found.port,
+        power=found.power,
+        memory=found.memory or None,
+        source=found.source,
+        signature=found.signature,
+        confused_with=list(found.confused_with),
+        applies_to=_applies(found),
+        parameters=[_parameter(found, one) for one in found.parameters],
+    )
+
+
+def _applies(found: Effect) -> list[Applies]:
+    wing = found.wing is not None or "tracks" in found.observed
+    vehicle = found.vehicle is not None or "forces" in found.observed
+    return [*(["wing"] if wing else []), *(["vehicle"] if vehicle else [])]  # type: ignore[list-item]
+
+
+def _parameter(found: Effect, one: Parameter) -> ParameterOut:
+    return ParameterOut(
+        name=f"{found.name}.{one.name}",
+        unit=one.unit,
+        of=one.of,
+        lower=one.lower,
+        upper=one.upper,
+        typical=one.typical,
+        scale=one.scale,
+        size=one in found.size,
+        place=one.place,
+        description=one.description,
+    )
