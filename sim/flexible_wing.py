@@ -132,7 +132,9 @@ class FlexibleWing:
         series, times, added = self._seen(batch, recording, beats)
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
-        since = 2 * np.pi * recording.condition.flap_frequency * times - recorded_crossing(self.wing, recording)
+        shift = (times - recording.times).mean(axis=1, keepdims=True)  # of the clock: alignment takes it, however large
+        angles = 2 * np.pi * recording.condition.flap_frequency * (times - shift)
+        since = angles - recorded_crossing(self.wing, recording)
         reasons = tuple(
             beat.reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
             for beat, phase in zip(beats, own, strict=True)

@@ -92,7 +92,7 @@ VACUUM = tuple(vacuum(p, lag, f) for p in (1000.0, 100.0, 10.0) for lag in _LAGS
 WIND_TUNNEL = tuple(tunnel(lag, f, v) for lag in _LAGS for f in _FREQUENCIES for v in _SPEEDS)
 
 # The small campaign: (condition, held out). The held-out ones change frequency, lag, pressure or speed.
-_SMALL: tuple[tuple[Condition, bool], ...] = (
+SMALL: tuple[tuple[Condition, bool], ...] = (
     (vacuum(10.0, _LAGS[0], 2.0), False),
     (vacuum(10.0, _LAGS[1], 3.0), False),
     (vacuum(10.0, _LAGS[2], 4.0), False),
@@ -228,7 +228,7 @@ def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) 
 
 def _plan(small: bool) -> Iterator[tuple[Condition, bool]]:
     if small:
-        yield from _SMALL
+        yield from SMALL
         return
     for k, condition in enumerate((*VACUUM, *WIND_TUNNEL)):
         yield condition, k % 4 == 3

@@ -182,7 +182,7 @@ def test_truth_lies_well_inside_the_box_and_follows_its_seed(model: FlexibleWing
 def two_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
     """A campaign short enough for a test."""
     pair = ((tunnel(0.05, 3.0, 6.0), False), (tunnel(0.05, 4.0, 6.0), True))
-    monkeypatch.setattr(sim.rig, "_SMALL", pair)
+    monkeypatch.setattr(sim.rig, "SMALL", pair)
     monkeypatch.setattr(sim.rig, "REFERENCE", QUICK)
 
 

@@ -1,0 +1,276 @@
+"""What each effect costs, what it moves, and what of that a refit leaves: ``python -m benchmarks.effects [--json]``.
+
+On the Robird's wing of 11 bodies over the small campaign (ten conditions), without noise, and on the DelFly over its
+eight tests. An effect is put in at its typical size, and the nominal genes are fitted to what is then recorded; what
+the fit leaves is what can be seen of the effect at all. Effects are compared after that: the angle between what two of
+them do, both freed from what the nominal genes can do. About twelve minutes on two cores; ``--quick`` takes three
+conditions, ``--only a,b`` some of the effects.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cache
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+from benchmarks.effect_rigs import RIGS, Rig, rig_of
+from benchmarks.machine import commit, cpu
+from calibration.linearised import free_genes, linearise, residuals_of, unit_at, values_at
+from calibration.problem import Problem, base_genome
+from records import Recording
+from sim.effects.contract import Effect
+from sim.effects.registry import EFFECTS
+from workers.in_process import InProcessEvaluator
+
+Array = npt.NDArray[np.float64]
+
+REPEATS = 5
+SPREAD = 0.1  # of the genes of a batch whose cost is measured, in logarithm or part of the value
+UNSEEN = 1e-3  # of what the effect moves: less after the refit is the fit's own error
+ITERATIONS = 12
+GAIN = 0.98  # an iteration that leaves more of the squares is the last
+LENGTHS = np.array([1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6])  # of a step, tried at once: a group of lanes
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What an effect does on a rig.
+
+    ``size`` of what it moves and ``left`` of that after the refit: root mean square, mm or mN; ``directions``
+    [D, sizes]: what its sizes do, one by one, freed from the nominal genes, as an orthonormal basis.
+    """
+
+    size: float
+    left: float
+    directions: Array
+
+
+def batch(rig: Rig, effect: Effect | None, count: int = 16) -> Array:
+    """Genomes [count, G] near the nominal one, each with a motion of its own; the effect at its typical size."""
+    model = rig.model(effect)
+    values = np.array([gene.nominal for gene in model.genes])
+    wobble = np.random.default_rng(1).uniform(-1.0, 1.0, (count, len(values)))
+    genomes = values * (1.0 + SPREAD * wobble)
+    typical = effect.typical(rig.description) if effect else {}
+    for k, gene in enumerate(model.genes):
+        genomes[:, k] = np.clip(genomes[:, k], gene.lower, gene.upper)
+        if gene.name in typical:
+            genomes[:, k] = typical[gene.name]
+    return genomes
+
+
+def cost_ratio(rig: Rig, effect: Effect) -> float:
+    """Processor time of a batch with the effect over that without: median of alternating repeats."""
+    pairs = [(rig.by_default(one, rig.stands_for(effect)), batch(rig, one)) for one in (None, effect)]
+    records = rig.timed()
+    spent: list[list[float]] = [[], []]
+    for _ in range(REPEATS + 1):  # the first warms up
+        for times, (model, genomes) in zip(spent, pairs, strict=True):
+            began = time.process_time()
+            for recording in records:
+                model.observe(genomes, recording)
+            times.append(time.process_time() - began)
+    ratios = np.array(spent[1][1:]) / np.array(spent[0][1:])
+    return float(np.median(ratios))
+
+
+def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings: tuple[Recording, ...]) -> Array:
+    """[D]: what the effect at ``values`` of its genes changes in all recordings, m or N."""
+    model = rig.model(effect)
+    genome = base_genome(model, values)
+    changed = []
+    for recording in recordings:
+        seen = model.observe(np.array([genome.values]), recording)
+        if seen.reasons[0] is not None:
+            raise ValueError(f"{effect.name} at its typical size under {recording.name}: {seen.reasons[0]}")
+        changed.append((seen.channels[0] - recording.values).ravel())
+    return np.concatenate(changed)
+
+
+def moved(rig: Rig, effect: Effect) -> Moved:
+    """What the effect moves, what a refit leaves of it, and in which directions."""
+    recordings, typical = rig.recordings(rig.stands_for(effect)), effect.typical(rig.description)
+    whole = displacement(rig, effect, typical, recordings)
+    size = rig.unit * rig.rms(whole)
+    left = rig.unit * refitted(rig, effect, recordings, whole)
+    known = nominal_directions(rig, rig.stands_for(effect))
+    columns = []
+    for parameter in effect.size:
+        others = {f"{effect.name}.{p.name}": 0.0 for p in effect.size if p is not parameter}
+        one = displacement(rig, effect, typical | others, recordings)
+        free = one - known @ (known.T @ one)
+        if np.linalg.norm(free) > UNSEEN * np.linalg.norm(whole):
+            columns.append(free)
+    empty = np.zeros((len(whole), 0))
+    basis = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)[0] if columns else empty
+    return Moved(size, left, basis)
+
+
+def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole: Array) -> float:
+    """RMS (m or N) that is left when the nominal genes have been fitted to recordings with the effect in them."""
+    model = rig.model(None, without=rig.stands_for(effect))
+    slopes, total, samples = sensitivities(rig, rig.stands_for(effect)), 0.0, 0
+    for part, slope in zip(rig.parts(rig.changed(recordings, whole)), slopes, strict=True):
+        problem = Problem(model, part, model.searched, base_genome(model), rig.axes)
+        squares, count = _fit(problem, slope)
+        total, samples = total + squares, samples + count
+    return float(np.sqrt(total / samples))
+
+
+def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
+    """Least squares with the sensitivities at the nominal genome kept, several step lengths at a time."""
+    genes, evaluator = free_genes(problem), InProcessEvaluator()
+    unit, best, inverse = (
+        unit_at(genes, np.array([gene.nominal for gene in genes]))[None],
+        np.inf,
+        np.linalg.pinv(slope),
+    )
+    for _ in range(ITERATIONS):
+        answer = evaluator.evaluate(problem, values_at(genes, unit), residuals=True)
+        k = int(np.argmin(answer.fitness))
+        if answer.fitness[k] > GAIN * best:
+            best = min(best, float(answer.fitness[k]))
+            break
+        best = float(answer.fitness[k])
+        left = np.concatenate([np.nan_to_num(one[k]).ravel() for one in residuals_of(answer)])
+        unit = np.clip(unit[k] - LENGTHS[:, None] * (inverse @ left), 0.0, 1.0)
+    return best, sum(one.samples for one in answer.per_recording)
+
+
+@cache
+def sensitivities(rig: Rig, without: str) -> list[Array]:
+    """What the nominal genes do, [D, F] for each set of recordings that share them."""
+    found = []
+    for part in rig.parts(rig.recordings(without)):
+        model = rig.model(None, without=without)
+        problem = Problem(model, part, model.searched, base_genome(model), rig.axes)
+        genes = free_genes(problem)
+        linear = linearise(problem, InProcessEvaluator(), unit_at(genes, np.array([gene.nominal for gene in genes])))
+        found.append(np.nan_to_num(np.concatenate([s.reshape(-1, s.shape[-1]) for s in linear.sensitivities])))
+    return found
+
+
+@cache
+def nominal_directions(rig: Rig, without: str) -> Array:
+    """[D, F]: orthonormal basis of what the nominal genes can do to the recordings."""
+    basis, spread, _ = np.linalg.svd(block_diag(*sensitivities(rig, without)), full_matrices=False)
+    return np.asarray(basis[:, spread > 1e-6 * spread[0]])
+
+
+def angle(a: Array, b: Array) -> float:
+    """Smallest angle (degrees) between two subspaces, given by orthonormal bases [D, .]."""
+    return float(np.degrees(np.arccos(np.clip(np.linalg.norm(a.T @ b, 2), 0.0, 1.0))))
+
+
+def nearest(name: str, found: dict[str, Moved]) -> tuple[str | None, float | None]:
+    """The effect most like ``name``, and the angle to it; None where nothing of either can be seen."""
+    own = found[name].directions
+    angles = {
+        other: angle(own, one.directions)
+        for other, one in found.items()
+        if other != name and own.shape[1] and one.directions.shape[1]
+    }
+    if not angles:
+        return None, None
+    best = min(angles, key=lambda other: angles[other])
+    return best, angles[best]
+
+
+def _task(kind: str, name: str, quick: bool) -> Moved:
+    return moved(rig_of(kind, quick), EFFECTS[name])
+
+
+def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) -> dict[str, Any]:
+    """The whole table, with progress on standard error."""
+    names, began = list(names), time.monotonic()
+    tasks = [(k, n) for k in RIGS for n in names if EFFECTS[n].applies_to(rig_of(k, quick).description)]
+    ratios: dict[tuple[str, str], float | None] = dict.fromkeys(tasks)
+    total = len(tasks) * (2 if costs else 1)
+    for done, (kind, name) in enumerate(tasks if costs else [], 1):  # alone: costs are ratios of processor time
+        ratios[kind, name] = cost_ratio(rig_of(kind, quick), EFFECTS[name])
+        _say(done, total, f"cost of {name} on the {kind}", began)
+    found: dict[str, dict[str, Moved]] = {kind: {} for kind in RIGS}
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        under_way = {pool.submit(_task, kind, name, quick): (kind, name) for kind, name in tasks}
+        for done, future in enumerate(as_completed(under_way), total - len(tasks) + 1):
+            kind, name = under_way[future]
+            found[kind][name] = future.result()
+            _say(done, total, f"{name} on the {kind}", began)
+    rows = [row(name, found, ratios) for name in names]
+    return {"effects": rows, "quick": quick, "commit": commit(), "cpu": cpu(), "seconds": time.monotonic() - began}
+
+
+def row(name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None]) -> dict[str, Any]:
+    """One line: what an effect does to tracks in mm; beside it what it does to forces in mN."""
+    line: dict[str, Any] = {"name": name, "family": EFFECTS[name].family}
+    for kind, prefix, unit in (("wing", "", "mm"), ("vehicle", "vehicle_", "mn")):
+        one = found[kind].get(name)
+        like, degrees = nearest(name, found[kind]) if one else (None, None)
+        line |= {
+            f"{prefix}cost_ratio": ratios.get((kind, name)),
+            f"rms_{unit}": one.size if one else None,
+            f"rms_{unit}_after_refit": one.left if one else None,
+            f"{prefix}nearest": like,
+            f"{prefix}angle_deg": degrees,
+        }
+    return line
+
+
+def _say(done: int, total: int, label: str, began: float) -> None:
+    spent = time.monotonic() - began
+    text = f"[{done}/{total}] {label}, about {spent / done * (total - done):.0f} s left"
+    print(f"\r{text:<100}", end="" if done < total else "\n", file=sys.stderr, flush=True)
+
+
+def table(answer: dict[str, Any]) -> str:
+    """The same for people, as in docs/effects.md."""
+
+    def cell(value: float | None, digits: int = 2) -> str:
+        return "" if value is None else f"{value:.{digits}f}"
+
+    lines = [
+        "| effect | family | cost | moves, mm | after refit, mm | nearest | angle, deg | cost (vehicle) | moves, mN | "
+        "after refit, mN | nearest (vehicle) | angle, deg |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for one in answer["effects"]:
+        cells = [f"[{one['name']}](effects/{one['name']}.md)", one["family"]]
+        for prefix, unit in (("", "mm"), ("vehicle_", "mn")):
+            cells += [cell(one[f"{prefix}cost_ratio"]), cell(one[f"rms_{unit}"], 3)]
+            cells += [cell(one[f"rms_{unit}_after_refit"], 3), one[f"{prefix}nearest"] or ""]
+            cells.append(cell(one[f"{prefix}angle_deg"], 0))
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.add_argument("--quick", action="store_true", help="three conditions of each rig")
+    parser.add_argument("--only", default="", help="names of effects, separated by commas; all without")
+    parser.add_argument("--no-costs", action="store_true", help="leave out the costs")
+    arguments = parser.parse_args()
+    names = [name for name in arguments.only.split(",") if name] or list(EFFECTS)
+    for name in names:
+        if name not in EFFECTS:
+            parser.error(f"unknown effect {name!r}; there are {', '.join(EFFECTS)}")
+    answer = measure(names, quick=arguments.quick, costs=not arguments.no_costs)
+    print(table(answer))
+    if arguments.json:
+        print(json.dumps(answer))
+
+
+if __name__ == "__main__":
+    main()
