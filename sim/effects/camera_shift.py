@@ -22,7 +22,7 @@ EFFECT = Effect(
         Parameter(axis, "m", -0.2, 0.2, 0.02, f"shift of all recorded positions along {axis}", of="chord")
         for axis in "xyz"
     ),
-    source="rigid motion of the measured frame: p' = p + s",
+    source="rigid motion of the measured frame, p' = p + s (Luhmann et al. 2014, Close-Range Photogrammetry)",
     signature="every marker is off by the same vector at every phase, in every condition",
     confused_with=("hinge_offset", "camera_rotation"),
     observe=_observe,

@@ -1,0 +1,214 @@
+"""What every effect must meet, on every rig that it applies to."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sim.effects.contract import Effect
+from sim.effects.registry import EFFECTS, chosen
+from sim.model import Observation
+from tests.sim.effects.rigs import AnyModel, Array, bare, recordings, rig_of
+
+KINDS = ("wing", "vehicle")
+CASES = [(name, kind) for name, effect in EFFECTS.items() for kind in KINDS if effect.applies_to(rig_of(bare(kind)))]
+INVISIBLE = {
+    ("clock_offset", "wing"): "tracks are placed on the beat by what they show",
+}
+SYMBOLS = {"m", "kg", "s", "Hz", "rad", "N", "Pa", "W", "J", "K"}  # of units: SI and radians
+FEW = 3  # individuals of a trial: off, off elsewhere, typical
+SEEN = {"wing": 2e-6, "vehicle": 2e-5}  # m, N: RMS of the change that a typical size makes at least
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Individuals [B, G] of a model with one effect, and what each is: off, typical, or an end of a bound."""
+
+    model: AnyModel
+    genomes: Array
+    labels: tuple[str, ...]
+
+    def row(self, label: str) -> int:
+        return self.labels.index(label)
+
+
+def own(model: AnyModel) -> Array:
+    """Nominal values of the model's own genes."""
+    return np.array([gene.nominal for gene in model.genes])
+
+
+@cache
+def trial(name: str, kind: str) -> Trial:
+    """Off, off elsewhere, typical, half of it, each parameter at either end, and typical again in another lane."""
+    effect, model = EFFECTS[name], bare(kind, name)
+    genes = effect.genes(rig_of(model))
+    nominal = {gene.name: gene.nominal for gene in genes}
+    typical = effect.typical(rig_of(model))
+    sizes = {f"{name}.{p.name}" for p in effect.size}
+    rows = {
+        "off": nominal,
+        "off elsewhere": {g.name: nominal[g.name] if g.name in sizes else g.upper for g in genes},
+        "typical": typical,
+        "half": {key: value * (0.5 if key in sizes else 1.0) for key, value in typical.items()},
+        **{f"{g.name} lower": typical | {g.name: g.lower} for g in genes},
+        **{f"{g.name} upper": typical | {g.name: g.upper} for g in genes},
+        "again": typical,
+    }
+    genomes = np.array([[*own(model), *(row[g.name] for g in genes)] for row in rows.values()])
+    return Trial(model.with_effects(name), genomes, tuple(rows))
+
+
+@cache
+def observation(name: str, kind: str, where: str) -> Observation:
+    """All individuals of the trial at once; in vacuum the first few."""
+    tried = trial(name, kind)
+    return tried.model.observe(tried.genomes[: None if where == "air" else FEW], recordings(kind)[where])
+
+
+@cache
+def without(name: str, kind: str, where: str) -> Array:
+    """Channels [T, C] of the model that has never heard of the effect."""
+    model = bare(kind, name)
+    found: Array = model.observe(own(model)[None], recordings(kind)[where]).channels[0]
+    return found
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_off_is_exactly_nothing(name: str, kind: str) -> None:
+    """Whatever its other parameters are, and whoever else is in the batch."""
+    tried = trial(name, kind)
+    for where in recordings(kind):
+        for label in ("off", "off elsewhere"):
+            channels = observation(name, kind, where).channels[tried.row(label)]
+            assert channels.tobytes() == without(name, kind, where).tobytes(), f"{label} in {where}"
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_an_individual_depends_on_nobody_else(name: str, kind: str) -> None:
+    """Alone, in another lane, in a batch turned round: the same bits."""
+    tried, recording = trial(name, kind), recordings(kind)["air"]
+    whole = observation(name, kind, "air").channels
+    turned = tried.model.observe(tried.genomes[::-1], recording).channels[::-1]
+    assert whole.tobytes() == np.ascontiguousarray(turned).tobytes()
+    assert whole[tried.row("typical")].tobytes() == whole[tried.row("again")].tobytes()
+    for label in ("typical", "half"):
+        alone = tried.model.observe(tried.genomes[tried.row(label)][None], recording).channels[0]
+        assert alone.tobytes() == whole[tried.row(label)].tobytes()
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_typical_size_is_seen(name: str, kind: str) -> None:
+    tried, changes = trial(name, kind), []
+    for where in recordings(kind):
+        found = observation(name, kind, where)
+        row = tried.row("typical")
+        assert found.reasons[row] is None, f"in {where}"
+        changes.append(float(np.sqrt(np.mean((found.channels[row] - without(name, kind, where)) ** 2))))
+    if (name, kind) in INVISIBLE:
+        assert max(changes) < SEEN[kind]
+    else:
+        assert max(changes) > SEEN[kind]
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_ends_of_the_bounds_are_finite_or_say_why(name: str, kind: str) -> None:
+    found = observation(name, kind, "air")
+    for label, channels, reason in zip(trial(name, kind).labels, found.channels, found.reasons, strict=True):
+        if reason is None:
+            assert np.isfinite(channels).all(), label
+        else:
+            assert label.endswith(("lower", "upper")), f"{label}: {reason}"
+            assert not EFFECTS[name].observe, f"{label}: no fault of a measurement stops a wing, but {reason}"
+            assert np.isnan(channels).all(), label
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_model_with_it_explains_a_recording_with_it(name: str, kind: str) -> None:
+    """Placed on the beat by the faulty recording itself, the model that has the effect fits, and no other does."""
+    tried = trial(name, kind)
+    rows = [tried.row("typical"), tried.row("off")]
+    values = observation(name, kind, "air").channels[rows[0]]
+    recording = replace(recordings(kind)["air"], values=values)
+    found, other = tried.model.observe(tried.genomes[rows], recording).channels
+    np.testing.assert_allclose(found, values, atol=1e-9)
+    if (name, kind) not in INVISIBLE:
+        assert np.sqrt(np.mean((other - values) ** 2)) > SEEN[kind]
+
+
+@pytest.mark.parametrize("name", [name for name, kind in CASES if kind == "wing" and EFFECTS[name].observe])
+def test_a_wing_that_fails_is_told_and_not_warned_of(name: str) -> None:
+    tried = trial(name, "wing")
+    wild = tried.genomes[[tried.row("typical")]].copy()
+    wild[0, [gene.name for gene in tried.model.genes].index("L_a")] = 1e6
+    found = tried.model.observe(wild, recordings("wing")["air"])
+    assert found.reasons[0]
+    assert np.isnan(found.channels).all()
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
+def test_is_declared_well(effect: Effect) -> None:
+    names = [p.name for p in effect.parameters]
+    assert effect.size
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) for name in (effect.name, *names))
+    assert any(p.typical for p in effect.size)
+    for p in effect.parameters:
+        assert p.unit
+        assert set(re.findall("[A-Za-z]+", p.unit)) <= SYMBOLS, p
+        assert -math.inf < p.lower <= p.typical <= p.upper < math.inf, p
+        assert p.description
+    for p in effect.size:
+        assert p.lower <= 0.0 <= p.upper, p
+    assert effect.title
+    assert effect.signature
+    assert (effect.family == "measurement") == (effect.port == "observation")
+    assert bool(effect.observe) == bool(effect.observed) == (effect.port == "observation")
+    assert effect.observe or effect.wing or effect.vehicle
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
+def test_names_an_author_and_a_year(effect: Effect) -> None:
+    assert re.search(r"[A-Z]\w+.*\b(1[6-9]|20)\d\d\b", effect.source), effect.source
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
+def test_names_what_it_is_confused_with(effect: Effect) -> None:
+    assert effect.confused_with
+    assert effect.name not in effect.confused_with
+    for other in effect.confused_with:
+        assert other in EFFECTS, f"{effect.name} is confused with {other!r}, which is not registered"
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_genes_are_off_and_within_bounds(name: str, kind: str) -> None:
+    effect, rig = EFFECTS[name], rig_of(bare(kind))
+    genes = effect.genes(rig)
+    typical = effect.typical(rig)
+    assert [g.name for g in genes] == [f"{name}.{p.name}" for p in effect.parameters] == list(typical)
+    for gene in genes:
+        gene.check(typical[gene.name])
+    values = effect.values(genes, np.array([[g.nominal for g in genes], list(typical.values())]))
+    assert effect.off(values).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_effects_combine_and_all_off_are_nothing(kind: str) -> None:
+    """All at once: switched off they are nothing, at a tenth of what is typical they are finite."""
+    names = [name for name, where in CASES if where == kind]
+    model = bare(kind)
+    names = [name for name in names if name not in getattr(model, "terms", ())]
+    rig, both = rig_of(model), model.with_effects(*names)
+    genes = both.genes[len(model.genes) :]
+    sizes = {f"{e.name}.{p.name}" for e in chosen(names, rig) for p in e.size}
+    typical = {key: value for name in names for key, value in EFFECTS[name].typical(rig).items()}
+    small = [typical[g.name] * (0.1 if g.name in sizes else 1.0) for g in genes]
+    batch = np.array([[*own(model), *values] for values in ([g.nominal for g in genes], small)])
+    found = both.observe(batch, recordings(kind)["air"])
+    assert found.channels[0].tobytes() == model.observe(own(model)[None], recordings(kind)["air"]).channels.tobytes()
+    assert found.reasons == (None, None)
+    assert np.isfinite(found.channels[1]).all()
