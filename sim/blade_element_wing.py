@@ -15,40 +15,25 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, EstimateError, Gene, Recording, Vehicle, WingMotion
-from sim.atmosphere import density
-from sim.blades.elements import (
-    COSINE,
-    CURVE_ROWS,
-    DIHEDRAL,
-    DIHEDRAL_RATE,
-    FLAP_ACCELERATION,
-    FLAP_RATE,
-    PEELED,
-    PITCH_ACCELERATION,
-    PITCH_RATE,
-    PROJECTION,
-    ROWS,
-    SINE,
-    STEP_COSINE,
-    STEP_SINE,
-    Constants,
-    Side,
-    synthesise,
-    wing_forces,
-)
-from sim.blades.motion import Angles, angles, motion_genes
+from records import EstimateError, Gene, Recording, Vehicle
+from sim.blades.elements import CURVE_ROWS, PEELED, ROWS, Constants, synthesise, synthesise_at, wing_forces
+from sim.blades.motion import motion_genes
+from sim.blades.rows import mirrored
+from sim.blades.sampling import passed, passing, phases, series_of, turns
 from sim.blades.terms import SEARCHED, TERMS, chosen
-from sim.filtering import gain, sampling_rate
+from sim.effects import registry
+from sim.effects.contract import Effect
+from sim.effects.observation import Sampling, apply, observed
+from sim.effects.vehicle import ROTATION_POINT, Setting, VehicleScene
 from sim.kernels import LANES
 from sim.model import Observation, genome_batch
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 
 ADDED_MASS_POINT = 0.5  # d, chords: where the added mass's acceleration is taken (Armanini et al. 2016, below Eq. 19)
-ROTATION_POINT = 0.75  # Eq. 4
 _KEPT = 64  # motions whose elements are remembered, per recording
-_NEGLIGIBLE = 1e-9  # of the largest: harmonics below are left out
+_DEFINITION = ("vehicle", "terms", "elements", "instants", "peel_width", "effects")
 
 
 @dataclass(frozen=True)
@@ -57,6 +42,7 @@ class BladeElementWing:
 
     ``terms`` are names of :data:`sim.blades.terms.TERMS`. A beat is computed at ``instants`` equal steps with
     ``elements`` along each wing. ``peel_width`` in beats smooths the end of the peel (0: it switches, as printed).
+    ``effects`` are names of :data:`sim.effects.registry.EFFECTS` whose genes are appended.
     """
 
     vehicle: Vehicle
@@ -64,6 +50,7 @@ class BladeElementWing:
     elements: int = 40
     instants: int = 400
     peel_width: float = 0.0
+    effects: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.terms:
@@ -76,41 +63,70 @@ class BladeElementWing:
             )
         if not 0 <= self.peel_width <= 0.5:
             raise ValueError(f"peel_width is {self.peel_width:g} beats; it must lie in [0, 0.5]")
+        _check_effects(self)
 
     def __getstate__(self) -> dict[str, object]:
         """Pickle the definition only; whatever was computed from it is computed again."""
-        return {name: self.__dict__[name] for name in ("vehicle", "terms", "elements", "instants", "peel_width")}
+        return {name: self.__dict__[name] for name in _DEFINITION}
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Coefficients of the terms, then parameters of the wings' motion; EstimateError for an estimate of no use."""
+        """Coefficients of the terms, parameters of the wings' motion, then genes of the effects.
+
+        EstimateError for an estimate of no use.
+        """
         coefficients = [gene for name in TERMS for gene in TERMS[name].genes if name in self.terms]
         if not self.vehicle.claps:
             coefficients = [gene for gene in coefficients if gene.name != "C_F"]
         genes = (*coefficients, *motion_genes(self.vehicle.motion))
         _check_estimates(self.vehicle, genes)
-        return tuple(replace(gene, nominal=self.vehicle.estimates.get(gene.name, gene.nominal)) for gene in genes)
+        own = tuple(replace(gene, nominal=self.vehicle.estimates.get(gene.name, gene.nominal)) for gene in genes)
+        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.vehicle)))
+
+    @cached_property
+    def chosen(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they act."""
+        return registry.chosen(self.effects, self.vehicle)
+
+    def with_effects(self, *names: str) -> BladeElementWing:
+        """The same vehicle with more effects; their genes are appended, switched off."""
+        return replace(self, effects=(*self.effects, *names))
 
     @cached_property
     def searched(self) -> tuple[str, ...]:
-        """What the seed estimates: lift, rotational and fling coefficients. Drag and motion are fixed beforehand."""
-        return tuple(gene.name for gene in self.genes if gene.name in SEARCHED)
+        """What the seed estimates: lift, rotational and fling coefficients; and all genes of effects.
+
+        Drag and motion are fixed beforehand.
+        """
+        added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
+        return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
 
     def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
         """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
         batch = genome_batch(self.genes, genomes)
         weights, out = self._weights(batch), np.empty((len(batch), 2, self.instants))
-        for start in range(0, len(batch), LANES):  # blocks that stay in the cache
-            for k, rows in enumerate(self._remembered(batch[start : start + LANES], recording), start):
-                out[k] = _sum(weights[k], rows)
+        for effects, members in self._alike(batch):
+            for start in range(0, len(members), LANES):  # blocks that stay in the cache
+                block = members[start : start + LANES]
+                if effects:
+                    rows, added = self._changed(effects, batch[block], recording)
+                    out[block] = [_sum(w, row) + more for w, row, more in zip(weights[block], rows, added, strict=True)]
+                else:
+                    found = self._remembered(batch[block], recording)
+                    out[block] = [_sum(w, row) for w, row in zip(weights[block], found, strict=True)]
         return out.transpose(0, 2, 1)
 
     def term_forces(self, genome: npt.ArrayLike, recording: Recording) -> dict[str, Array]:
-        """Forces [n, 2] of each term (N); together they are :meth:`beat`."""
+        """Forces [n, 2] of each term (N), and of the effects beside them; together they are :meth:`beat`."""
         batch = genome_batch(self.genes, np.asarray(genome, float)[None])
-        rows, weights = self._rows(batch, recording)[0], self._weights(batch)[0]
-        parts: dict[str, Array] = {}
-        for name, weight, row in zip(self._active, weights, rows, strict=True):
+        ((effects, _),) = self._alike(batch)
+        weights, parts = self._weights(batch)[0], dict[str, Array]()
+        if effects:
+            rows, added = self._changed(effects, batch, recording)
+            parts["effects"] = added[0].T
+        else:
+            rows = self._rows(batch, recording)
+        for name, weight, row in zip(self._active, weights, rows[0], strict=True):
             parts[_ROWS[name]] = parts.get(_ROWS[name], 0.0) + weight * row.T
         return parts
 
@@ -119,13 +135,54 @@ class BladeElementWing:
         if recording.kind != "forces":
             raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
         batch = genome_batch(self.genes, genomes)
+        beat = self.beat(batch, recording)
+        watched, sampling = self._seen(batch, beat, recording)
+        beat[watched] = sampling.beat
         basis, wanted = self._basis(recording)
         axes = ["xz".index(axis) for axis in recording.forces]
-        series = self._series(self.beat(batch, recording)[:, :, axes].transpose(0, 2, 1), recording)
+        series = series_of(beat[:, :, axes].transpose(0, 2, 1), self._harmonics, recording)[:, :, wanted]
+        series = np.ascontiguousarray(series)
         channels = np.empty((len(batch), len(recording.times), len(axes)))
-        synthesise(basis, np.ascontiguousarray(series[:, :, wanted]), channels)
+        synthesise(basis, series, channels)
+        for k, times, added in zip(watched, sampling.times, sampling.added, strict=True):
+            if not np.array_equal(times, recording.times):
+                synthesise_at(phases(recording, times), series[k], channels[k])
+            channels[k] += passed(added, recording)
         good = [bool(np.isfinite(forces).all()) for forces in channels]
         return Observation(channels, tuple(None if fine else "the forces are not finite" for fine in good))
+
+    # -- effects -----------------------------------------------------------------------------------------------
+
+    def _alike(self, batch: Array) -> list[tuple[tuple[Effect, ...], Places]]:
+        """Individuals in groups for which the same effects on the vehicle are on."""
+        acting = [effect for effect in self.chosen if effect.vehicle]
+        on = [~effect.off(effect.values(self.genes, batch)) for effect in acting]
+        groups: dict[tuple[Effect, ...], list[int]] = {}
+        for k in range(len(batch)):
+            groups.setdefault(tuple(e for e, each in zip(acting, on, strict=True) if each[k]), []).append(k)
+        return [(effects, np.array(members)) for effects, members in groups.items()]
+
+    def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array]:
+        """Forces of each active row [B, rows, 2, n], and those beside them [B, 2, n], with ``effects`` on."""
+        moving = {} if recording.motion else self._moving(batch)
+        names = [gene.name for gene in self.genes]
+        coefficients = {name: batch[:, names.index(name)] for name in _COEFFICIENTS if name in names}
+        scene = self._scene(moving | coefficients, len(batch), recording)
+        for effect in effects:
+            if effect.vehicle:
+                effect.vehicle(scene, effect.values(self.genes, batch))
+        scene.settle()
+        return self._wings(scene), scene.finish()
+
+    def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Places, Sampling]:
+        """Individuals for whom an effect on the observation is on, and what the balance makes of their ``beat``."""
+        effects = observed(self.chosen, self.genes, batch, "forces")
+        on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
+        watched = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
+        times, added = (np.zeros((len(watched), *shape)) for shape in (recording.times.shape, recording.values.shape))
+        sampling = Sampling(self.vehicle, recording, beat[watched], times + recording.times, added)
+        apply(effects, self.genes, batch[watched], sampling)
+        return watched, sampling
 
     # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
 
@@ -163,8 +220,11 @@ class BladeElementWing:
 
     def _moving(self, batch: Array) -> dict[str, Array]:
         """Genes [B] of the wings' motion, in the order of the model."""
-        names = {gene.name for gene in motion_genes(self.vehicle.motion)}
-        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
+        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in self._motion_names}
+
+    @cached_property
+    def _motion_names(self) -> frozenset[str]:
+        return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
 
     def _remembered(self, batch: Array, recording: Recording) -> list[Array]:
         """Forces of each active row [rows, 2, n] of every individual; those of the last few motions are remembered."""
@@ -179,51 +239,43 @@ class BladeElementWing:
             kept.popitem(last=False)
         return answer
 
-    def _series(self, forces: Array, recording: Recording) -> Array:
-        """Series [..., 2 K + 1] of periodic ``forces`` [..., n], filtered like the recording.
-
-        Mean, then cosine and sine coefficients of each harmonic.
-        """
-        spectrum = np.fft.rfft(forces)[..., : self._harmonics + 1] / self.instants
-        if recording.low_pass:
-            frequency = np.arange(self._harmonics + 1) * recording.condition.flap_frequency
-            spectrum = spectrum * gain(recording.low_pass, sampling_rate(recording), frequency)
-        spectrum[..., 1:] *= 2
-        return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
-
     def _rows(self, batch: Array, recording: Recording) -> Array:
         """Forces of each active row [B, rows, 2, n] of all wings, for the motions that ``batch`` [B, G] prescribes."""
-        motion, moving = (recording.motion, {}) if recording.motion else (self.vehicle.motion, self._moving(batch))
-        found = self._wings(moving, motion, recording.condition)
+        moving = {} if recording.motion else self._moving(batch)
+        found = self._wings(self._scene(moving, len(batch) if moving else 1, recording))
         return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
 
-    def _wings(self, moving: dict[str, Array], motion: WingMotion, condition: Condition) -> Array:
-        """The same; one individual only where nothing is ``moving``."""
-        vehicle, n = self.vehicle, self.instants
-        prescribed = angles(motion, moving, condition.flap_frequency, n, vehicle.claps, self.peel_width)
-        if "effective_chord" not in self.terms:
-            prescribed = replace(prescribed, peeled=np.ones(n))
+    def _scene(self, genes: dict[str, Array], count: int, recording: Recording) -> VehicleScene:
+        """``count`` vehicles in the recording's condition; ``genes`` [count] of those that the scene depends on."""
+        motion, r = recording.motion or self.vehicle.motion, self._span[0]
+        setting = Setting(self.vehicle, self.terms, motion, recording.condition, self.instants, self.peel_width, r)
+        return VehicleScene.of(setting, genes, count)
+
+    def _wings(self, scene: VehicleScene) -> Array:
+        """Forces of each active row [B, rows, 2, n] of all wings of a scene."""
+        vehicle, n, motion = self.vehicle, self.instants, scene.setting.motion
         r, chord, mass, width = self._span
         first, step = np.array([r[0], width]) / (motion.pitch_station * vehicle.span)
-        rho = density(condition.pressure, condition.temperature)
-        constants = Constants(rho, vehicle.thickness, width, first, step, ADDED_MASS_POINT)
+        constants = Constants(vehicle.thickness, width, first, step, ADDED_MASS_POINT)
         curves = len(CURVE_ROWS) if "steady_curves" in self.terms else 0
-        found = np.zeros((len(prescribed.flap), len(ROWS) + curves, 2, n // LANES, LANES))
-        rows = _motion_rows(prescribed, motion.root_pitch, first)
-        zeta = prescribed.flap[:, 0]
-        flap = (np.cos(zeta), np.sin(zeta), prescribed.flap[:, 1])
-        for upper in (False, True) if vehicle.layout == "x4" else (False,):
-            side = _set_side(rows, vehicle, flap, condition, upper)
-            wing_forces(rows, side, r, chord, mass, constants, found)
+        found = np.zeros((len(scene), len(ROWS) + curves, 2, n // LANES, LANES))
+        rows = scene.rows(first)
+        if "effective_chord" not in self.terms:
+            rows[:, PEELED] = 1.0
+        masses, loading = scene.mass_factor[:, None] * mass, scene.loading[:, : len(r)].copy()
+        grouped = rows.reshape(*rows.shape[:2], -1, LANES)
+        for side in scene.each_side(rows):
+            wing_forces(grouped, side, r, chord, masses, scene.density.copy(), loading, constants, found)
         each = found.reshape(len(found), -1, 2, n)
-        if vehicle.layout != "single":
-            each *= 2.0  # left and right alike
-        peel = prescribed.peel[:, None] * ("clap_and_peel" in self.terms)
+        each *= mirrored(vehicle)
+        peel = scene.angles.peel[:, None] * ("clap_and_peel" in self.terms)
         out = np.empty((len(each), len(self._active), 2, n))
         for k, name in enumerate(self._active):
             factor = {"rotation": 1.0 - peel, "clap_and_peel": peel}.get(name)
             row = each[:, _PLACES[name]]
             out[:, k] = row if factor is None else row * factor
+        if scene.fling.any():
+            scene.added -= scene.fling[:, None, None] * scene.angles.peel[:, None] * each[:, ROWS.index("rotation")]
         return out
 
     @cached_property
@@ -243,17 +295,9 @@ class BladeElementWing:
 
     def _basis(self, recording: Recording) -> tuple[Array, npt.NDArray[np.int64]]:
         """Cosines and sines [K, T] at the recording's instants, and their places in a series: only what passes."""
-        k = np.arange(self._harmonics + 1)
-        passing = np.ones(len(k))
-        rate = sampling_rate(recording) if recording.low_pass else np.inf
-        if recording.low_pass:
-            passing = gain(recording.low_pass, rate, k * recording.condition.flap_frequency)
-        kept = k[passing > _NEGLIGIBLE]
-        kept_sines = kept[kept > 0]
-        wanted = np.concatenate([kept, self._harmonics + kept_sines])
+        wanted = passing(recording, self._harmonics)
         if self._last_basis.get("recording") is not recording:
-            psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-            basis = np.concatenate([np.cos(kept[:, None] * psi), np.sin(kept_sines[:, None] * psi)])
+            basis = turns(wanted, self._harmonics, recording)
             self._last_basis.update(recording=recording, basis=basis)
         return self._last_basis["basis"], wanted
 
@@ -279,6 +323,21 @@ _ROWS = {
 _PLACES = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
 
 
+# Genes that the flow at the stations depends on; a scene without effects depends on the motion alone.
+_COEFFICIENTS = ("C_l", "C_r", "C_F", "C_D0", "C_Dpi2", "K_l", "K_d")
+
+
+def _check_effects(model: BladeElementWing) -> None:
+    """Refuse effects that are unknown, or terms of the model already, or need wings that meet."""
+    for effect in registry.chosen(model.effects, model.vehicle):
+        if effect.name in model.terms:
+            raise ValueError(
+                f"effect {effect.name!r} is a term of this model already; name no such effect, or leave out the term"
+            )
+        if effect.name == "clap_and_peel" and not model.vehicle.claps:
+            raise ValueError("effect 'clap_and_peel' needs wings that meet, and vehicle.claps is false: leave it out")
+
+
 def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
     """Refuse estimates that no model of ``vehicle`` takes; those for terms that are off must be good as well."""
     known = {gene.name: gene for term in TERMS.values() for gene in term.genes} | {gene.name: gene for gene in genes}
@@ -301,40 +360,3 @@ def _sum(weights: Array, rows: Array) -> Array:
         if weight != 0.0:
             total += weight * row
     return total
-
-
-def _motion_rows(prescribed: Angles, root: float, half_step: float) -> Array:
-    """Motion [B, 12, n / 8, 8] for :func:`wing_forces`, but for what depends on the side.
-
-    The first element lies half a step from the root, so one pair of sine and cosine gives both of its turns.
-    """
-    flap, pitch = prescribed.flap, prescribed.pitch
-    rows = np.empty((len(flap), 12, flap.shape[2]))
-    half = half_step * (pitch[:, 0] - root)
-    c, s = np.cos(half), np.sin(half)
-    rows[:, [FLAP_RATE, FLAP_ACCELERATION]] = flap[:, 1:]
-    rows[:, [PITCH_RATE, PITCH_ACCELERATION]] = pitch[:, 1:]
-    rows[:, PEELED] = prescribed.peeled
-    rows[:, COSINE], rows[:, SINE] = np.cos(root) * c - np.sin(root) * s, np.sin(root) * c + np.cos(root) * s
-    rows[:, STEP_COSINE], rows[:, STEP_SINE] = c * c - s * s, 2 * c * s
-    return rows.reshape(*rows.shape[:2], -1, LANES)
-
-
-def _set_side(
-    rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], condition: Condition, upper: bool
-) -> Side:
-    """Set the rows of the dihedral for the lower wings, or for the upper ones, and return the stream that they meet.
-
-    In axes mirrored at the body's plane the upper wing moves like the lower one, in a stream from the other side. As
-    printed, Eq. 18 has the stream along the upper wing's chord from behind (docs/decisions/0005). Wings that are no X
-    move like lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate.
-    """
-    (cosine, sine, rate), shape = flap, (len(rows), *rows.shape[2:])
-    sign, printed = -1.0 if upper else 1.0, vehicle.velocities == "printed"
-    c, s = np.cos(vehicle.dihedral), np.sin(vehicle.dihedral)  # of the angle zeta_0 - sign zeta:
-    rows[:, DIHEDRAL] = (c * cosine + sign * s * sine).reshape(shape)
-    rows[:, DIHEDRAL_RATE] = ((sign * s * cosine - c * sine) * rate).reshape(shape)
-    rows[:, PROJECTION] = cosine.reshape(shape) if printed else rows[:, DIHEDRAL]
-    theta_b, speed = condition.angle_of_attack, condition.airspeed
-    along = -1.0 if printed and upper else 1.0
-    return Side(speed * np.cos(theta_b), sign * speed * np.sin(theta_b), along, float(printed), sign)

@@ -33,7 +33,9 @@ CURVE_ROWS = ("lift_curve", "drag_curve")
     SINE,
     STEP_COSINE,  # of the change of theta_w from one element to the next: the twist is linear in span
     STEP_SINE,
-) = range(12)
+    FORWARD,  # speed of the stream along body x, induced inflow included, m/s
+    DOWNWARD,  # speed of the stream along this side's z at zero dihedral, m/s
+) = range(14)
 STILL = 1e-30  # m^2/s^2, keeps a direction defined without flow
 CHUNK = 80
 DEGREE = math.pi / 180
@@ -43,16 +45,12 @@ class Side(NamedTuple):
     """The stream as the wings of one side meet it, in axes mirrored at the body's plane for the upper side.
 
     Attributes:
-        forward: speed along body x, m/s.
-        downward: speed along this side's z at zero dihedral, m/s.
         stream: sign of the stream along the chord.
         printed: 1 where the whole of the stream normal to the wing shrinks with the dihedral, as printed (Eqs. 18-19);
             0 where only what comes from below does: so no work is gained or lost between velocities and forces.
         sign: of this side's z in body axes.
     """
 
-    forward: float
-    downward: float
     stream: float
     printed: float
     sign: float
@@ -61,11 +59,10 @@ class Side(NamedTuple):
 class Constants(NamedTuple):
     """What is the same for all elements.
 
-    Air density (kg/m^3), thickness b and width dr of an element (m), share of the twist at the pitch station that the
-    first element has and its step to the next, d of the added mass (chords).
+    Thickness b and width dr of an element (m), share of the twist at the pitch station that the first element has and
+    its step to the next, d of the added mass (chords).
     """
 
-    density: float
     thickness: float
     width: float
     twist: float
@@ -74,26 +71,40 @@ class Constants(NamedTuple):
 
 
 @inlined
-def _flow(ct: Vector, st: Vector, swing: Vector, w: Vector, whole: Vector, side: Side) -> tuple[Vector, Vector]:
-    """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19)."""
-    vx = swing * ct + (side.forward * st + w * ct) * side.stream
-    vz = whole * (side.forward * ct - w * st) - swing * st
+def velocities(
+    ct: Vector, st: Vector, swing: Vector, u: Vector, w: Vector, whole: Vector, stream: float
+) -> tuple[Vector, Vector]:
+    """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19).
+
+    ``swing`` is that of its flapping, ``u`` and ``w`` are those of the stream along body x and this side's z.
+    """
+    vx = swing * ct + (u * st + w * ct) * stream
+    vz = whole * (u * ct - w * st) - swing * st
     return vx, vz
 
 
 @inlined
 def _element_forces(
-    motion: Array, side: Side, r: Array, chord: Array, mass: Array, constants: Constants, out: Array
+    motion: Array,
+    side: Side,
+    r: Array,
+    chord: Array,
+    mass: Array,
+    rho: float,
+    loading: Array,
+    constants: Constants,
+    out: Array,
 ) -> None:
-    """The rows of ROWS for one individual: ``motion`` [12, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
-    rho, dr, d = constants.density, constants.width, constants.point
+    """The rows of ROWS for one individual: ``motion`` [14, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
+    dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
     for g in range(motion.shape[1]):
         flap_rate, flap_acceleration = load(motion, FLAP_RATE, g), load(motion, FLAP_ACCELERATION, g)
         pitch_rate, pitch_acceleration = load(motion, PITCH_RATE, g), load(motion, PITCH_ACCELERATION, g)
         lam, lam_rate = load(motion, DIHEDRAL, g), load(motion, DIHEDRAL_RATE, g)
-        w = (lam * (1.0 - side.printed) + side.printed) * side.downward
-        w_rate = lam_rate * (side.downward * (1.0 - side.printed))
+        forward, downward = load(motion, FORWARD, g), load(motion, DOWNWARD, g)
+        w = (lam * (1.0 - side.printed) + side.printed) * downward
+        w_rate = lam_rate * (downward * (1.0 - side.printed))
         whole, whole_rate = lam * side.printed + (1.0 - side.printed), lam_rate * side.printed
         peeled = load(motion, PEELED, g)
         added = peeled * peeled * (0.25 * math.pi * rho)  # m22 / c^2, Eq. 10
@@ -104,8 +115,8 @@ def _element_forces(
         for e in range(len(r)):
             q, c, mw = constants.twist + e * constants.twist_step, chord[e], mass[e]
             rate, swing = pitch_rate * q, flap_rate * r[e]
-            vx, vz = _flow(ct, st, swing, w, whole, side)
-            along, across = side.forward * st + w * ct, side.forward * ct - w * st
+            vx, vz = velocities(ct, st, swing, forward, w, whole, side.stream)
+            along, across = forward * st + w * ct, forward * ct - w * st
             turn = flap_acceleration * r[e]
             ax = turn * ct - swing * rate * st + (rate * across + w_rate * ct) * side.stream
             az = whole_rate * across - turn * st - swing * rate * ct - whole * (rate * along + w_rate * st)
@@ -117,10 +128,10 @@ def _element_forces(
             z0 += fx * ct - fz * st
             # circulation: -rho Gamma (v_z, -v_x) (Eq. 8); Gamma = 1/2 c |V| sin 2 alpha (Eqs. 2, 3)
             per_speed = (rho * c) / root(vx * vx + vz * vz + STILL)
-            gamma = -vx * vz * per_speed
+            gamma = -vx * vz * (per_speed * loading[e])
             x1 += gamma * wb
             z1 -= gamma * ub
-            gamma = rate * (0.5 * rho * c * c)  # Gamma = 1/2 c^2 theta' (Eq. 2)
+            gamma = rate * (0.5 * rho * c * c * loading[e])  # Gamma = 1/2 c^2 theta' (Eq. 2)
             x2 += gamma * wb
             z2 -= gamma * ub
             # added mass (Eq. 9), its acceleration taken d chords behind the axis of pitch (Eqs. 18-19)
@@ -153,27 +164,40 @@ def _element_forces(
 
 
 @inlined
-def _curve_forces(motion: Array, side: Side, r: Array, chord: Array, constants: Constants, out: Array) -> None:
+def curve_lift(alpha: float) -> float:
+    """C_L of a revolving model wing at ``alpha`` degrees, 0 to 90 (Dickinson, Lehmann and Sane 1999)."""
+    return 0.225 + 1.58 * math.sin((2.13 * alpha - 7.20) * DEGREE)
+
+
+@inlined
+def curve_drag(alpha: float) -> float:
+    """C_D of the same."""
+    return 1.92 - 1.55 * math.cos((2.04 * alpha - 9.82) * DEGREE)
+
+
+@inlined
+def _curve_forces(
+    motion: Array, side: Side, r: Array, chord: Array, rho: float, loading: Array, constants: Constants, out: Array
+) -> None:
     """Lift and drag by measured steady curves: ``out`` [2, 2, n / 8, 8], in the order of CURVE_ROWS.
 
-    Measured on a revolving wing (Dickinson, Lehmann and Sane 1999): C_L = 0.225 + 1.58 sin(2.13 alpha - 7.20) and
-    C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82), alpha in degrees, here folded into 0 to 90.
+    Measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
     """
     for g in range(motion.shape[1]):
         for k in range(LANES):
             ct, st = motion[COSINE, g, k], motion[SINE, g, k]
             step_ct, step_st = motion[STEP_COSINE, g, k], motion[STEP_SINE, g, k]
             lam = motion[DIHEDRAL, g, k]
-            w = side.downward * (side.printed + (1.0 - side.printed) * lam)
+            forward = motion[FORWARD, g, k]
+            w = motion[DOWNWARD, g, k] * (side.printed + (1.0 - side.printed) * lam)
             whole = (1.0 - side.printed) + side.printed * lam
             projection = side.sign * motion[PROJECTION, g, k]
             for e in range(len(r)):
-                vx, vz = _flow(ct, st, motion[FLAP_RATE, g, k] * r[e], w, whole, side)
+                vx, vz = velocities(ct, st, motion[FLAP_RATE, g, k] * r[e], forward, w, whole, side.stream)
                 ub, wb = vx * st + vz * ct, vx * ct - vz * st
                 alpha = math.atan2(abs(vz), abs(vx)) / DEGREE
-                lift = 0.225 + 1.58 * math.sin((2.13 * alpha - 7.20) * DEGREE)
-                drag = 1.92 - 1.55 * math.cos((2.04 * alpha - 9.82) * DEGREE)
-                pressure = 0.5 * constants.density * chord[e] * constants.width * math.sqrt(vx * vx + vz * vz)
+                lift, drag = curve_lift(alpha) * loading[e], curve_drag(alpha)
+                pressure = 0.5 * rho * chord[e] * constants.width * math.sqrt(vx * vx + vz * vz)
                 gamma = math.copysign(pressure * lift, -vx * vz)
                 out[0, 0, g, k] += gamma * wb
                 out[0, 1, g, k] -= gamma * ub * projection
@@ -184,23 +208,33 @@ def _curve_forces(motion: Array, side: Side, r: Array, chord: Array, constants: 
 
 @kernel
 def wing_forces(
-    motion: Array, side: Side, r: Array, chord: Array, mass: Array, constants: Constants, out: Array
+    motion: Array,
+    side: Side,
+    r: Array,
+    chord: Array,
+    mass: Array,
+    density: Array,
+    loading: Array,
+    constants: Constants,
+    out: Array,
 ) -> None:
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
 
     Args:
-        motion: [B, 12, n / 8, 8], rows as named above.
-        side: the stream.
+        motion: [B, 14, n / 8, 8], rows as named above.
+        side: how the stream comes.
         r: [E] distances from the flapping axis in equal steps, m.
         chord: [E], m.
-        mass: [E] of the wing per length, kg/m.
+        mass: [B, E] of the wing per length, kg/m.
+        density: [B] of the air, kg/m^3.
+        loading: [B, E], what circulation is multiplied by.
         constants: of all elements.
         out: is added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
     """
     for b in range(len(motion)):
-        _element_forces(motion[b], side, r, chord, mass, constants, out[b])
+        _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
         if out.shape[1] > len(ROWS):
-            _curve_forces(motion[b], side, r, chord, constants, out[b, len(ROWS) :])
+            _curve_forces(motion[b], side, r, chord, density[b], loading[b], constants, out[b, len(ROWS) :])
 
 
 @kernel
@@ -218,3 +252,30 @@ def synthesise(basis: Array, series: Array, out: Array) -> None:
                         total[t] += series[b, a, k] * basis[k, start + t]
                 for t in range(size):
                     out[b, start + t, a] = total[t]
+
+
+@kernel
+def synthesise_at(psi: Array, series: Array, out: Array) -> None:
+    """The same of one individual at its own phases ``psi`` [T] (rad): ``out`` [T, A] from ``series`` [A, 2 K + 1].
+
+    Turned from harmonic to harmonic, since sines of all would cost more than the rest of a beat.
+    """
+    A, K = len(series), (series.shape[1] - 1) // 2
+    dc, ds, c, s = np.empty((4, CHUNK))
+    total = np.empty((A, CHUNK))
+    for start in range(0, len(psi), CHUNK):
+        size = min(CHUNK, len(psi) - start)
+        for t in range(size):
+            dc[t], ds[t] = math.cos(psi[start + t]), math.sin(psi[start + t])
+            c[t], s[t] = 1.0, 0.0
+        for a in range(A):
+            total[a] = series[a, 0]
+        for k in range(1, K + 1):
+            for t in range(size):
+                c[t], s[t] = c[t] * dc[t] - s[t] * ds[t], s[t] * dc[t] + c[t] * ds[t]
+            for a in range(A):
+                for t in range(size):
+                    total[a, t] += series[a, k] * c[t] + series[a, K + k] * s[t]
+        for a in range(A):
+            for t in range(size):
+                out[start + t, a] = total[a, t]

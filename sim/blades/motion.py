@@ -75,10 +75,24 @@ def angles(
     printed (Eq. 7).
     """
     count = max((len(v) for v in values.values()), default=1)
-    flap = _derivatives(_flap_series(motion.flap, values, count, instants), frequency, instants, 3)
+    series = flap_series(motion.flap, values, count, instants)
+    return angles_of(series, motion, values, frequency, instants, claps, peel_width)
+
+
+def angles_of(
+    series: Complex,
+    motion: WingMotion,
+    values: Mapping[str, Array],
+    frequency: float,
+    instants: int,
+    claps: bool,
+    peel_width: float = 0.0,
+) -> Angles:
+    """The same of wings whose flap angle is a ``series`` [B, K + 1], as :func:`flap_series` gives it."""
+    flap = _derivatives(series, frequency, instants, 3)
     pitch = _pitch(motion.pitch, values, flap, frequency, instants)
     t_star = np.arange(instants) / instants
-    peel, peeled = np.zeros((count, instants)), np.ones(instants)
+    peel, peeled = np.zeros((len(series), instants)), np.ones(instants)
     if claps:
         peel = _peel(pitch[:, 1], t_star, max(peel_width, 1.0 / instants), motion.peel_end)
         peeled = np.minimum(t_star / motion.peel_end, 1.0)
@@ -86,7 +100,7 @@ def angles(
     return Angles(flap[:, :3], pitch, peel, peeled)
 
 
-def _flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
+def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
     """Series [B, K + 1] of the flap angle: Re sum_k series_k exp(2 pi i k t*)."""
     if isinstance(flap, FourierFlap):
         return np.tile(_series(flap.mean, flap.cosine, flap.sine), (count, 1))
