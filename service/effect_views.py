@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.effect_schemas import Applies, EffectOut, EffectsOut, ParameterOut
+from service.effect_schemas import EffectOut, EffectsOut, ParameterOut
 from service.problems import not_found
 from sim.effects.contract import Effect, Parameter
 from sim.effects.registry import EFFECTS
@@ -31,15 +31,9 @@ def _effect(found: Effect) -> EffectOut:
         source=found.source,
         signature=found.signature,
         confused_with=list(found.confused_with),
-        applies_to=_applies(found),
+        applies_to=list(found.rigs),
         parameters=[_parameter(found, one) for one in found.parameters],
     )
-
-
-def _applies(found: Effect) -> list[Applies]:
-    wing = found.wing is not None or "tracks" in found.observed
-    vehicle = found.vehicle is not None or "forces" in found.observed
-    return [*(["wing"] if wing else []), *(["vehicle"] if vehicle else [])]  # type: ignore[list-item]
 
 
 def _parameter(found: Effect, one: Parameter) -> ParameterOut:

@@ -27,6 +27,7 @@ Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measureme
 Port = Literal["inertia", "connector", "drive", "air", "observation"]
 Power = Literal["conservative", "dissipative", "any"]
 Measure = Literal["span", "chord", "mass"]
+RigKind = Literal["wing", "vehicle"]
 Values = Mapping[str, Array]  # parameters of one effect by name, one value per individual
 
 
@@ -99,11 +100,17 @@ class Effect:
         """All: sizes, then the others."""
         return (*self.size, *self.shape)
 
+    @property
+    def rigs(self) -> tuple[RigKind, ...]:
+        """Whose models can contain it."""
+        on_wing = self.wing is not None or "tracks" in self.observed
+        on_vehicle = self.vehicle is not None or "forces" in self.observed
+        both: tuple[tuple[RigKind, bool], ...] = (("wing", on_wing), ("vehicle", on_vehicle))
+        return tuple(rig for rig, acts in both if acts)
+
     def applies_to(self, rig: Wing | Vehicle) -> bool:
         """Whether a model of ``rig`` can contain it."""
-        if isinstance(rig, Wing):
-            return self.wing is not None or "tracks" in self.observed
-        return self.vehicle is not None or "forces" in self.observed
+        return ("wing" if isinstance(rig, Wing) else "vehicle") in self.rigs
 
     def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
         """Genes for ``rig``: switched off, all else at its typical value."""
