@@ -3,60 +3,71 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+from records import Station
+from sim.division import MAX_STRIPS
 from sim.effects.contract import Effect, Parameter, Values
 from sim.effects.wing import WingScene
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-_MODES = 64  # of the flow about a section
+_MODES = 128  # of the flow about a section: entries of up to 8 bodies along the chord to 3e-4
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    scale = values["k"] * scene.density
-    structure = scene.structure
+    scale, structure = values["k"] * scene.density, scene.structure
     for strip, count in enumerate(structure.division.bodies):
-        joined = strip_matrix(structure, strip)
+        joined, first = strip_matrix(structure, strip), structure.division.index(strip, 0)
         for i in range(count):
             for j in range(count):
-                block = np.zeros((6, 6, len(scale)))
-                block += joined[6 * i : 6 * i + 6, 6 * j : 6 * j + 6, None] * scale
-                first, second = structure.division.index(strip, i), structure.division.index(strip, j)
-                scene.add_air(first, second, block)
+                block = joined[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+                scene.add_air(first + i, first + j, block[:, :, None] * scale)
 
 
 def strip_matrix(structure: Structure, strip: int) -> Array:
     """[6 n, 6 n] (m^3 to m^5): twice the kinetic energy of air of density one that a strip of n bodies moves.
 
-    A section of chord c = 2 b whose points move along the normal with w(x) moves the air about it with the kinetic
-    energy of a potential jump sqrt(1 - x^2) sum_k W_k U_k(x), x = cos t from edge to edge; with w = sum_k w_k U_k that
-    is W_k = 2 b w_k / (k + 1) (thin airfoil theory; Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955), sect. 5-6).
-    So a section that heaves moves rho pi c^2 / 4 of air, one that pitches about its middle rho pi c^4 / 128.
+    A section of chord c = 2 b whose points move along its normal with w(x), x = cos t from edge to edge, makes a jump
+    of the velocity potential sqrt(1 - x^2) sum_k W_k U_k(x), U_k(x) = sin((k + 1) t) / sin t. With w = sum_k w_k U_k
+    it is W_k = 2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w: so a
+    section that heaves moves rho pi c^2 / 4 of air, one that pitches about its middle rho pi c^4 / 128 (Bisplinghoff,
+    Ashley and Halfman, Aeroelasticity (1955), ch. 5).
     """
-    division = structure.division
-    count, panels = division.bodies[strip], structure.panels
+    panel = structure.panels[structure.division.index(strip, 0)]
+    first, count = structure.division.index(strip, 0), structure.division.bodies[strip]
+    centres = tuple((float(b.centre[0]), float(b.centre[1])) for b in structure.bodies[first : first + count])
+    return _strip_matrix(structure.wing.stations, panel.y0, panel.y1, centres)
+
+
+@lru_cache(maxsize=4 * MAX_STRIPS)
+def _strip_matrix(
+    stations: tuple[Station, ...], y0: float, y1: float, centres: tuple[tuple[float, float], ...]
+) -> Array:
+    """The same from the planform, the strip's ends and its bodies' centres of mass (x, y), m; read-only."""
+    count = len(centres)
     total = np.zeros((6 * count, 6 * count))
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    first = panels[division.index(strip, 0)]
+    middle, half = 0.5 * (y0 + y1), 0.5 * (y1 - y0)
+    span, edges, chords = np.array([(s.y, s.leading_edge, s.chord) for s in stations]).T
     for node, weight in zip(nodes, weights, strict=True):
-        y = 0.5 * (first.y0 + first.y1) + 0.5 * (first.y1 - first.y0) * node
-        width = 0.5 * (first.y1 - first.y0) * weight
-        chord, edge = float(structure.planform.chord(y)), float(structure.planform.leading_edge(y))
+        y = middle + half * node
+        b = 0.5 * float(np.interp(y, span, chords))
         modes = np.zeros((_MODES, 6 * count))
-        for i in range(count):
-            body = structure.bodies[division.index(strip, i)]
-            for column, constant, slope in _normal_motion(y, edge + 0.5 * chord, body.centre):
-                modes[:, 6 * i + column] = _modes(i / count, (i + 1) / count, constant, slope * 0.5 * chord)
+        for i, centre in enumerate(centres):
+            for column, constant, slope in _normal_motion(y, float(np.interp(y, span, edges)) + b, centre):
+                modes[:, 6 * i + column] = _modes(i / count, (i + 1) / count, constant, slope * b)
         k = np.arange(1, _MODES + 1)
-        total += width * 2 * (0.5 * chord) ** 2 * (0.5 * math.pi) * modes.T @ (modes / k[:, None])
+        total += half * weight * math.pi * b * b * modes.T @ (modes / k[:, None])
+    total.setflags(write=False)
     return total
 
 
-def _normal_motion(y: float, middle: float, centre: Array) -> list[tuple[int, float, float]]:
+def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
     """Velocity along the normal of a body's points at span ``y`` per component of its twist: at mid-chord, and by x."""
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 
@@ -86,8 +97,8 @@ EFFECT = Effect(
     port="inertia",
     size=(Parameter("k", "1", 0.0, 3.0, 1.0, "air carried along, as a part of that of plates in unbounded flow"),),
     power="conservative",
-    source="Lamb, Hydrodynamics (1932), sections 71 and 124; Sedov (1965); Ellington, Philosophical Transactions B 305, "
-    "17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
+    source="Lamb, Hydrodynamics (1932), sections 71 and 124; Sedov (1965); Ellington, Philosophical Transactions "
+    "B 305, 17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
     signature="swings later and wider, as if the wing were heavier across its plane; grows with density and the "
     "acceleration, not with the airspeed",
     confused_with=("lumped_mass", "rotational_circulation"),

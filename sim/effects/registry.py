@@ -10,8 +10,57 @@ from sim.effects.contract import Effect
 
 # One line each: a file of this folder that declares EFFECT.
 _NAMES: tuple[str, ...] = (
-    # measurement
+    # structure: what changes the springs before what takes its measure from them
+    "damage",
+    "cubic_stiffness",
+    "rod_slip",
+    "hysteresis",
+    "viscoelastic",
+    # inertia
+    "lumped_mass",
+    "mass_offset",
+    # actuation
+    "stroke_amplitude",
+    "stroke_bias",
+    "drive_harmonics",
+    "phase_lag_error",
+    "hinge_tilt",
+    "hinge_offset",
+    "compliant_drive",
+    "backlash",
+    # aerodynamics, in the order in which each sees what the last changed: stream, coefficients, circulation, wake
+    "residual_air",
+    "airspeed_error",
+    "added_mass",
+    "leading_edge_vortex",
+    "viscous_drag",
+    "plate_drag",
+    "rotational_circulation",
+    "dynamic_stall",
+    "circulation_lag",
+    "clap_and_peel",
+    "tip_loss",
+    "induced_inflow",
+    "wake_capture",
+    # measurement, on the way of a track: wing, image, tracker, frame
+    "marker_slip",
+    "rolling_shutter",
+    "camera_desync",
+    "lens_distortion",
+    "marker_swap",
+    "tracker_lag",
+    "camera_rotation",
     "camera_shift",
+    # of a force: axes, mount, amplifier
+    "balance_tilt",
+    "balance_resonance",
+    "filter_delay",
+    "balance_offset",
+    "balance_drift",
+    # of both
+    "scale_error",
+    "clock_offset",
+    "strobe_rate",
 )
 
 EFFECTS: dict[str, Effect] = {name: import_module(f"sim.effects.{name}").EFFECT for name in _NAMES}
