@@ -24,7 +24,7 @@ def drive_table(
     """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
 
     The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
-    A drive that gives way asks for two more derivatives.
+    A drive that gives way asks for two more derivatives, and for that share by itself, in the last row.
     """
     omega = 2 * np.pi * frequency
     beats = beat + (np.arange(n)[:, None] + NODES) / n
@@ -35,9 +35,13 @@ def drive_table(
         )
         angle[..., 4, :] = 0.0
     slope = SLOPES[:, None, None] / (n * frequency)
-    table = zeros((n, STAGES, 2, 5 if giving_way else 3, LANES))
-    table[...] = angle[..., : table.shape[3], :]
-    table[:, :, :, 2] += slope * angle[:, :, :, 3]
+    share = slope * angle[:, :1, :, 3]  # of the change at the start of the step
+    table = zeros((n, STAGES, 2, 6 if giving_way else 3, LANES))
+    if giving_way:
+        table[..., :5, :], table[..., 5, :] = angle, share
+    else:
+        table[...] = angle[..., :3, :]
+        table[..., 2, :] += share
     return table
 
 

@@ -84,7 +84,8 @@ EFFECT = Effect(
         ),
     ),
     shape=(Parameter("clearance", "rad", 0.0, 0.5, 0.0, "angle of wing and mirror plane at the top of the stroke"),),
-    source="Armanini et al. (2016), Eq. 7: Gamma = 1/2 C_F c^2 theta_fling' from t* = 0 until the wings stop peeling",
+    source="Armanini et al. (2016), Eq. 7: Gamma = 1/2 C_F c^2 theta_fling' from t* = 0 until the wings stop peeling; "
+    "of a wing its fall with gap and angle by potential flow (Weis-Fogh 1973; Lighthill 1973)",
     signature="a peak of force at the start of the beat, while the wings open, and nothing after",
     confused_with=("wake_capture", "drive_harmonics"),
     wing=_wing,

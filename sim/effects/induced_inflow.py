@@ -1,4 +1,4 @@
-"""A vehicle that is carried by the air moves the air: its wings meet a stream of their own making."""
+"""What the air carries moves the air: wings meet a stream of their own making."""
 
 from __future__ import annotations
 

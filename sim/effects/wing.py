@@ -94,7 +94,8 @@ class WingScene:
     def add_air(self, first: int, second: int, block: Array) -> None:
         """Add [6, 6, W] to the matrix that joins the momenta of air moved by two bodies (moment, force; turn, move).
 
-        Bodies of one strip only; for two different ones give both orders, each the transpose of the other.
+        Bodies of one strip only; for two different ones give both orders, each the transpose of the other. Air is moved
+        along the normal: of the block only the rows and columns of turning about x and y and moving along z count.
         """
         self._air[first, second] = self._air.get((first, second), 0.0) + block
 

@@ -211,7 +211,7 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
     r_xi, wrench, known = work.r_xi, work.wrench, work.known
     coupled_rates(work.xi, work.V, work.U_xi, work.U_V, COUPLING[stage], stage, 1.0 / setting.step, r_xi, work.lead)
     for rod in range(n, n + 2):
-        place_rod(rod, load(rods, rod - n, 2), hg, lanes.hinge, work.lead, r_xi, known)
+        place_rod(rod, load(rods, rod - n, 2), hg, lanes.hinge, work.V0, work.lead, r_xi, known)
     add_own_terms(wiring.mass, wiring.inertia, work.drag0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     if len(lanes.pairs):
         add_mass_terms(

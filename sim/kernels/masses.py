@@ -3,8 +3,9 @@
 The kinetic energy is half the sum of X_i . M_ij X_j over pairs of bodies, M_ij constant in their frames. X is the
 twist; for air it is taken relative to the wind, so that a plate that drifts with it feels nothing. With
 (h, p) = M_ij X_j the law of motion is h' = h x omega + p x v, p' = p x omega (Kirchhoff 1869; Lamb, Hydrodynamics,
-section 124), which keeps the energy exactly. All of it enters as inertia: fed back as a force, air that outweighs the wing would make the
-step unstable.
+section 124), which keeps the energy exactly. All of it enters as inertia: fed back as a force, air that outweighs the
+wing would make the step unstable. Plates move air along their normal only: of its blocks the rows and columns of
+turning about x and y and of moving along z are used.
 """
 
 from __future__ import annotations
@@ -51,6 +52,25 @@ def _matrix(masses: Array, k: int) -> Six:
 
 
 @inlined
+def _across(masses: Array, k: int) -> Nine:
+    """Of air: rows and columns of rotation about x and y and of translation along z; all others are zero."""
+    return (
+        load(masses, k, 0), load(masses, k, 1), load(masses, k, 5),
+        load(masses, k, 6), load(masses, k, 7), load(masses, k, 11),
+        load(masses, k, 30), load(masses, k, 31), load(masses, k, 35),
+    )  # fmt: skip
+
+
+@inlined
+def _turning(h: Three, x: Three, y: Three) -> tuple[Three, Three]:
+    """h x X + p x Y and p x X of a momentum of air, h = (h_x, h_y, 0) and p = (0, 0, h_z)."""
+    return (
+        (h[1] * x[2] - h[2] * y[1], h[2] * y[0] - h[0] * x[2], h[0] * x[1] - h[1] * x[0]),
+        (-(h[2] * x[1]), h[2] * x[0], 0.0 * h[2]),
+    )
+
+
+@inlined
 def _times(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
     a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2])
@@ -82,20 +102,22 @@ def add_momentum(
     pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, wrench: Array
 ) -> None:
     """Add what turning does to the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
-    for k in range(len(pairs)):
-        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
+    for k in range(weighing):
+        i, j = pairs[k, 0], pairs[k, 1]
         M, omega = _matrix(masses, k), load_vector(V, i, 0)
-        own = _relative(V, R, i, wind, air)
-        h, p = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
-        t, s, f = cross(h, omega), cross(p, own), cross(p, omega)
+        h, p = _times(M, load_vector(V, j, 0), load_vector(V, j, 3))
+        t, s, f = cross(h, omega), cross(p, load_vector(V, i, 3)), cross(p, omega)
         add_wrench(wrench, i, (t[0] + s[0], t[1] + s[1], t[2] + s[2]), f)
-        if air:  # the wind turns in the frame of the body
-            turn, w = load_vector(V, j, 0), _in_body(R, j, wind)
-            a, b = _times(M, scaled_vector(0.0, turn), cross(turn, w))
-            add_wrench(wrench, i, scaled_vector(-1.0, a), scaled_vector(-1.0, b))
-        else:
-            t, f = _weight(M, gravity, R, i)
-            add_wrench(wrench, i, t, f)
+        t, f = _weight(M, gravity, R, i)
+        add_wrench(wrench, i, t, f)
+    for k in range(weighing, len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        N, omega, turn = _across(masses, k), load_vector(V, i, 0), load_vector(V, j, 0)
+        own, w = _relative(V, R, i, wind, True), _in_body(R, j, wind)
+        h = times(N, (turn[0], turn[1], load(V, j, 5) - w[2]))
+        a = turn[0] * w[1] - turn[1] * w[0]  # the wind turns in the frame of the body
+        t, f = _turning(h, omega, own)
+        add_wrench(wrench, i, (t[0] - N[2] * a, t[1] - N[5] * a, t[2]), (f[0], f[1], -(N[8] * a)))
 
 
 @inlined
@@ -183,9 +205,9 @@ def add_mass_terms(
     wrench: Array,
 ) -> None:
     """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
-    for k in range(len(pairs)):
-        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
-        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), _relative(V, R, i, wind, air)
+    for k in range(weighing):
+        i, j = pairs[k, 0], pairs[k, 1]
+        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         x, y = load_vector(X, j, 0), load_vector(X, j, 3)
         u, w = load_vector(lead, j, 0), load_vector(lead, j, 3)
         a, b = _times(
@@ -195,7 +217,7 @@ def add_mass_terms(
         )
         c, d = _times(M, x, y)
         e, f, g = cross(omega, c), cross(v, d), cross(omega, d)
-        h, p = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+        h, p = _times(M, load_vector(V, j, 0), load_vector(V, j, 3))
         x, y = load_vector(X, i, 0), load_vector(X, i, 3)
         q, r, s = cross(h, x), cross(p, y), cross(p, x)
         add_wrench(
@@ -207,6 +229,22 @@ def add_mass_terms(
                 a[2] + e[2] + f[2] - q[2] - r[2],
             ),
             (b[0] + g[0] - s[0], b[1] + g[1] - s[1], b[2] + g[2] - s[2]),
+        )
+    for k in range(weighing, len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        N, omega, v = _across(masses, k), load_vector(V, i, 0), _relative(V, R, i, wind, True)
+        x = (load(X, j, 0), load(X, j, 1), load(X, j, 5))
+        u = (load(lead, j, 0), load(lead, j, 1), load(lead, j, 5))
+        a = times(N, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]))
+        w = _in_body(R, j, wind)
+        h = times(N, (load(V, j, 0), load(V, j, 1), load(V, j, 5) - w[2]))
+        t, f = _turning(times(N, x), omega, v)
+        s, g = _turning(h, load_vector(X, i, 0), load_vector(X, i, 3))
+        add_wrench(
+            wrench,
+            i,
+            (a[0] - t[0] - s[0], a[1] - t[1] - s[1], -(t[2] + s[2])),
+            (-(f[0] + g[0]), -(f[1] + g[1]), a[2]),
         )
 
 

@@ -25,15 +25,16 @@ DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, f
 
 @kernel
 def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> None:
-    """Angle, rate and acceleration ``out`` [2, 3, W] of both rods from ``profile`` [2, 5, W], four derivatives by time.
+    """Angle, rate and acceleration ``out`` [2, 3, W] of both rods from ``profile`` [2, 6, W].
 
-    ``tau_sigma`` [Z, W]: all states; ``turning`` [Z, W]: their rates.
+    That is the angle and four derivatives by time, then the stage's share of the acceleration's change. ``tau_sigma``
+    [Z, W]: all states; ``turning`` [Z, W]: their rates.
     """
     z = len(tau_sigma) - 3
     tau, pace, quickening = load1(tau_sigma, z), load1(tau_sigma, z + 1) + 1.0, load1(turning, z + 1)
     for rod in range(2):
         jerk, snap = load(profile, rod, 3), load(profile, rod, 4)
-        a = load(profile, rod, 2) + tau * (jerk + 0.5 * tau * snap)
+        a = load(profile, rod, 2) + load(profile, rod, 5) + tau * (jerk + 0.5 * tau * snap)
         v = load(profile, rod, 1) + tau * (load(profile, rod, 2) + tau * (0.5 * jerk + tau * snap * (1.0 / 6.0)))
         x = load(profile, rod, 2) + tau * (jerk * (1.0 / 3.0) + tau * snap * (1.0 / 12.0))
         store(out, rod, 0, load(profile, rod, 0) + tau * (load(profile, rod, 1) + 0.5 * tau * x))

@@ -56,11 +56,18 @@ def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V:
 
 
 @kernel
-def place_rod(rod: int, turning: Vector, length: float, hinge: Array, lead: Array, rate: Array, known: Array) -> None:
-    """Y of a driving rod that turns about the hinge with the acceleration ``turning``; l is ``length``."""
+def place_rod(
+    rod: int, turning: Vector, length: float, hinge: Array, V: Array, lead: Array, rate: Array, known: Array
+) -> None:
+    """Y of a driving rod that turns about the hinge with the acceleration ``turning``; l is ``length``.
+
+    Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in :func:`keep_stage`; about one axis, A leaves rotations be.
+    """
     u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
-    sweep = cross(u, off)
+    sweep, v = cross(u, off), load_vector(V, rod, 3)
     for j in range(3):
         store(known, rod, j, length * (load(lead, rod, j) + u[j] * turning) + load(rate, rod, j))
-        moved = length * (load(lead, rod, 3 + j) - sweep[j] * turning)
+    dragged = cross(load_vector(known, rod, 0), v)
+    for j in range(3):
+        moved = length * (load(lead, rod, 3 + j) - sweep[j] * turning + dragged[j])
         store(known, rod, 3 + j, moved + load(rate, rod, 3 + j))
