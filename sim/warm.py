@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+from records import Genome
 from sim.balance import TRIALS, delfly
 from sim.balance import blank_recording as blank_forces
 from sim.blade_element_wing import BladeElementWing
@@ -12,13 +13,19 @@ from sim.numerics import Numerics
 from sim.rig import WIND_TUNNEL, blank_recording, robird_wing
 
 
+WITH_MEMORY = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture")
+
+
 def main() -> None:
-    """Simulate two beats of the coarsest wing, and a beat of the vehicle, once."""
+    """Simulate two beats of the coarsest wing, and a beat of the vehicle, once without effects and once with memory."""
     start = time.perf_counter()
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=8, max_beats=2))
     model.beat([gene.nominal for gene in model.genes], blank_recording(model.wing, WIND_TUNNEL[0]))
-    vehicle = BladeElementWing(delfly())
-    vehicle.observe([[gene.nominal for gene in vehicle.genes]], blank_forces(TRIALS[0].condition))
+    vehicle = BladeElementWing(delfly()).with_effects(*WITH_MEMORY)
+    genome = Genome.nominal(vehicle.genes)
+    switched_on = {name: value for one in vehicle.chosen for name, value in one.typical(vehicle.vehicle).items()}
+    for one in (genome, genome.replace(switched_on)):
+        vehicle.observe([one.values], blank_forces(TRIALS[0].condition))
     print(f"kernels ready after {time.perf_counter() - start:.0f} s")
 
 
