@@ -12,7 +12,6 @@ from sim.flexible_wing import FlexibleWing
 from sim.numerics import Numerics
 from sim.rig import WIND_TUNNEL, blank_recording, robird_wing
 
-
 WITH_MEMORY = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture")
 
 
