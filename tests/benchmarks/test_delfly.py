@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import delfly
 from benchmarks.delfly import FINER_TRIAL, SMALL, Fitted, corners, coverage, fit, milliseconds, rows, table, widest
-from benchmarks.delfly_figures import Line, Panel, svg
+from benchmarks.svg import Line, Panel, svg
 from calibration.evaluator import Evaluator
 from records import LowPass
 from sim.balance import TRIALS, record, true_beat
