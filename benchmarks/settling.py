@@ -14,9 +14,11 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from records import Condition
+from sim.effects.wing import WingScene
 from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
-from sim.kernels.integrate import Lanes, State, Trace, advance, new_work
+from sim.kernels.arrays import State, Trace, new_work
+from sim.kernels.integrate import advance
 from sim.numerics import Numerics
 from sim.periodic import Secants
 from sim.rig import robird_wing
@@ -61,9 +63,13 @@ class Subject:
         return np.array([[gene.nominal * factors.get(gene.name, 1.0) for gene in self.model.genes]])
 
     @cached_property
-    def group(self) -> Lanes:
+    def scene(self) -> WingScene:
         """A full group of lanes."""
-        return lanes(self.structure, self.model.genes, self.genome)
+        return WingScene.of(self.structure, self.condition, lanes(self.structure, self.model.genes, self.genome))
+
+    def drive(self, numerics: Numerics, steps: int, beat: int) -> Array:
+        """Of a beat, as :func:`sim.scene.drive_table` has it."""
+        return drive_table(self.scene.rods, self.condition.flap_frequency, numerics, steps, beat)
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,8 @@ def beats(subject: Subject, steps: int, *, window: int, start: State | None = No
     What :func:`sim.settle.settle` does, but every beat is shown. ``window`` as in Numerics.
     """
     structure, numerics = subject.structure, Numerics(steps=steps, window=window)
-    here, work = setting(subject.condition, steps), new_work(structure.wiring, subject.group)
+    group, here = subject.scene.frozen(), subject.scene.setting(steps)
+    work = new_work(structure.wiring, here, group)
     state, trace, alive = at_rest(structure), new_trace(structure, steps), np.ones(LANES, bool)
     if start is not None:
         _put(state, start)
@@ -89,13 +96,13 @@ def beats(subject: Subject, steps: int, *, window: int, start: State | None = No
     beat = 0 if start is None else numerics.ramp_beats
     while True:
         before = _first_lane(state)
-        table = drive_table(structure, subject.condition, numerics, steps, min(beat, numerics.ramp_beats))
-        advance(structure.wiring, here, subject.group, table, work, state, trace, alive)
+        table = subject.drive(numerics, steps, min(beat, numerics.ramp_beats))
+        advance(structure.wiring, here, group, table, work, state, trace, alive)
         if not alive.all():
             raise ArithmeticError(f"{subject.division} bodies diverge with {steps} steps a beat")
         distance = np.inf
         if beat >= numerics.ramp_beats:
-            secants = secants or Secants(before, 2 * np.pi * subject.condition.flap_frequency, window)
+            secants = secants or Secants(before, subject.scene.angular_rate, window, group.laws.size)
             following, distance = secants.add(before, _first_lane(state))
             _put(state, following)
         yield Passed(Trace(*(array[..., 0].copy() for array in trace)), before, distance)
@@ -199,14 +206,15 @@ def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: floa
 def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6) -> float:
     """Processor time of one beat of the integrator, per individual of a full group: median of repeats, warm."""
     structure, numerics = subject.structure, Numerics(steps=steps)
-    here, work = setting(subject.condition, steps), new_work(structure.wiring, subject.group)
-    table = drive_table(structure, subject.condition, numerics, steps, numerics.ramp_beats)
+    group, here = subject.scene.frozen(), subject.scene.setting(steps)
+    work = new_work(structure.wiring, here, group)
+    table = subject.drive(numerics, steps, numerics.ramp_beats)
     state, trace, alive = at_rest(structure), new_trace(structure, steps), np.ones(LANES, bool)
     _put(state, start)
     times: list[float] = []
     while len(times) < 6 or sum(times) < seconds:
         began = time.thread_time()
-        advance(structure.wiring, here, subject.group, table, work, state, trace, alive)
+        advance(structure.wiring, here, group, table, work, state, trace, alive)
         times.append(time.thread_time() - began)
     if not alive.all():
         raise ArithmeticError(f"{subject.division} bodies diverge with {steps} steps a beat")
@@ -224,7 +232,7 @@ class ByDefault:
 def by_default(subject: Subject) -> ByDefault:
     """A full group through :func:`sim.simulate.periodic_beats`, and the first of its beats."""
     genomes = np.repeat(subject.genome, LANES, axis=0)
-    arguments = (subject.structure, subject.model.genes, genomes, subject.condition, subject.model.numerics)
+    arguments = (subject.model.subject((), subject.condition), genomes, subject.model.numerics)
     times, found = [], periodic_beats(*arguments)
     for _ in range(3):
         began = time.thread_time()

@@ -15,7 +15,6 @@ from sim.model import Solution
 from sim.numerics import LADDER
 from sim.outputs import Outputs, from_motion
 from sim.simulate import Beat
-from sim.wing_genes import lanes
 
 Array = npt.NDArray[np.float64]
 
@@ -48,10 +47,9 @@ def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Re
 def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording, beat: Beat) -> Outputs:
     if beat.motion is None:
         raise AssertionError("a beat without its motion")
-    group = lanes(model.structure, model.genes, np.atleast_2d(np.asarray(genome, float)))
-    found = from_motion(
-        model.structure, group, recording.condition, beat.motion, _crossing(model, recording, beat.tracks)
-    )
+    genomes = np.asarray(genome, float)[None]
+    scene = model.subject(model.switched_on(genomes[0]), recording.condition).scene(genomes)
+    found = from_motion(scene, beat.motion, _crossing(model, recording, beat.tracks))
     return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
 
 

@@ -8,22 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from records import Condition
+from sim.effects.wing import WingScene
 from sim.kernels import LANES
 from sim.kernels.air import strip_forces
+from sim.kernels.arrays import Lanes, Setting, State, Wiring, Work, new_work
 from sim.kernels.bodies import kinetic_and_height
-from sim.kernels.connectors import connect, relative_pose
-from sim.kernels.integrate import Lanes, State
+from sim.kernels.connectors import twists
+from sim.kernels.integrate import airflow, forces
+from sim.kernels.masses import add_energies
+from sim.kernels.memory import aligned
 from sim.model import Solution
-from sim.scene import setting
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
 Kind = Literal["root", "spanwise", "chordwise"]
 RODS = ("front rod", "rear rod")
 
@@ -166,26 +170,29 @@ class Balance:
         return self.closing / entering if entering > 0 else 0.0
 
 
-def from_motion(
-    structure: Structure, group: Lanes, condition: Condition, motion: State, crossing: float = 0.0
-) -> Outputs:
-    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6]) of the one individual in ``group``."""
-    n, count = len(motion.V), len(structure.bodies)
+def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outputs:
+    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6], z [n, Z]) of the one individual in ``scene``.
+
+    The scene's lanes must all be that individual, its effects included: they are taken for instants.
+    """
+    structure, n = scene.structure, len(motion.V)
     sums = _Sums(structure, n)
-    for rows, state in _groups(motion):
-        _connectors(structure, group, state, sums, rows)
-        _air(structure, group, condition, state, sums, rows)
-        _energies(structure, condition, state, sums, rows)
+    parts = _Parts(structure.wiring, scene.setting(n), scene.frozen())
+    groups = list(_groups(motion))
+    for c in range(len(structure.connectors)):
+        _connector(parts, c, groups, sums)
+    _air_and_energies(parts, groups, sums)
+    incidence = _incidence(scene.condition)
     return Outputs(
         phase=np.arange(n) / n,
         crossing=crossing,
-        motors=(_motor(motion, sums, count), _motor(motion, sums, count + 1)),
+        motors=(_motor(parts, motion, sums, 0), _motor(parts, motion, sums, 1)),
         connectors=_named(structure, sums),
         sections=_sections(structure, motion, sums),
         strips=_strips(structure, sums),
         air_wrench=sums.air_wrench,
-        lift_axis=np.array([-np.sin(_incidence(condition)), 0.0, np.cos(_incidence(condition))]),
-        thrust_axis=-np.array([np.cos(_incidence(condition)), 0.0, np.sin(_incidence(condition))]),
+        lift_axis=np.array([-np.sin(incidence), 0.0, np.cos(incidence)]),
+        thrust_axis=-np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
         kinetic=sums.kinetic,
         elastic=sums.stored.sum(axis=1),
         gravitational=sums.gravitational,
@@ -196,16 +203,47 @@ class _Sums:
     """What is collected over the groups of instants."""
 
     def __init__(self, structure: Structure, n: int) -> None:
-        bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.wiring.area)
+        bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.division.bodies)
         self.wrench, self.twist = np.zeros((n, connectors, 6)), np.zeros((n, connectors, 6))
         self.lost, self.stored = np.zeros((n, connectors)), np.zeros((n, connectors))
-        self.rod_moment = np.zeros((n, bodies + 2))
+        self.on_rods = np.zeros((n, 2, 6))
         self.air_wrench = np.zeros((n, bodies, 6))
         self.strip_force, self.strip_power = np.zeros((n, strips, 3)), np.zeros((n, strips))
         self.kinetic, self.gravitational = np.zeros(n), np.zeros(n)
 
 
-def _groups(motion: State) -> Iterator[tuple[npt.NDArray[np.int64], State]]:
+class _Parts(NamedTuple):
+    """What the kernels are given for the wing."""
+
+    wiring: Wiring
+    here: Setting
+    lanes: Lanes
+
+    def alone(self, c: int) -> tuple[_Parts, Index]:
+        """The wing with nothing but connector ``c`` and its laws, and which of the states are its own."""
+        w, group, none = self.wiring, self.lanes, np.zeros(0, np.int64)
+        one, count = slice(c, c + 1), len(w.first)
+        wiring = w._replace(
+            mass=0 * w.mass, inertia=0 * w.inertia, first=w.first[one], second=w.second[one], a=w.a[one], b=w.b[one],
+            driven=0, below=none, strip_start=np.zeros(1, np.int64), geometry=w.geometry[:0],
+        )  # fmt: skip
+        laws, rows, parameters, states = group.laws, [], none, none
+        for function, given, kept, at, first, axes in laws.connector:
+            rows.append([function, given, kept, len(parameters), len(states), axes])
+            parameters = np.append(parameters, at + c + count * np.arange(given))
+            states = np.append(states, first + c + count * np.arange(kept))
+        own = laws._replace(
+            strip=laws.strip[:0], connector=np.array(rows, np.int64).reshape(-1, 6), size=laws.size[states],
+            parameters=aligned(laws.parameters[parameters]), motor=laws.motor[:0],
+        )  # fmt: skip
+        lanes = group._replace(
+            stiffness=group.stiffness[one], damping=group.damping[one], coupling=group.coupling[one],
+            pairs=group.pairs[:0], masses=group.masses[:0], weighing=0, laws=own,
+        )  # fmt: skip
+        return _Parts(wiring, self.here, lanes), states
+
+
+def _groups(motion: State) -> Iterator[tuple[Index, State]]:
     """Instants by LANES: their numbers, and their state with the instant as the last axis, spare lanes filled."""
     n = len(motion.V)
     for start in range(0, n, LANES):
@@ -214,74 +252,68 @@ def _groups(motion: State) -> Iterator[tuple[npt.NDArray[np.int64], State]]:
         yield rows, State(*(np.ascontiguousarray(np.moveaxis(part[filled], 0, -1)) for part in motion))
 
 
-def _connectors(structure: Structure, group: Lanes, state: State, sums: _Sums, rows: npt.NDArray[np.int64]) -> None:
-    """One connector at a time, so that what the law adds up is that connector's."""
-    w, kept = structure.wiring, len(rows)
-    Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
-    relative_pose(w.first, w.second, w.a, w.b, state.R, state.p, Q, d)
-    for c in range(len(w.first)):
-        one = slice(c, c + 1)
-        wrench, lost, stored = np.zeros_like(state.V), np.zeros(LANES), np.zeros(LANES)
-        connect(
-            w.first[one], w.second[one], w.a[one], w.b[one], group.stiffness[one], group.damping[one],
-            group.coupling[one], Q[one], d[one], state.V, wrench, lost, stored,
-        )  # fmt: skip
-        on_first = wrench[w.first[c]].T[:kept]
-        e = (w.a[c] + d[c].T)[:kept]
+def _put(work: Work, state: State) -> None:
+    for array, value in zip((work.R, work.p, work.V, work.z), state, strict=True):
+        array[:] = value
+
+
+def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _Sums) -> None:
+    """One connector, by the integrator's own forces of a wing that has no other: what they add up is its own."""
+    alone, own = parts.alone(c)
+    work, w, twist = new_work(*alone), alone.wiring, np.zeros((1, 6, LANES))
+    first = int(w.first[0])
+    for rows, state in groups:
+        kept = len(rows)
+        _put(work, state._replace(z=state.z[own]))
+        forces(*alone, work)
+        twists(w.first, w.second, w.a, w.b, work.Q, work.d, work.V, twist)
+        on_first, e = work.wrench[first].T[:kept], (w.a[0] + work.d[0].T)[:kept]
         sums.wrench[rows, c, 3:] = -on_first[:, 3:]
         sums.wrench[rows, c, :3] = -on_first[:, :3] + np.cross(e, on_first[:, 3:])
-        sums.twist[rows, c] = _relative_twist(state, w.first[c], w.second[c], w.b[c], Q[c], e)
-        sums.lost[rows, c], sums.stored[rows, c] = lost[:kept], stored[:kept]
-        if w.first[c] >= len(w.mass):
-            sums.rod_moment[rows, w.first[c]] += on_first[:, 0]
+        sums.twist[rows, c] = twist[0].T[:kept]
+        sums.lost[rows, c], sums.stored[rows, c] = work.lost[:kept], work.stored[:kept]
+        if first >= len(w.mass):
+            sums.on_rods[rows, first - len(w.mass)] += on_first
 
 
-def _relative_twist(state: State, first: int, second: int, b: Array, Q: Array, e: Array) -> Array:
-    """[n, 6] of the second body against the first, in the first's axes at the point ``e`` [n, 3] from its centre."""
-    n = len(e)
-    turn = Q.T[:n].reshape(n, 3, 3)
-    V, U = state.V[first].T[:n], state.V[second].T[:n]
-    spin = np.einsum("tij,tj->ti", turn, U[:, :3]) - V[:, :3]
-    carried = np.einsum("tij,tj->ti", turn, U[:, 3:] + np.cross(U[:, :3], b))
-    return np.hstack([spin, carried - V[:, 3:] - np.cross(V[:, :3], e)])
+def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
+    """Flow and laws of the air for the whole wing, then the forces one strip at a time."""
+    w, here, group = parts
+    work, n = new_work(*parts), len(w.mass)
+    kinetic, height = np.zeros(LANES), np.zeros(LANES)
+    for rows, state in groups:
+        kept = len(rows)
+        _put(work, state)
+        airflow(w, here, group, work)
+        work.wrench[:] = 0.0
+        for s in range(len(w.geometry)):
+            one = slice(s, s + 1)
+            power, force = np.zeros(LANES), np.zeros((3, LANES))
+            strip_forces(
+                w.strip_start[s : s + 2], w.weight, w.centroid, w.geometry[one], here.density,
+                group.lift_share, group.lift_x, group.drag_share, group.drag_x,
+                work.flow[one], work.loads[one], len(group.laws.strip) > 0,
+                work.R, work.V, work.wrench, work.normal_damping, power, force,
+            )  # fmt: skip
+            sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:kept], power[:kept]
+        sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:kept, :n]
+        kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
+        add_energies(
+            group.pairs, group.masses, group.weighing, here.gravity, here.wind, work.R, work.p, work.V, kinetic, height
+        )
+        sums.kinetic[rows], sums.gravitational[rows] = kinetic[:kept], height[:kept]
 
 
-def _air(
-    structure: Structure,
-    group: Lanes,
-    condition: Condition,
-    state: State,
-    sums: _Sums,
-    rows: npt.NDArray[np.int64],
-) -> None:
-    """One strip at a time."""
-    w, kept = structure.wiring, len(rows)
-    bodies, here = len(w.mass), setting(condition, len(sums.kinetic))
-    wrench, unused = np.zeros_like(state.V), np.zeros((bodies, LANES))
-    for s in range(len(w.area)):
-        power, force = np.zeros(LANES), np.zeros((3, LANES))
-        strip_forces(
-            w.strip_start[s : s + 2], w.weight, w.centroid, w.area[s : s + 1],
-            here.density, here.wind, group.coefficients, group.lift_share, group.lift_x, group.drag_share,
-            group.drag_x, state.R, state.V, wrench, unused, power, force,
-        )  # fmt: skip
-        sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:kept], power[:kept]
-    sums.air_wrench[rows] = np.moveaxis(wrench, -1, 0)[:kept, :bodies]
-
-
-def _energies(
-    structure: Structure, condition: Condition, state: State, sums: _Sums, rows: npt.NDArray[np.int64]
-) -> None:
-    w, n = structure.wiring, len(structure.bodies)
-    kinetic, potential = np.zeros(LANES), np.zeros(LANES)
-    kinetic_and_height(w.mass, w.inertia, state.p[:n], state.V[:n], condition.gravity, kinetic, potential)
-    sums.kinetic[rows], sums.gravitational[rows] = kinetic[: len(rows)], potential[: len(rows)]
-
-
-def _motor(motion: State, sums: _Sums, rod: int) -> Motor:
-    R, rate = motion.R[:, rod], motion.V[:, rod, 0]
-    torque = -sums.rod_moment[:, rod]  # the rods have no mass: the motor holds what the connectors exert
-    return Motor(np.arctan2(R[:, 7], R[:, 4]), rate, torque, torque * rate)
+def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
+    """The rods have no mass: the motor holds what the connectors exert, about the hinge where it truly is."""
+    hinge, row = parts.lanes.hinge[:, 0], len(parts.wiring.mass) + rod
+    axis, off = hinge[:3], hinge[3:6]
+    R, rate = motion.R[:, row].reshape(-1, 3, 3), motion.V[:, row, :3] @ axis
+    turned = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1) @ axis
+    angle = np.arctan2(turned, np.trace(R, axis1=1, axis2=2) - 1.0)
+    moment, force = sums.on_rods[:, rod, :3], sums.on_rods[:, rod, 3:]
+    torque = -(moment - np.cross(off, force)) @ axis
+    return Motor(angle, rate, torque, torque * rate)
 
 
 def body_names(structure: Structure) -> list[str]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from records import Condition, Gene
 from sim.atmosphere import density
 from sim.drive import flap_angle
+from sim.kernels.arrays import AREA
 from sim.kernels.jit import kernel
 from sim.structure import Structure
 from sim.wing_genes import lanes
@@ -94,7 +95,7 @@ def peer_wing(
         strip=w.strip_start,
         weight=w.weight,
         centroid=w.centroid.copy(),
-        area=w.area,
+        area=w.geometry[:, AREA].copy(),
         coefficients=group.coefficients[:, 0].copy(),
         lift=np.stack([group.lift_share[:, 0], group.lift_x[:, 0]], axis=-1),
         drag=np.stack([group.drag_share[:, 0], group.drag_x[:, 0]], axis=-1),

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from records import FourierDrive, Hinge, Marker, Materials, Rod, Station, Wing
+from records import Condition, FourierDrive, Hinge, Marker, Materials, Rod, Station, Wing
+from sim.drive import RodDrive
 from sim.kernels import LANES
-from sim.kernels.integrate import STAGES, Lanes, Setting, State, Trace, advance, new_work
-from sim.scene import new_trace
+from sim.kernels.arrays import STAGES, Lanes, Setting, State, Trace, new_work
+from sim.kernels.integrate import advance
+from sim.numerics import Numerics
+from sim.scene import drive_table, new_trace
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -35,16 +38,24 @@ def march(
     structure: Structure, group: Lanes, here: Setting, state: State, steps: int, table: Array | None = None
 ) -> Trace:
     """Integrate ``steps`` equal steps from ``state``, in place; the motion is kept. No lane may diverge."""
-    trace, alive = new_trace(structure, steps, with_motion=True), np.ones(LANES, bool)
-    still = np.zeros((steps, STAGES, 2, 3)) if table is None else table
-    advance(structure.wiring, here, group, still, new_work(structure.wiring, group), state, trace, alive)
+    trace, alive = new_trace(structure, steps, with_motion=True, states=len(state.z)), np.ones(LANES, bool)
+    still = np.zeros((steps, STAGES, 2, 3, LANES)) if table is None else table
+    advance(structure.wiring, here, group, still, new_work(structure.wiring, here, group), state, trace, alive)
     assert alive.all()
     return trace
 
 
 def vacuum_here(step: float, gravity: float = 0.0) -> Setting:
     """No air."""
-    return Setting(0.0, np.zeros(3), gravity, step)
+    return Setting(np.zeros(LANES), np.zeros((3, LANES)), gravity, step)
+
+
+def driven(structure: Structure, condition: Condition, steps: int, beats: int, *, giving_way: bool = False) -> Array:
+    """The drive of the first ``beats`` with ``steps`` each, ramped up over the first."""
+    rods, numerics = RodDrive.of(structure.wing.drive, condition.phase_lag, LANES), Numerics(steps=steps)
+    frequency = condition.flap_frequency
+    tables = [drive_table(rods, frequency, numerics, steps, beat, giving_way=giving_way) for beat in range(beats)]
+    return np.concatenate(tables)
 
 
 def with_connectors(structure: Structure, group: Lanes, kept: npt.NDArray[np.bool_]) -> tuple[Structure, Lanes]:

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from records import FourierDrive, Hinge, Marker, Materials, Rod, Station, Wing
 from sim.division import Division
 from sim.kernels import LANES
+from sim.kernels.arrays import Lanes
 from sim.kernels.connectors import connect, relative_pose, tangent
-from sim.kernels.integrate import Lanes
 from sim.scene import at_rest
 from sim.structure import Structure, build
 from sim.wing_genes import lanes, wing_genes
@@ -67,8 +67,9 @@ def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) ->
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
     relative_pose(w.first, w.second, w.a, w.b, R, p, Q, d)
     still, wrench = np.zeros((len(p), 6, LANES)), np.zeros((len(p), 6, LANES))
-    lost, stored, coupling = np.zeros(LANES), np.zeros(LANES), np.zeros((0, 9, LANES))
-    connect(w.first, w.second, w.a, w.b, springs, 0 * springs, coupling, Q, d, still, wrench, lost, stored)
+    lost, stored = np.zeros(LANES), np.zeros(LANES)
+    coupling, more = np.zeros((0, 9, LANES)), np.zeros((0, 6, LANES))
+    connect(w.first, w.second, w.a, w.b, springs, 0 * springs, coupling, more, Q, d, still, wrench, lost, stored)
     return wrench
 
 

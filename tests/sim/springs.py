@@ -57,5 +57,6 @@ def load(pair: Pair) -> tuple[Array, float, float]:
     relative_pose(first, second, a, b, R, p, Q, d)
     wrench, lost, stored = np.zeros((2, 6, LANES)), np.zeros(LANES), np.zeros(LANES)
     coupling = np.zeros((0, 9, LANES)) if pair.coupling is None else lanes(pair.coupling.reshape(1, 9))
-    connect(first, second, a, b, lanes(pair.K[None]), lanes(pair.D[None]), coupling, Q, d, V, wrench, lost, stored)
+    K, D, more = lanes(pair.K[None]), lanes(pair.D[None]), np.zeros((0, 6, LANES))
+    connect(first, second, a, b, K, D, coupling, more, Q, d, V, wrench, lost, stored)
     return wrench[..., 0], float(lost[0]), float(stored[0])

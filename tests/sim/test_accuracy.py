@@ -10,7 +10,7 @@ import pytest
 
 from records import Condition
 from sim.flexible_wing import FlexibleWing
-from sim.kernels.integrate import Trace
+from sim.kernels.arrays import Trace
 from sim.numerics import LADDER, Numerics
 from sim.rig import blank_recording, robird_wing, tunnel, vacuum
 from sim.settle import Course

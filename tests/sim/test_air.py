@@ -10,7 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sim.kernels import LANES
-from sim.kernels.air import strip_forces
+from sim.kernels.air import strip_flow, strip_forces
+from sim.kernels.arrays import AREA, FLOW, GEOMETRY, LOADS
 from tests.sim.plates import cut, loaded, plate, straight_rod
 
 Array = npt.NDArray[np.float64]
@@ -48,8 +49,24 @@ class Loads(NamedTuple):
 def blow(case: Blown) -> Loads:
     n = len(case.weight)
     out = Loads(np.zeros((n, 6, LANES)), np.zeros((n, LANES)), np.zeros(LANES), np.zeros((3, LANES)))
-    strip_forces(*case, *out)
+    add_air(case, out)
     return out
+
+
+def add_air(case: Blown, out: Loads) -> None:
+    """Both kernels one after the other, as the integrator calls them without effects."""
+    strips = len(case.area)
+    flow, loads = np.zeros((strips, FLOW, LANES)), np.zeros((strips, LOADS, LANES))
+    geometry, places, none = np.zeros((strips, GEOMETRY)), np.zeros((len(case.V), 3, LANES)), np.zeros((0, 3, LANES))
+    geometry[:, AREA] = case.area
+    density, wind = np.full(LANES, case.density), np.repeat(case.wind[:, None], LANES, axis=1)
+    strip_flow(
+        case.start, case.weight, case.centroid, wind, case.coefficients, none, case.R, places, case.V, flow, loads
+    )
+    strip_forces(
+        case.start, case.weight, case.centroid, geometry, density, case.lift_share, case.lift_x, case.drag_share,
+        case.drag_x, flow, loads, False, case.R, case.V, *out,
+    )  # fmt: skip
 
 
 def tumbling(seed: int, wind: tuple[float, float, float], speed: float) -> Blown:
@@ -158,7 +175,7 @@ def test_wrench_is_added_to_what_is_there() -> None:
     case = tumbling(4, *FLOWS["forward"])
     alone = blow(case).wrench
     out = Loads(np.full_like(alone, 2.0), np.zeros(alone[:, 0].shape), np.zeros(LANES), np.zeros((3, LANES)))
-    strip_forces(*case, *out)
+    add_air(case, out)
     np.testing.assert_allclose(out.wrench, alone + 2.0, rtol=1e-12)
 
 
@@ -267,8 +284,9 @@ def test_load_ahead_of_the_middle_lifts_the_nose(division: str, quarters: tuple[
     w, n = structure.wiring, len(structure.bodies)
     level = np.repeat(np.tile(np.eye(3).reshape(1, 9, 1), (n, 1, 1)), LANES, axis=2)
     case = Blown(
-        w.strip_start, w.weight, w.centroid, w.area, DENSITY, np.array([6.0, 0.0, 0.5]), group.coefficients,
-        group.lift_share, group.lift_x, group.drag_share, group.drag_x, level, np.zeros((n, 6, LANES)),
+        w.strip_start, w.weight, w.centroid, w.geometry[:, AREA], DENSITY, np.array([6.0, 0.0, 0.5]),
+        group.coefficients, group.lift_share, group.lift_x, group.drag_share, group.drag_x, level,
+        np.zeros((n, 6, LANES)),
     )  # fmt: skip
     wrench = blow(case).wrench[..., 0]
     arms = np.array([body.centre for body in structure.bodies]) - [0.2, 0.0, 0.0]

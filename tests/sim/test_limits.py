@@ -11,13 +11,12 @@ from scipy.interpolate import CubicSpline
 
 from records import Condition, FourBarDrive, Genome
 from sim.division import Division
-from sim.kernels.integrate import Setting
-from sim.numerics import Numerics
+from sim.kernels.arrays import Setting
 from sim.rig import robird_wing, tunnel, vacuum
-from sim.scene import at_rest, drive_table, setting
+from sim.scene import at_rest, setting
 from sim.structure import Structure, build
 from sim.wing_genes import wing_genes
-from tests.sim.marching import CHORD, DENSITY, LENGTH, ORDER, THICKNESS, march, plank, vacuum_here
+from tests.sim.marching import CHORD, DENSITY, LENGTH, ORDER, THICKNESS, driven, march, plank, vacuum_here
 from tests.sim.plates import loaded
 
 Array = npt.NDArray[np.float64]
@@ -84,9 +83,8 @@ def test_energy_ledger_closes(condition: Condition, genome: dict[str, float], or
     structure = build(robird_wing(), Division.parse("11"))
     closing = []
     for steps in (200, 800):
-        numerics = Numerics(steps=steps)
         here = setting(condition, steps)
-        table = np.concatenate([drive_table(structure, condition, numerics, steps, beat) for beat in (0, 1)])
+        table = driven(structure, condition, steps, 2)
         _, energy, power = run(structure, genome, here, 2 * steps, table)
         stored, times = energy.sum(axis=1), here.step * np.arange(2 * steps)
         work = CubicSpline(times, power).antiderivative()(times)
@@ -119,8 +117,7 @@ def test_the_integrator_is_of_its_order() -> None:
     condition = replace(vacuum(0.01, 0.05, 3.0), gravity=0.0)
     tracks = {}
     for steps in (200, 400, 800):
-        numerics = Numerics(steps=steps)
-        table = np.concatenate([drive_table(structure, condition, numerics, steps, beat) for beat in (0, 1)])
+        table = driven(structure, condition, steps, 2)
         whole, _, _ = run(structure, LIGHT, setting(condition, steps), 2 * steps, table)
         tracks[steps] = whole[:: steps // 200]
     errors = [np.abs(tracks[a] - tracks[b]).max() for a, b in ((200, 400), (400, 800))]

@@ -29,7 +29,8 @@ from records import Condition
 from sim.drive import flap_angle
 from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
-from sim.kernels.integrate import forces, new_work
+from sim.kernels.arrays import new_work
+from sim.kernels.integrate import forces
 from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing
 from sim.scene import setting
@@ -109,7 +110,8 @@ def kernels_accelerations(ours: FlexibleWing, wing: PeerWing, condition: Conditi
     n, w = len(wing.mass), ours.structure.wiring
     R, p, v, omega = frames(wing, state, t)
     group = lanes(ours.structure, ours.genes, nominal(ours)[None])
-    here, work = setting(condition, FINE)._replace(wind=wing.wind), new_work(w, group)
+    here = setting(condition, FINE)._replace(wind=np.repeat(wing.wind[:, None], LANES, axis=1))
+    work = new_work(w, here, group)
     twist = np.concatenate([np.einsum("nji,nj->ni", R, omega), np.einsum("nji,nj->ni", R, v)], axis=1)
     for array, value in ((work.R, R.reshape(n + 2, 9)), (work.p, p), (work.V, twist)):
         array[:] = np.repeat(value[..., None], LANES, axis=-1)

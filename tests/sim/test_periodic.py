@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sim.flexible_wing import FlexibleWing
-from sim.kernels.integrate import State
+from sim.kernels.arrays import State
 from sim.numerics import Numerics
 from sim.periodic import Secants
 from sim.rig import blank_recording, robird_wing, vacuum
@@ -19,6 +19,7 @@ from sim.settle import _mean_growth
 Array = npt.NDArray[np.float64]
 
 BODIES, RATE = 2, 20.0
+NO_STATES = NO_SIZES = np.zeros(0)
 
 
 class LinearBeat:
@@ -41,7 +42,7 @@ class LinearBeat:
         turn[:BODIES, 0] = body[:, 0]
         place, twist = np.zeros((BODIES + 2, 3)), np.zeros((BODIES + 2, 6))
         place[:BODIES], twist[:BODIES] = body[:, 3:6], body[:, 6:] * RATE
-        return State(Rotation.from_rotvec(turn).as_matrix().reshape(-1, 9), place, twist)
+        return State(Rotation.from_rotvec(turn).as_matrix().reshape(-1, 9), place, twist, NO_STATES)
 
     def coordinates(self, state: State) -> Array:
         turn = Rotation.from_matrix(state.R[:BODIES].reshape(-1, 3, 3)).as_rotvec()
@@ -51,7 +52,7 @@ class LinearBeat:
 def follow(beat: LinearBeat, count: int, kept: int = 8) -> tuple[State, list[float], Secants]:
     """State after ``count`` accelerated beats from the start, and the distances told on the way."""
     state, told = beat.state(beat.start), []
-    secants = Secants(state, RATE, kept)
+    secants = Secants(state, RATE, kept, NO_SIZES)
     for _ in range(count):
         state, distance = secants.add(state, beat(state))
         told.append(distance)
@@ -72,7 +73,7 @@ def test_distance_is_to_the_fixed_point_and_not_to_the_next_beat() -> None:
     """A mode that keeps 0.95 a beat moves by a twentieth of what is left: that must not pass for being there."""
     beat = LinearBeat((0.95, 0.2), 2)
     state = beat.state(beat.start)
-    secants = Secants(state, RATE, 8)
+    secants = Secants(state, RATE, 8, NO_SIZES)
     for _ in range(3):
         here = state
         state, told = secants.add(state, beat(state))
@@ -88,7 +89,7 @@ def test_mode_too_slow_to_leap_along_is_not_taken_for_periodic(decay: float) -> 
     """Where a leap would be too long the distance is still that to the fixed point."""
     beat = LinearBeat((decay,), 6)
     state = beat.state(beat.start)
-    secants = Secants(state, RATE, 8)
+    secants = Secants(state, RATE, 8, NO_SIZES)
     for _ in range(4):
         here = state
         state, told = secants.add(state, beat(state))
@@ -143,7 +144,7 @@ def test_keeping_nothing_is_waiting() -> None:
 def test_leap_that_makes_things_worse_is_taken_back() -> None:
     beat = LinearBeat((0.8, 0.5), 4)
     state = beat.state(beat.start)
-    secants = Secants(state, RATE, 8)
+    secants = Secants(state, RATE, 8, NO_SIZES)
     ends = []
     for _ in range(2):
         ends.append(beat(state))
@@ -162,9 +163,9 @@ def test_leap_that_makes_things_worse_is_taken_back() -> None:
 def test_state_that_is_no_number_is_passed_on() -> None:
     beat = LinearBeat((0.8,), 5)
     state = beat.state(beat.start)
-    secants = Secants(state, RATE, 8)
+    secants = Secants(state, RATE, 8, NO_SIZES)
     state, _ = secants.add(state, beat(state))
-    lost = State(state.R * np.nan, state.p * np.nan, state.V * np.nan)
+    lost = State(state.R * np.nan, state.p * np.nan, state.V * np.nan, state.z)
     _, distance = secants.add(state, lost)
     assert not distance <= 1.0
 

@@ -14,12 +14,11 @@ from records import FourierDrive, Hinge
 from sim.division import Division
 from sim.drive import flap_angle
 from sim.kernels import LANES
-from sim.kernels.integrate import Lanes, State
-from sim.numerics import Numerics
+from sim.kernels.arrays import Lanes, State
 from sim.rig import vacuum
-from sim.scene import at_rest, drive_table
+from sim.scene import at_rest
 from sim.structure import Structure, build
-from tests.sim.marching import ORDER, STIFF_ORDER, march, order, plank, turned, vacuum_here, with_connectors
+from tests.sim.marching import ORDER, STIFF_ORDER, driven, march, order, plank, turned, vacuum_here, with_connectors
 from tests.sim.plates import loaded
 
 Array = npt.NDArray[np.float64]
@@ -164,8 +163,7 @@ def motor_torque_error(steps: int) -> float:
     drive, hinge, beats = FourierDrive(0.1, (0.5, 0.05), (0.1, 0.0)), Hinge(-0.03, 0.02), 4
     structure = build(plank(drive, hinge), Division.parse("4x1"))
     group = loaded(structure, {"E_f": 1e11, "G_f": 1e11, "D_E": 1e7, "D_G": 1e7})
-    condition, numerics = vacuum(0.0, 0.0, 3.0), Numerics(steps=steps)
-    table = np.concatenate([drive_table(structure, condition, numerics, steps, beat) for beat in range(beats)])
+    table = driven(structure, vacuum(0.0, 0.0, 3.0), steps, beats)
     trace = march(structure, group, vacuum_here(1 / (3.0 * steps), G), at_rest(structure), beats * steps, table)
     mass = np.array([b.mass for b in structure.bodies])
     arms = np.array([b.centre for b in structure.bodies]) - [0.0, hinge.y, hinge.z]
