@@ -40,13 +40,25 @@ class RodDrive:
         self.series = np.concatenate([self.series, np.zeros((lacking, *self.series.shape[1:]))])
 
     def angles(self, psi: Array) -> Array:
-        """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad)."""
-        k = np.arange(len(self.series))
-        turn = np.exp(1j * k * psi.ravel()[:, None])
-        derived = ((1j * k) ** np.arange(5)[:, None])[:, :, None, None] * self.series  # [4, K + 1, 2, W]
-        stacked = np.moveaxis(derived, 0, 2).reshape(len(k), -1)
-        found = turn.real @ stacked.real - turn.imag @ stacked.imag
-        return np.asarray(found.reshape(*psi.shape, 2, 5, self.series.shape[2]))
+        """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad).
+
+        One individual at a time, and those that are driven alike once: nobody's numbers depend on his neighbours.
+        """
+        turn, found = np.exp(1j * np.arange(len(self.series)) * psi.ravel()[:, None]), {}
+        lanes = [np.ascontiguousarray(self.series[:, :, w]) for w in range(self.series.shape[2])]
+        for series in lanes:
+            if series.tobytes() not in found:
+                found[series.tobytes()] = _angles(turn, series).reshape(*psi.shape, 2, 5)
+        return np.stack([found[series.tobytes()] for series in lanes], axis=-1)
+
+
+def _angles(turn: npt.NDArray[np.complex128], series: npt.NDArray[np.complex128]) -> Array:
+    """[T, 2, 5] from exp(i k psi) [T, K + 1] and the series [K + 1, 2] of both rods."""
+    order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
+    derived = (series[:, :, None] * order.T[:, None]).reshape(len(series), -1)
+    # sums and not matrix products, whose threads would cost more than they do
+    found = np.einsum("tk,kc->tc", turn.real, derived.real) - np.einsum("tk,kc->tc", turn.imag, derived.imag)
+    return np.asarray(found.reshape(len(turn), 2, 5))
 
 
 def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:

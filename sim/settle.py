@@ -120,7 +120,7 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
     """Run up to LANES individuals with ``steps`` a beat until each is periodic, whatever its neighbours do."""
     group = _Group(subject, courses, steps, with_motion)
     first = 0 if courses[0].state is None else numerics.ramp_beats
-    tables = [group.table(numerics, steps, beat) for beat in range(numerics.ramp_beats + 1)]
+    tables = {beat: group.table(numerics, steps, beat) for beat in range(first, numerics.ramp_beats + 1)}
     for course in courses:
         course.reason, course.trace = None, None
         if course.secants is not None:

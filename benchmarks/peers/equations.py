@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_matrix
 
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating, kernel
 
 Array = npt.NDArray[np.float64]
 V3 = tuple[float, float, float]
@@ -209,7 +209,7 @@ def _solved(A: Array, n: int, x: V3) -> V3:
     return f * _dot(x, c), f * _dot(x, _cross(r2, r0)), f * _dot(x, _cross(r0, r1))
 
 
-@kernel
+@allocating
 def rates(wing: PeerWing, t: float, y: Array, dy: Array) -> None:
     """dy/dt [13 N] of state ``y`` at time ``t``."""
     n_bodies = len(wing.mass)
@@ -235,7 +235,7 @@ def rates(wing: PeerWing, t: float, y: Array, dy: Array) -> None:
         _accelerate(wing, n, R, omega, load, d)
 
 
-@kernel
+@allocating
 def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
     """Rates [k, 13 N] of k states at once, for finite differences."""
     out = np.empty_like(rows)

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.peers.equations import air_loads
 from benchmarks.peers.scipy_engine import Cost, OutOfTimeError
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating, kernel
 
 Array = npt.NDArray[np.float64]
 Law = Literal["angles", "logarithm", "energy"]
@@ -196,7 +196,7 @@ def tait_bryan(a: float, b: float, c: float, R: Array) -> None:
     R[2, 0], R[2, 1], R[2, 2] = sa * sc - ca * sb * cc, sa * cc + ca * sb * sc, ca * cb
 
 
-@kernel
+@allocating
 def energy_wrench(K: Array, D: Array, d: Array, angles: Array, v: Array, w: Array) -> Array:
     """Force and moment [6] on the first body of springs that derive from the energies of ``docs/peers.md``.
 
@@ -225,7 +225,7 @@ def _energy_law(K: Array, D: Array) -> Callable[..., Array]:
     return wrench
 
 
-@kernel
+@allocating
 def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
     """Generalised force [6 N] of the air for displacements and Tait-Bryan angles ``q`` [6 N] of all bodies.
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.kernels import LANES
-from sim.kernels.jit import inlined, kernel
+from sim.kernels.jit import allocating, inlined, kernel
 from sim.kernels.vector import Vector, load, load3, root, store3
 
 Array = npt.NDArray[np.float64]
@@ -237,7 +237,7 @@ def wing_forces(
             _curve_forces(motion[b], side, r, chord, density[b], loading[b], constants, out[b, len(ROWS) :])
 
 
-@kernel
+@allocating
 def synthesise(basis: Array, series: Array, out: Array) -> None:
     """Sum Fourier series: ``out`` [B, T, A] from ``basis`` [K, T] and ``series`` [B, A, K], in one order for any B."""
     K, T = basis.shape
@@ -254,7 +254,7 @@ def synthesise(basis: Array, series: Array, out: Array) -> None:
                     out[b, start + t, a] = total[t]
 
 
-@kernel
+@allocating
 def synthesise_at(psi: Array, series: Array, out: Array) -> None:
     """The same of one individual at its own phases ``psi`` [T] (rad): ``out`` [T, A] from ``series`` [A, 2 K + 1].
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from sim.blades.elements import STILL
 from sim.kernels import LANES
-from sim.kernels.jit import inlined, kernel
+from sim.kernels.jit import allocating, inlined, kernel
 from sim.kernels.vector import Vector, greatest, least, load0, load1, magnitude, root, store0, store1
 
 Array = npt.NDArray[np.float64]
@@ -33,7 +33,7 @@ def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
     return decay, slope - decay, 1.0 - slope
 
 
-@kernel
+@allocating
 def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
     """Periodic solution x of x' = share speed (target - x) over one beat.
 

@@ -31,7 +31,7 @@ from sim.blades.elements import (
     velocities,
 )
 from sim.kernels import LANES
-from sim.kernels.jit import inlined, kernel
+from sim.kernels.jit import allocating, inlined, kernel
 from sim.kernels.vector import load0, load1, root, store1
 
 Array = npt.NDArray[np.float64]
@@ -175,7 +175,7 @@ def station_circulation(
                     circulation[b, t, e] += math.copysign(lift, -x * z)
 
 
-@kernel
+@allocating
 def station_forces(
     motion: Array,
     side: Side,

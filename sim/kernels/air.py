@@ -34,7 +34,7 @@ from sim.kernels.arrays import (
     STREAM_C,
     STREAM_N,
 )
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating, kernel
 from sim.kernels.lanewise import angle
 from sim.kernels.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
@@ -44,7 +44,7 @@ REVERSAL = math.sin(math.radians(15.0))
 STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
-@kernel
+@allocating
 def strip_flow(
     start: Index,
     weight: Array,
@@ -129,7 +129,7 @@ def _whereabouts(
         store(flow, s, PITCH_RATE, load(flow, s, PITCH_RATE) + g * load(V, n, 1))
 
 
-@kernel
+@allocating
 def strip_forces(
     start: Index,
     weight: Array,

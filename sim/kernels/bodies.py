@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import inlined, kernel
+from sim.kernels.jit import allocating, inlined, kernel
 from sim.kernels.matrices import Three, cross
 from sim.kernels.vector import Vector, load, load0, store, store0
 
@@ -99,7 +99,7 @@ def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
         store(out, n, 5, load(out, n, 5) + m * load(V, n, 5))
 
 
-@kernel
+@allocating
 def kinetic_and_height(
     mass: Array, inertia: Array, p: Array, V: Array, gravity: float, kinetic: Array, potential: Array
 ) -> None:

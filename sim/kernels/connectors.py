@@ -205,6 +205,27 @@ def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, 
 
 
 @kernel
+def add_turned(
+    first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, X: Array, out: Array
+) -> None:
+    """Add to ``out`` [C, 6, W] how the relative twists change with the pose, for bodies' displacements X: B J X."""
+    for c in range(len(first)):
+        i, j = first[c], second[c]
+        q, x = load_matrix(Q, c), load_vector(d, c, 0)
+        e, arm = (a[c, 0] + x[0], a[c, 1] + x[1], a[c, 2] + x[2]), times(q, (b[c, 0], b[c, 1], b[c, 2]))
+        omega, turning = load_vector(V, i, 0), times(q, load_vector(V, j, 0))
+        phi, delta = relative_twist(
+            q, e, arm, load_vector(X, i, 0), load_vector(X, i, 3), times(q, load_vector(X, j, 0)), load_vector(X, j, 3)
+        )
+        there, moving = cross(turning, arm), times(q, load_vector(V, j, 3))
+        g = (moving[0] + there[0], moving[1] + there[1], moving[2] + there[2])
+        t, f, h = cross(turning, phi), cross(g, phi), cross(omega, delta)
+        for k in range(3):
+            store(out, c, k, load(out, c, k) - t[k])
+            store(out, c, 3 + k, load(out, c, 3 + k) - f[k] - h[k])
+
+
+@kernel
 def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
     """Subtract J^T times ``push`` [C, 6, W] from the wrenches: ``push`` resists on the second body."""
     for c in range(len(first)):

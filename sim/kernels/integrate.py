@@ -17,7 +17,7 @@ from sim.kernels.air import strip_flow, strip_forces
 from sim.kernels.arrays import AIR, DAMPERS, FRONT_MOTOR, STAGES, Lanes, Setting, State, Trace, Wiring, Work
 from sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from sim.kernels.connectors import connect, relative_pose, tangent, twists
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating, kernel
 from sim.kernels.lanewise import cosine_and_sine
 from sim.kernels.laws import AFTER, BEFORE, call
 from sim.kernels.linear import factor, solve, subtract_column
@@ -138,7 +138,7 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
         call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, AFTER)
 
 
-@kernel
+@allocating
 def note(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
     """Write down the motion, the rods' load, the air's force, powers and energies at the start of step ``t``.
 
@@ -170,7 +170,7 @@ def note(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trac
         trace.z[t] = work.z
 
 
-@kernel
+@allocating
 def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     """Assemble and factor the step's matrix S at its start (``sim.kernels.tangents``)."""
     hg = setting.step * GAMMA
@@ -223,7 +223,9 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
     for c in range(k, len(wiring.first)):
         subtract_column(wiring.second[c], wiring.lower[c], work.blocks, known, wiring.first[c], wrench)
     solve(wiring.order, wiring.start, wiring.below, wiring.row, work.blocks, wrench)
-    known[:n] = wrench[:n]
+    for i in range(n):
+        for j in range(6):
+            store(known, i, j, load(wrench, i, j))
     keep_stage(known, r_xi, work.V0, hg, work.U_xi[stage], work.U_V[stage])
     if len(work.z):
         finish_states(wiring, lanes.laws, work, stage)
@@ -246,7 +248,7 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
     move(state.R, state.p, work.xi, work.R, work.p)
 
 
-@kernel
+@allocating
 def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
     """Take the step; a lane that turned too far or is no number any more is dead."""
     _to_stage(work, state, STAGES)
@@ -261,7 +263,7 @@ def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
                 alive[w] = False
 
 
-@kernel
+@allocating
 def advance(
     wiring: Wiring,
     setting: Setting,

@@ -25,13 +25,26 @@ _KEPT = 8  # contents of the kernels whose compiled code is kept
 
 
 def kernel(function: F) -> F:
-    """Compile a function over groups of lanes, cached on disk by the content of all kernels.
+    """Compile a function over groups of lanes that makes no array, cached on disk by the content of all kernels.
 
-    OSError where no folder for the cache can be written; RuntimeError where numba puts it elsewhere.
+    Such a function need not count references to the arrays it is given, which would take a third of a small wing's
+    step; one that makes or copies whole arrays does not compile so, and is :func:`allocating`. OSError where no folder
+    for the cache can be written; RuntimeError where numba puts it elsewhere.
     """
+    return _compiled(function, counting=False)
+
+
+def allocating(function: F) -> F:
+    """The same for a function that makes arrays or copies whole ones."""
+    return _compiled(function, counting=True)
+
+
+def _compiled(function: F, *, counting: bool) -> F:
     folder = _cache_folder(Path(inspect.getfile(function)).resolve().parent)
     with _cached_in(folder):
-        compiled = numba.njit(cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
+        compiled = numba.njit(
+            cache=True, _nrt=counting, fastmath={"contract"}, error_model="numpy", nogil=True
+        )(function)  # fmt: skip
     if not Path(compiled.stats.cache_path).is_relative_to(folder):
         raise RuntimeError(
             f"numba {numba.__version__} caches {function.__qualname__!r} in {compiled.stats.cache_path} instead of "

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from sim.kernels import LANES
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating
 from sim.kernels.vector import Vector, load1, store1
 
 
-@kernel
+@allocating
 def angle(y: Vector, x: Vector) -> Vector:
     """atan2."""
     scratch = np.empty((2, LANES))
@@ -22,7 +22,7 @@ def angle(y: Vector, x: Vector) -> Vector:
     return load1(scratch, 0)
 
 
-@kernel
+@allocating
 def cosine_and_sine(x: Vector) -> tuple[Vector, Vector]:
     """Cosine and sine."""
     scratch = np.empty((2, LANES))
@@ -33,7 +33,7 @@ def cosine_and_sine(x: Vector) -> tuple[Vector, Vector]:
     return load1(scratch, 0), load1(scratch, 1)
 
 
-@kernel
+@allocating
 def exponential(x: Vector) -> Vector:
     """e to the x."""
     scratch = np.empty((1, LANES))
@@ -43,7 +43,7 @@ def exponential(x: Vector) -> Vector:
     return load1(scratch, 0)
 
 
-@kernel
+@allocating
 def power(x: Vector, exponent: Vector) -> Vector:
     """x to the power of ``exponent``, for x >= 0."""
     scratch = np.empty((2, LANES))

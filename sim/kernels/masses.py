@@ -157,10 +157,13 @@ def add_mass_blocks(
         v_j = _relative(V, R, j, wind, air)
         h, p = _times(M, load_vector(V, j, 0), v_j)
         A = _by_twist(M, load_vector(V, i, 0), _relative(V, R, i, wind, air), 1.0 / length)
-        add_to_block(blocks, pairs[k, 2], _with_motion(A, V, j, length))
+        joined = _with_motion(A, load_vector(V, j, 0), v_j, length)
+        if air:
+            joined = _with_wind(joined, M, load_vector(V, j, 0), _in_body(R, j, wind), length)
+        add_to_block(blocks, pairs[k, 2], joined)
         zero = scaled(0.0, M[0])
         own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
-        add_to_block(blocks, i, _with_motion(own, V, i, length))
+        add_to_block(blocks, i, _with_motion(own, load_vector(V, i, 0), _relative(V, R, i, wind, air), length))
         if not air:
             up = skew((load(R, i, 6), load(R, i, 7), load(R, i, 8)))
             turned = scaled(length * gravity, up)
@@ -179,9 +182,8 @@ def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
 
 
 @inlined
-def _with_motion(A: Six, V: Array, j: int, length: float) -> Six:
+def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
     """A (I - l A_j), A_j being that of body j: I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]]."""
-    omega, v = load_vector(V, j, 0), load_vector(V, j, 3)
     half = 0.5 * length
     return (
         plus(A[0], plus(scaled(half, times_skew(A[0], omega)), scaled(length, times_skew(A[1], v)))),
@@ -189,6 +191,13 @@ def _with_motion(A: Six, V: Array, j: int, length: float) -> Six:
         plus(A[2], plus(scaled(half, times_skew(A[2], omega)), scaled(length, times_skew(A[3], v)))),
         A[3],
     )
+
+
+@inlined
+def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
+    """A and, as the wind w turns in the body's frame, l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation."""
+    turned = plus(scaled(length, skew_times(omega, skew(w))), scaled(-0.5 * length, skew_times(w, skew(omega))))
+    return plus(A[0], product(M[1], turned)), A[1], plus(A[2], product(M[3], turned)), A[3]
 
 
 @kernel
@@ -235,8 +244,9 @@ def add_mass_terms(
         N, omega, v = _across(masses, k), load_vector(V, i, 0), _relative(V, R, i, wind, True)
         x = (load(X, j, 0), load(X, j, 1), load(X, j, 5))
         u = (load(lead, j, 0), load(lead, j, 1), load(lead, j, 5))
-        a = times(N, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]))
         w = _in_body(R, j, wind)
+        blown = w[0] * x[1] - w[1] * x[0]  # what the wind does as the body turns
+        a = times(N, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2] - blown))
         h = times(N, (load(V, j, 0), load(V, j, 1), load(V, j, 5) - w[2]))
         t, f = _turning(times(N, x), omega, v)
         s, g = _turning(h, load_vector(X, i, 0), load_vector(X, i, 3))

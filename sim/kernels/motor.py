@@ -2,10 +2,11 @@
 
 Its crank runs the time tau ahead of an even one: tau' = sigma, the relative error of its speed, with
 
-    sigma' = -(d (P - P_m) + sigma) / T - k tau,     P_m' = (P - P_m) f,
+    sigma' = -(d (P - P_m) + sigma) / T - k tau,     P_m' = (P - P_m) a,
 
 P being the power drawn, d the speed lost per power (1/W), T the time in which the motor follows (s), k how fast what
-holds the mean speed takes back a lead (1/s^2), f the flap frequency: of the mean load nothing is seen. The rods follow
+holds the mean speed takes back a lead (1/s^2), a the rate at which it learns the mean load P_m, of which nothing is
+seen. The rods follow
 the same profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the last three.
 """
 

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
-from sim.kernels.connectors import push_apart, twists
-from sim.kernels.jit import kernel
+from sim.kernels.connectors import add_turned, push_apart, twists
+from sim.kernels.jit import allocating, kernel
 from sim.kernels.vector import load, load1, store, store1
 
 Array = npt.NDArray[np.float64]
@@ -30,7 +30,7 @@ def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: A
         store1(out, i, total)
 
 
-@kernel
+@allocating
 def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None:
     """Keep the states' derivatives at the start of the step; DECAY becomes theta. Add the dampers that they make."""
     work.z_tangent0[:] = work.z_tangent
@@ -76,6 +76,7 @@ def finish_states(wiring: Wiring, laws: Laws, work: Work, stage: int) -> None:
         return
     count = len(wiring.first)
     twists(wiring.first, wiring.second, wiring.a, wiring.b, work.Q0, work.d0, work.U_V[stage], work.push)
+    add_turned(wiring.first, wiring.second, wiring.a, wiring.b, work.Q0, work.d0, work.V0, work.U_xi[stage], work.push)
     for law in laws.connector:
         for k in range(law[2]):
             axis, at = laws.axes[law[5] + k], law[4] + k * count

@@ -27,7 +27,6 @@ from tests.sim.plates import loaded
 from tests.sim.test_rigid import SMALL, TwoBodies
 
 Array = npt.NDArray[np.float64]
-STATES_ORDER = 2  # of states that pull on connectors which turn far
 
 
 def _one(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
@@ -209,7 +208,7 @@ def test_order_where_connectors_turn_far() -> None:
         strains.append(trace.z[:: steps // 100, :, 0])
     errors = [float(np.abs(a - b).max()) for a, b in pairwise(strains)]
     assert errors[-1] < 1e-5 * np.abs(strains[-1]).max()
-    assert order(errors) > STATES_ORDER - 0.25
+    assert order(errors) > ORDER - 0.25
 
 
 def test_ledger_closes_with_states() -> None:

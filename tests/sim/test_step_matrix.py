@@ -225,17 +225,11 @@ def test_matrix_is_the_exact_derivative_with_effects(changes: tuple[Change, ...]
     assert_same(assembled(case, lane)[:-12], by_differences(case, lane)[:-12])
 
 
-def test_what_the_matrix_leaves_out_of_air_in_wind() -> None:
-    """How the wind turns in the frames of the bodies: in the columns of rotation alone, proportional to the wind."""
-    lane, left = 5, []
-    for part in (1.0, 0.5):
-        case = bent("3,2", moved_air, wind=part * WIND)
-        expected = by_differences(case, lane)[:-12]
-        error = relative_errors(assembled(case, lane)[:-12], expected).reshape(len(expected), -1, 2, 3)
-        assert error[:, :, 1].max() < 1e-4, "columns of translation are exact"
-        left.append(error.max())
-    assert 0.01 < left[0] < 0.1, "of the largest entry of the block it is in"
-    assert left[1] == pytest.approx(0.5 * left[0], rel=0.01)
+def test_air_in_wind_is_in_the_matrix() -> None:
+    """The wind turns in the frames of the bodies."""
+    case, lane = bent("3,2", moved_air, wind=WIND), 5
+    expected = by_differences(case, lane)[:-12]
+    assert relative_errors(assembled(case, lane)[:-12], expected).max() < 1e-4
 
 
 @pytest.mark.parametrize(
