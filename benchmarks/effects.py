@@ -37,7 +37,7 @@ Array = npt.NDArray[np.float64]
 
 REPEATS = 5
 SPREAD = 0.1  # of the genes of a batch whose cost is measured, in logarithm or part of the value
-UNSEEN = 1e-3  # of what the effect moves: less after the refit is the fit's own error
+SEEN = 1e-3  # mm or mN: less is the simulation's own error
 ITERATIONS = 12
 GAIN = 0.98  # an iteration that leaves more of the squares is the last
 LENGTHS = np.array([1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6])  # of a step, tried at once: a group of lanes
@@ -47,13 +47,13 @@ LENGTHS = np.array([1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6])  # of a step, trie
 class Moved:
     """What an effect does on a rig.
 
-    ``size`` of what it moves and ``left`` of that after the refit: root mean square, mm or mN; ``directions``
-    [D, sizes]: what its sizes do, one by one, freed from the nominal genes, as an orthonormal basis.
+    ``size`` of what it moves and ``left`` of that after the refit: root mean square, mm or mN; ``columns`` [D, sizes]:
+    what its sizes do one by one, m or N.
     """
 
     size: float
     left: float
-    directions: Array
+    columns: Array
 
 
 def batch(rig: Rig, effect: Effect | None, count: int = 16) -> Array:
@@ -104,17 +104,11 @@ def moved(rig: Rig, effect: Effect) -> Moved:
     whole = displacement(rig, effect, typical, recordings)
     size = rig.unit * rig.rms(whole)
     left = rig.unit * refitted(rig, effect, recordings, whole)
-    known = nominal_directions(rig, rig.stands_for(effect))
     columns = []
     for parameter in effect.size:
         others = {f"{effect.name}.{p.name}": 0.0 for p in effect.size if p is not parameter}
-        one = displacement(rig, effect, typical | others, recordings)
-        free = one - known @ (known.T @ one)
-        if np.linalg.norm(free) > UNSEEN * np.linalg.norm(whole):
-            columns.append(free)
-    empty = np.zeros((len(whole), 0))
-    basis = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)[0] if columns else empty
-    return Moved(size, left, basis)
+        columns.append(displacement(rig, effect, typical | others, recordings))
+    return Moved(size, left, np.stack(columns, axis=1))
 
 
 def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole: Array) -> float:
@@ -173,14 +167,19 @@ def angle(a: Array, b: Array) -> float:
     return float(np.degrees(np.arccos(np.clip(np.linalg.norm(a.T @ b, 2), 0.0, 1.0))))
 
 
-def nearest(name: str, found: dict[str, Moved]) -> tuple[str | None, float | None]:
+def freed(rig: Rig, one: Moved, known: Array) -> Array:
+    """Orthonormal basis of what the sizes of an effect do and the nominal genes cannot; less than SEEN is nothing."""
+    free = one.columns - known @ (known.T @ one.columns)
+    seen = [rig.unit * rig.rms(column) > SEEN for column in free.T]
+    return np.asarray(np.linalg.svd(free[:, seen], full_matrices=False)[0])
+
+
+def nearest(rig: Rig, name: str, found: dict[str, Moved]) -> tuple[str | None, float | None]:
     """The effect most like ``name``, and the angle to it; None where nothing of either can be seen."""
-    own = found[name].directions
-    angles = {
-        other: angle(own, one.directions)
-        for other, one in found.items()
-        if other != name and own.shape[1] and one.directions.shape[1]
-    }
+    known = nominal_directions(rig, rig.stands_for(EFFECTS[name]))
+    own = freed(rig, found[name], known)
+    others = {other: freed(rig, one, known) for other, one in found.items() if other != name}
+    angles = {other: angle(own, basis) for other, basis in others.items() if basis.size and own.size}
     if not angles:
         return None, None
     best = min(angles, key=lambda other: angles[other])
@@ -207,16 +206,18 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
             kind, name = under_way[future]
             found[kind][name] = future.result()
             _say(done, total, f"{name} on the {kind}", began)
-    rows = [row(name, found, ratios) for name in names]
+    rows = [row(name, found, ratios, quick=quick) for name in names]
     return {"effects": rows, "quick": quick, "commit": commit(), "cpu": cpu(), "seconds": time.monotonic() - began}
 
 
-def row(name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None]) -> dict[str, Any]:
+def row(
+    name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None], *, quick: bool
+) -> dict[str, Any]:
     """One line: what an effect does to tracks in mm; beside it what it does to forces in mN."""
     line: dict[str, Any] = {"name": name, "family": EFFECTS[name].family}
     for kind, prefix, unit in (("wing", "", "mm"), ("vehicle", "vehicle_", "mn")):
         one = found[kind].get(name)
-        like, degrees = nearest(name, found[kind]) if one else (None, None)
+        like, degrees = nearest(rig_of(kind, quick), name, found[kind]) if one else (None, None)
         line |= {
             f"{prefix}cost_ratio": ratios.get((kind, name)),
             f"rms_{unit}": one.size if one else None,

@@ -6,8 +6,8 @@ Its crank runs the time tau ahead of an even one: tau' = sigma, the relative err
 
 P being the power drawn, d the speed lost per power (1/W), T the time in which the motor follows (s), k how fast what
 holds the mean speed takes back a lead (1/s^2), a the rate at which it learns the mean load P_m, of which nothing is
-seen. The rods follow
-the same profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the last three.
+seen. The rods follow the same profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the
+last three.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sim.kernels.vector import load, load1, store, store1
 
 Array = npt.NDArray[np.float64]
 
-DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, f
+DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 
 
 @kernel
