@@ -27,7 +27,7 @@ class Beat:
     Attributes:
         tracks: [n, M, 3] marker positions in the world, m.
         rods: [n, 2, 6] wrench (moment, force) of the wing on the front and rear driving rod, rod frame at the hinge.
-        air: [n, 3] force of the air on the wing in the world, N.
+        air: [n, 3] force of the air on the wing in the world, N; without the inertia of air it moves along.
         energy: [n, 3] kinetic, elastic, gravitational, J.
         power: [n, 4] into the wing through dampers, front motor, rear motor and air, W.
         beats: simulated in all.

@@ -97,10 +97,10 @@ EFFECT = Effect(
     port="inertia",
     size=(Parameter("k", "1", 0.0, 3.0, 1.0, "air carried along, as a part of that of plates in unbounded flow"),),
     power="conservative",
-    source="Lamb, Hydrodynamics (1932), sections 71 and 124; Sedov (1965); Ellington, Philosophical Transactions "
-    "B 305, 17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
+    source="Theodorsen (1935), NACA Report 496, noncirculatory part; Lamb, Hydrodynamics (1932), section 71; "
+    "Ellington, Philosophical Transactions B 305, 17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
     signature="swings later and wider, as if the wing were heavier across its plane; grows with density and the "
-    "acceleration, not with the airspeed",
+    "acceleration, little with the airspeed",
     confused_with=("lumped_mass", "rotational_circulation"),
     wing=_wing,
 )

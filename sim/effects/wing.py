@@ -18,6 +18,8 @@ from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
+_LEAST_STROKE = 0.01  # rad, of a drive that is held
+
 
 @dataclass
 class WingScene:
@@ -128,8 +130,9 @@ class WingScene:
     @property
     def _motor_sizes(self) -> Array:
         """Of the motor's states, if it gives way: a lead is felt as motion at the speed of the outer wing."""
-        span = self.structure.planform.wing.stations[-1].y
-        lead = span * self.angular_rate * np.abs(self.rods.series[1:]).sum(axis=0).max()
+        wing = self.structure.planform.wing
+        stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as told: the same for every individual
+        lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)
         return np.array([lead, lead / self.angular_rate, 1e-3] if len(self.motor) else [])
 
     def frozen(self) -> Lanes:

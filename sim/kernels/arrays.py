@@ -181,6 +181,9 @@ class Work(NamedTuple):
     rods: Array
     strip_frames: Index
     connector_frames: Index
+    parameters: Array
+    density: Array
+    wind: Array
 
 
 class Trace(NamedTuple):
@@ -254,6 +257,10 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
         rods=zeros((2, 3, LANES)),
         strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
         connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
+        # whose addresses are in the frames, so that they live as long
+        parameters=laws.parameters,
+        density=setting.density,
+        wind=setting.wind,
     )
     _frame_laws(wiring, setting, laws, work)
     return work

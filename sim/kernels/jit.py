@@ -45,19 +45,26 @@ def _compiled(function: F, *, counting: bool) -> F:
         compiled = numba.njit(
             cache=True, _nrt=counting, fastmath={"contract"}, error_model="numpy", nogil=True
         )(function)  # fmt: skip
-    if not Path(compiled.stats.cache_path).is_relative_to(folder):
-        raise RuntimeError(
-            f"numba {numba.__version__} caches {function.__qualname__!r} in {compiled.stats.cache_path} instead of "
-            f"{folder}: code compiled from older kernels could run; use a numba that heeds numba.config.CACHE_DIR"
-        )
+    _check(function, compiled.stats.cache_path, folder)
     return cast(F, compiled)
+
+
+def _check(function: Callable[..., object], path: str, folder: Path) -> None:
+    """RuntimeError where numba does not cache in the folder it was told to."""
+    if not Path(path).is_relative_to(folder):
+        raise RuntimeError(
+            f"numba {numba.__version__} caches {function.__qualname__!r} in {path} instead of {folder}: "
+            "code compiled from older kernels could run; use a numba that heeds numba.config.CACHE_DIR"
+        )
 
 
 def callback(function: F, signature: Any) -> Any:
     """Compile a function to be called by address, cached on disk by the content of its own file and of all kernels."""
     folder = _cache_folder(Path(inspect.getfile(function)).resolve())
     with _cached_in(folder):
-        return numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
+        compiled = numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
+    _check(function, compiled._cache.cache_path, folder)
+    return compiled
 
 
 def inlined(function: F) -> F:

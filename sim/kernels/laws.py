@@ -10,8 +10,8 @@ connectors are called once, AFTER.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -147,12 +147,13 @@ def connector_port(frame: Any) -> ConnectorPort:
     )
 
 
-@cache
-def compiled(law: Law) -> Any:
-    """A law, compiled or taken from the cache; one must keep it as long as its address is used."""
-    return callback(law, SIGNATURE)
+_COMPILED: dict[Law, Any] = {}  # kept for ever: their addresses are in use
+_LOCK = threading.Lock()
 
 
 def address(law: Law) -> int:
-    """Where the compiled law is in this process."""
-    return int(compiled(law).address)
+    """Where the law is in this process; compiled, or taken from the cache, when it is first asked for."""
+    with _LOCK:
+        if law not in _COMPILED:
+            _COMPILED[law] = callback(law, SIGNATURE)
+        return int(_COMPILED[law].address)

@@ -1,11 +1,17 @@
-"""Momentum of masses that effects add: fixed to a body, or of air that the bodies of a strip move together.
+"""Masses that effects add: weight fixed to a body, and air that the bodies of a strip move together.
 
-The kinetic energy is half the sum of X_i . M_ij X_j over pairs of bodies, M_ij constant in their frames. X is the
-twist; for air it is taken relative to the wind, so that a plate that drifts with it feels nothing. With
-(h, p) = M_ij X_j the law of motion is h' = h x omega + p x v, p' = p x omega (Kirchhoff 1869; Lamb, Hydrodynamics,
-section 124), which keeps the energy exactly. All of it enters as inertia: fed back as a force, air that outweighs the
-wing would make the step unstable. Plates move air along their normal only: of its blocks the rows and columns of
-turning about x and y and of moving along z are used.
+**Weight.** The kinetic energy is V . M V / 2, M constant in the body's frame. With (h, p) = M V the law of motion is
+h' = h x omega + p x v, p' = p x omega, which keeps the energy exactly.
+
+**Air.** A thin plate moves air by the motion of its points along the normal alone: by q = (omega_x, omega_y, v_z) of
+its bodies, v_z relative to the wind. The kinetic energy is the sum of q_i . N_ij q_j / 2 over pairs of bodies of a
+strip and the wrench of the air is -N q', along the same three: pressure pushes along the normal. Kirchhoff's equations
+of a body in a perfect fluid have a pair of terms more, a force along the chord and the moment of Munk, which together
+do no work. At a section's edges they are suction; on a wing that carries circulation the moment is what puts the lift at the
+quarter of the chord (Theodorsen 1935, NACA Report 496), which strips do by where they place their lift. So what is
+left is the noncirculatory part of thin airfoils: in a stream U, m (h'' + U alpha') along the normal.
+
+All of it enters as inertia: fed back as a force, air that outweighs the wing would make the step unstable.
 """
 
 from __future__ import annotations
@@ -62,15 +68,6 @@ def _across(masses: Array, k: int) -> Nine:
 
 
 @inlined
-def _turning(h: Three, x: Three, y: Three) -> tuple[Three, Three]:
-    """h x X + p x Y and p x X of a momentum of air, h = (h_x, h_y, 0) and p = (0, 0, h_z)."""
-    return (
-        (h[1] * x[2] - h[2] * y[1], h[2] * y[0] - h[0] * x[2], h[0] * x[1] - h[1] * x[0]),
-        (-(h[2] * x[1]), h[2] * x[0], 0.0 * h[2]),
-    )
-
-
-@inlined
 def _times(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
     a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2])
@@ -111,19 +108,11 @@ def add_momentum(
         t, f = _weight(M, gravity, R, i)
         add_wrench(wrench, i, t, f)
     for k in range(weighing, len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        N, omega, turn = _across(masses, k), load_vector(V, i, 0), load_vector(V, j, 0)
-        own, w = _relative(V, R, i, wind, True), _in_body(R, j, wind)
-        h = times(N, (turn[0], turn[1], load(V, j, 5) - w[2]))
-        a = turn[0] * w[1] - turn[1] * w[0]  # the wind turns in the frame of the body
-        t, f = _turning(h, omega, own)
-        add_wrench(wrench, i, (t[0] - N[2] * a, t[1] - N[5] * a, t[2]), (f[0], f[1], -(N[8] * a)))
-
-
-@inlined
-def scaled_vector(factor: float, x: Three) -> Three:
-    """``factor`` times x."""
-    return factor * x[0], factor * x[1], factor * x[2]
+        j, N = pairs[k, 1], _across(masses, k)
+        turn, w = load_vector(V, j, 0), _in_body(R, j, wind)
+        a = turn[1] * w[0] - turn[0] * w[1]  # the wind turns in the frame of the body
+        zero = 0.0 * a
+        add_wrench(wrench, pairs[k, 0], (N[2] * a, N[5] * a, zero), (zero, zero, N[8] * a))
 
 
 @inlined
@@ -151,23 +140,24 @@ def add_mass_blocks(
     blocks: Array,
 ) -> None:
     """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`sim.kernels.tangents`)."""
-    for k in range(len(pairs)):
-        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
-        M = _matrix(masses, k)
-        v_j = _relative(V, R, j, wind, air)
-        h, p = _times(M, load_vector(V, j, 0), v_j)
-        A = _by_twist(M, load_vector(V, i, 0), _relative(V, R, i, wind, air), 1.0 / length)
-        joined = _with_motion(A, load_vector(V, j, 0), v_j, length)
-        if air:
-            joined = _with_wind(joined, M, load_vector(V, j, 0), _in_body(R, j, wind), length)
-        add_to_block(blocks, pairs[k, 2], joined)
+    for k in range(weighing):
+        i = pairs[k, 0]
+        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
+        h, p = _times(M, omega, v)
         zero = scaled(0.0, M[0])
         own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
-        add_to_block(blocks, i, _with_motion(own, load_vector(V, i, 0), _relative(V, R, i, wind, air), length))
-        if not air:
-            up = skew((load(R, i, 6), load(R, i, 7), load(R, i, 8)))
-            turned = scaled(length * gravity, up)
-            add_to_block(blocks, i, (skew_times(_first_moment(M), turned), zero, product(M[3], turned), zero))
+        A = _by_twist(M, omega, v, 1.0 / length)
+        A = (plus(A[0], own[0]), plus(A[1], own[1]), plus(A[2], own[2]), A[3])
+        add_to_block(blocks, i, _with_motion(A, omega, v, length))
+        turned = scaled(length * gravity, skew((load(R, i, 6), load(R, i, 7), load(R, i, 8))))
+        add_to_block(blocks, i, (skew_times(_first_moment(M), turned), zero, product(M[3], turned), zero))
+    for k in range(weighing, len(pairs)):
+        j, M = pairs[k, 1], _matrix(masses, k)
+        omega, w = load_vector(V, j, 0), _in_body(R, j, wind)
+        v, factor = load_vector(V, j, 3), 1.0 / length
+        A = (scaled(factor, M[0]), scaled(factor, M[1]), scaled(factor, M[2]), scaled(factor, M[3]))
+        joined = _with_motion(A, omega, (v[0] - w[0], v[1] - w[1], v[2] - w[2]), length)
+        add_to_block(blocks, pairs[k, 2], _with_wind(joined, M, omega, w, length))
 
 
 @inlined
@@ -241,21 +231,13 @@ def add_mass_terms(
         )
     for k in range(weighing, len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
-        N, omega, v = _across(masses, k), load_vector(V, i, 0), _relative(V, R, i, wind, True)
+        N, w = _across(masses, k), _in_body(R, j, wind)
         x = (load(X, j, 0), load(X, j, 1), load(X, j, 5))
         u = (load(lead, j, 0), load(lead, j, 1), load(lead, j, 5))
-        w = _in_body(R, j, wind)
         blown = w[0] * x[1] - w[1] * x[0]  # what the wind does as the body turns
         a = times(N, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2] - blown))
-        h = times(N, (load(V, j, 0), load(V, j, 1), load(V, j, 5) - w[2]))
-        t, f = _turning(times(N, x), omega, v)
-        s, g = _turning(h, load_vector(X, i, 0), load_vector(X, i, 3))
-        add_wrench(
-            wrench,
-            i,
-            (a[0] - t[0] - s[0], a[1] - t[1] - s[1], -(t[2] + s[2])),
-            (-(f[0] + g[0]), -(f[1] + g[1]), a[2]),
-        )
+        zero = 0.0 * blown
+        add_wrench(wrench, i, (a[0], a[1], zero), (zero, zero, a[2]))
 
 
 @kernel

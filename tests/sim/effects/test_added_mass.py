@@ -195,25 +195,40 @@ def test_a_wing_that_drifts_with_the_wind_feels_none_of_it() -> None:
     np.testing.assert_allclose(carried - moved, calm, atol=1e-7)
     bare = immersed(robird_wing(), "11", {}, k=0.0, step=5e-4).of(inner)
     alone = march(bare.structure, bare.lanes, bare.here, tumbling(bare, np.zeros(3)), 100).tracks[..., 0]
-    assert np.abs(calm - alone).max() > 1e-3
+    assert np.abs(calm - alone).max() > 2e-4
 
 
-@pytest.mark.parametrize("count", [1, 2, 4])
-@pytest.mark.parametrize(("along", "across"), [(-5.0, -1.0), (4.0, -2.0)])
-def test_a_plate_that_moves_obliquely_is_turned_across(count: int, along: float, across: float) -> None:
-    """Munk (1924): rho pi c^2 / 4 u w per span about y, nose up where the air comes from ahead and below."""
+def added_wrench(count: int, motion: Array, wind: float) -> Array:
+    """What the air adds [N, 6] to the wrenches of a plank whose bodies all have the twist ``motion`` [6]."""
     wrenches = []
     for k in (0.0, 1.0):
         body = immersed(plank(), f"2x{count}", {}, k)
         w, n, rest = body.structure.wiring, len(body.structure.bodies), at_rest(body.structure)
-        work = new_work(w, body.here, body.lanes)
+        here = body.here._replace(wind=np.repeat(np.array([[wind], [0.0], [0.0]]), LANES, axis=1))
+        work = new_work(w, here, body.lanes)
         work.R[:], work.p[:] = rest.R, rest.p
-        work.V[:n, 3], work.V[:n, 5] = along, across
-        forces(w, body.here, body.lanes, work)
+        work.V[:n] = motion[:, None]
+        forces(w, here, body.lanes, work)
         wrenches.append(work.wrench[:n, :, 0].copy())
-    added = wrenches[1] - wrenches[0]
-    np.testing.assert_allclose(added[:, 3:], 0.0, atol=1e-12)
-    assert added[:, 1].sum() == pytest.approx(AIR * np.pi * CHORD**2 / 4 * LENGTH * along * across, rel=1e-9)
+    return np.asarray(wrenches[1] - wrenches[0])
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize(("along", "across"), [(-5.0, -1.0), (4.0, -2.0)])
+def test_steady_motion_is_free(count: int, along: float, across: float) -> None:
+    """The moment of a steady stream is that of the lift at the quarter of the chord, which the strips place."""
+    steady = added_wrench(count, np.array([0.0, 0.0, 0.0, along, 0.0, across]), 3.0)
+    np.testing.assert_allclose(steady, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_a_plate_that_pitches_in_a_stream_is_lifted(count: int) -> None:
+    """Theodorsen (1935, NACA Report 496): noncirculatory lift rho pi c^2 / 4 U alpha' per span, at mid-chord."""
+    stream, rate = 6.0, 3.0
+    added = added_wrench(count, np.array([0.0, rate, 0.0, 0.0, 0.0, 0.0]), stream)
+    lift = AIR * np.pi * CHORD**2 / 4 * LENGTH * stream * rate
+    assert added[:, 5].sum() == pytest.approx(lift, rel=1e-9)
+    np.testing.assert_allclose(added[:, 3:5], 0.0, atol=1e-12)
 
 
 def test_air_scales_with_its_density() -> None:
