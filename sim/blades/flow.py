@@ -32,7 +32,8 @@ class Flow:
     Attributes:
         along, normal: velocity of the wing through the air along its chord and normal to it, m/s.
         speed: m/s, never zero.
-        circulation: m^2/s; its force per length is -rho Gamma (normal, -along).
+        circulation: m^2/s, of all but fling, which comes on top as it is; its force per length is
+            -rho Gamma (normal, -along).
     """
 
     along: Array
@@ -48,7 +49,8 @@ class StationedWings:
     Attributes:
         places: the stations.
         sides: motion [B, 14, n] of each side that is computed, and how the stream meets it.
-        turning: [B, n], rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station.
+        turning: [B, n], rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, of a wing by itself.
+        fling: [B, n], rad/s: the same of what wings that peel apart add to it (Eq. 7).
         loading: [B, 8]: what circulation is multiplied by.
         density: [B] of the air, kg/m^3.
         lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
@@ -59,6 +61,7 @@ class StationedWings:
     places: Stations
     sides: tuple[tuple[Array, Side], ...]
     turning: Array
+    fling: Array
     loading: Array
     density: Array
     lift: Array
@@ -68,7 +71,7 @@ class StationedWings:
     def every(self, k: int) -> StationedWings:
         """The same at every ``k``-th instant."""
         sides = tuple((rows[:, :, ::k].copy(), side) for rows, side in self.sides)
-        return replace(self, sides=sides, turning=self.turning[:, ::k].copy())
+        return replace(self, sides=sides, turning=self.turning[:, ::k].copy(), fling=self.fling[:, ::k].copy())
 
     @cached_property
     def turns(self) -> tuple[Array, Array]:
@@ -76,6 +79,11 @@ class StationedWings:
         cosine, sine = np.empty((2, *self.turning.shape, LANES))
         station_turns(self.sides[0][0], cosine, sine)
         return cosine, sine
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Quasi-steady circulation [B, n, 8] that pitching makes, m^2/s: a part of that of the flow."""
+        return self._turned(self.turning)
 
     def flow(self, forward: Array) -> Flow:
         """Quasi-steady flow in a stream of ``forward`` [B, n] (m/s) along body x."""
@@ -93,13 +101,19 @@ class StationedWings:
         self._circulate(flow)
 
     def forces(self, flow: Flow) -> Array:
-        """Circulatory and viscous forces [B, 2, n] of all wings along body x and z, N."""
+        """Circulatory and viscous forces [B, 2, n] of all wings along body x and z, fling included, N."""
         out = np.zeros((len(self.turning), 2, self.turning.shape[1]))
+        circulation = flow.circulation + self._turned(self.fling)
         for k, (rows, side) in enumerate(self.sides):
-            moving = (flow.along[k], flow.normal[k], flow.speed[k], flow.circulation[k])
+            moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
             station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)
         out *= self.alike
         return out
+
+    def _turned(self, rate: Array) -> Array:
+        """Circulation [B, n, 8] at the stations (m^2/s) for a ``rate`` [B, n] at the pitch station (Eq. 2)."""
+        lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading
+        return np.asarray(rate[:, :, None] * lever[:, None])
 
     def _circulate(self, flow: Flow) -> None:
         """Set speed and quasi-steady circulation from the velocities."""

@@ -125,17 +125,35 @@ def steady_attachment(
 
 
 @kernel
-def separate(attached: Array, share: Array, circulation: Array) -> None:
+def separate(attached: Array, share: Array, rotation: Array, circulation: Array) -> None:
     """Multiply ``circulation`` [sides, B, n, 8] by 1 - share (1 - ((1 + sqrt X) / 2)^2), ``share`` [B].
 
-    What separation leaves of the lift where the flow is ``attached`` along the part X of the chord: Kirchhoff's law.
+    What separation leaves of the lift where the flow is ``attached`` along the part X of the chord: Kirchhoff's law. It
+    is one of the angle of attack: the part of the circulation that is of ``rotation`` [B, n, 8] stays.
     """
     for k in range(len(attached)):
         for b in range(len(share)):
-            lost, found = share[b], circulation[k, b]
+            lost, found, turned = share[b], circulation[k, b], rotation[b]
             for t in range(attached.shape[2]):
                 half = root(greatest(load1(attached[k, b], t), 0.0)) * 0.5 + 0.5
-                store1(found, t, load1(found, t) * (half * half * lost + (1.0 - lost)))
+                stays = load1(turned, t)
+                store1(found, t, (load1(found, t) - stays) * (half * half * lost + (1.0 - lost)) + stays)
+
+
+@kernel
+def overtake(wing: Array, share: Array, wake: Array) -> None:
+    """Turn the velocity of the ``wake`` w into share (w - k u), which ``wing``, moving at u along the same line, meets.
+
+    k u is what the wing takes along: w between none and all of u. All [sides, B, n, 8] in m/s, ``share`` [B].
+    """
+    for k in range(len(wake)):
+        for b in range(len(share)):
+            part = share[b]
+            for t in range(wake.shape[2]):
+                u, w = load1(wing[k, b], t), load1(wake[k, b], t)
+                ahead = greatest(greatest(w, 0.0) - greatest(u, 0.0), 0.0)
+                behind = least(least(w, 0.0) - least(u, 0.0), 0.0)
+                store1(wake[k, b], t, (ahead + behind) * part)
 
 
 @kernel

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from sim.effects.contract import Effect, Parameter, Values
+from sim.effects.joints import Joints
 from sim.effects.wing import WingScene
-from sim.kernels import LANES
 from sim.kernels.lanewise import angle, cosine_and_sine
 from sim.kernels.laws import connector_port
 from sim.kernels.matrices import load_matrix
 from sim.kernels.vector import greatest, load, load0, magnitude, root, store, store0
 
-EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
+_EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
 
 
 def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
@@ -27,7 +27,9 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
     to h behind it, S is a parabola.
     """
     port = connector_port(frame)
-    for c in range(int(port.parameters[0, 0, 0]), port.places):
+    for c in range(port.places):
+        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, whoever it is
+            continue
         half, h = load(port.parameters, 1, c), load(port.parameters, 2, c)
         g1, g2 = load(port.parameters, 3, c), load(port.parameters, 4, c)
         Q = load_matrix(port.Q, c)
@@ -49,11 +51,11 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """The play is of the spring alone: the damper beside it, foam glued to the rod, still acts."""
+    """The play is of the spring, and no other law bends the root; the damper, foam glued to the rod, still acts."""
     k = np.moveaxis(scene.lanes.stiffness[:, :3], 1, 0)
-    half, first = 0.5 * values["b"], np.full(LANES, float(scene.structure.wiring.driven))
+    half, root = 0.5 * values["b"], ~Joints.of(scene.structure).within[:, None]
     g1, g2 = 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])
-    scene.add_connector_law(_law, [first, half, 2 * EDGE * half, g1, g2])
+    scene.add_connector_law(_law, [root.astype(float), half, 2 * _EDGE * half, g1, g2])
 
 
 EFFECT = Effect(

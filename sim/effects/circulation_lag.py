@@ -72,14 +72,15 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 EFFECT = Effect(
     name="circulation_lag",
-    title="Lagged circulation (Wagner)",
+    title="Lagged circulation (Wagner, Theodorsen)",
     family="aerodynamics",
     port="air",
     size=(Parameter("share", "1", 0.0, 1.5, 1.0, "part of Wagner's deficit; 1 is a thin wing in plane flow"),),
     shape=(Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states in parts of that in plane flow", scale="log"),),
     memory="two late circulations at each station or strip",
-    source="Wagner (1925) in the approximation of R. T. Jones (1940, NACA Report 681); states: Leishman (2006, ch. 8)",
-    signature="lift that comes late and is smaller after each reversal, by the same half chords at any frequency",
+    source="Wagner (1925) in the approximation of R. T. Jones (1940, NACA Report 681), which for a steady swing is "
+    "Theodorsen's function (1935, NACA Report 496); states: Leishman (2006, ch. 8)",
+    signature="lift that comes late and swings less, by the same half chords at any frequency",
     confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),
     wing=_wing,
     vehicle=_vehicle,

@@ -69,7 +69,9 @@ class Effect:
         port: where it enters the model.
         size: zero of all of these switches it off exactly.
         shape: the other parameters.
-        power: what it may do with energy: only keep it, only lose it, or either (air and drive give energy).
+        power: what its own law does with energy: "conservative" only keeps it (over a beat it gives and takes none),
+            "dissipative" takes some at every instant, "any" promises nothing: it gives energy, or changes what the
+            wing's other laws take. Of the air both promises hold in still air only: a stream pushes.
         memory: its internal states in words; empty where it has none.
         source: where the law is from (author, year, equation).
         signature: one line: what it looks like in a recording.

@@ -49,7 +49,6 @@ EFFECT = Effect(
             "width", "1", 0.02, 0.3, 0.06, "how far it reaches (standard deviation), part of the span", place=True
         ),
     ),
-    power="dissipative",
     source="Christides and Barr, International Journal of Mechanical Sciences 26, 639 (1984): a crack as a local loss "
     "of bending stiffness; Sinha, Friswell and Edwards, Journal of Sound and Vibration 251, 13 (2002)",
     signature="a kink: all that lies outboard of one station swings further than told, all inboard as told",

@@ -21,13 +21,16 @@ _METRES = 0.01  # m, felt of either state
 
 
 def _stall(scene: VehicleScene, values: Values) -> None:
-    """tau_1 X' + X = X_0(alpha - tau_2 alpha'), times tau in chords travelled; circulation times 1 - share (1 - f)."""
+    """tau_1 X' + X = X_0(alpha - tau_2 alpha'), times tau in chords travelled.
+
+    Circulation of the angle of attack times 1 - share (1 - ((1 + sqrt X) / 2)^2).
+    """
     flow, chord = scene.flow, scene.stations.chord
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
     steady = np.empty_like(flow.speed)
     steady_attachment(flow.along, flow.normal, flow.speed, chord, stall, scene.step, steady)
     attached = scene.follow(1.0 / (values["delay"][:, None] * chord), steady)
-    separate(attached, values["share"], flow.circulation)
+    separate(attached, values["share"], scene.wings.rotation, flow.circulation)
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
@@ -83,7 +86,7 @@ EFFECT = Effect(
         "X_0 = 1 / (1 + exp((alpha - angle) / width)); Kirchhoff's law of lift, ((1 + sqrt X) / 2)^2"
     ),
     signature="lift breaks down late in each stroke at high angles of attack and comes back with a loop",
-    confused_with=("circulation_lag", "tip_loss"),
+    confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss"),
     wing=_wing,
     vehicle=_vehicle,
 )

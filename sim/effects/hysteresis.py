@@ -42,9 +42,10 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    spring = scene.lanes.stiffness * values["k"]
-    per = 1.0 / (Joints.of(scene.structure).part[:, None] * values["yield_angle"])
-    parameters = [spring[:, 0], spring[:, 1], per, values["gamma"], values["n"]]
+    joints = Joints.of(scene.structure)
+    spring = joints.out_of_plane(scene.lanes.stiffness * values["k"])
+    per = 1.0 / (joints.part[:, None] * values["yield_angle"])
+    parameters = [*spring, per, values["gamma"], values["n"]]
     scene.add_connector_law(_law, parameters, axes=[0, 1], states=_METRES)
 
 

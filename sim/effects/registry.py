@@ -28,15 +28,16 @@ _NAMES: tuple[str, ...] = (
     "hinge_offset",
     "compliant_drive",
     "backlash",
-    # aerodynamics, in the order in which each sees what the last changed: stream, coefficients, circulation, wake
+    # aerodynamics, in the order in which each sees what the last changed: stream, coefficients of the angle of attack,
+    # circulation of all kinds, wake
     "residual_air",
     "airspeed_error",
     "added_mass",
     "leading_edge_vortex",
     "viscous_drag",
     "plate_drag",
-    "rotational_circulation",
     "dynamic_stall",
+    "rotational_circulation",
     "circulation_lag",
     "clap_and_peel",
     "tip_loss",

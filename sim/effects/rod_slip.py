@@ -31,7 +31,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
     stored, lost = load0(port.stored), load0(port.lost)
     for c in range(port.places):
-        if port.parameters[0, c, 0] == 0.0:  # no rods here, whoever it is
+        if port.parameters[4, c, 0] == 0.0:  # no rods here, whoever it is
             store1(rate, c, 0.0)
             store1(decay, c, 0.0)
             store1(drive, c, 0.0)
@@ -56,10 +56,12 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    part = Joints.of(scene.structure).part[:, None]
+    joints = Joints.of(scene.structure)
+    part = joints.part[:, None]
     play, most = part * values["clearance"], part * values["friction"]
-    spring = values["stick"] * of_rods(scene)
-    scene.add_connector_law(_law, [spring, play, 1.0 / most, _SHAKE / (play + most)], axes=[0], states=_METRES)
+    slipping = joints.within & np.array([c.rods.any() for c in scene.structure.connectors])
+    spring, mask = values["stick"] * of_rods(scene), slipping[:, None].astype(float)
+    scene.add_connector_law(_law, [spring, play, 1.0 / most, _SHAKE / (play + most), mask], axes=[0], states=_METRES)
 
 
 def of_rods(scene: WingScene) -> Array:

@@ -71,7 +71,7 @@ EFFECT = Effect(
     ),
     source="Prandtl in Betz (1919); Glauert (1935, Aerodynamic Theory, division L, chapter VII): F = 2/pi arccos e^-f",
     signature="less load and less bending of the outer wing only, at the phases of large lift",
-    confused_with=("residual_air", "dynamic_stall"),
+    confused_with=("induced_inflow", "residual_air", "dynamic_stall"),
     wing=_wing,
     vehicle=_vehicle,
 )

@@ -162,8 +162,9 @@ class VehicleScene:
         sides = tuple((rows.copy(), side) for side in self.each_side(rows))
         lift, drag = self._coefficients("C_l", "K_l"), self._coefficients("C_D0", "C_Dpi2", "K_d")
         loading = self.loading[:, -LANES:].copy()
+        turning, fling = self._turning()
         return StationedWings(
-            self.stations, sides, self._turning(), loading, self.density.copy(), lift, drag, mirrored(own)
+            self.stations, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)
         )
 
     @cached_property
@@ -220,13 +221,17 @@ class VehicleScene:
         flap = self.angles.flap
         return np.cos(flap[:, 0]), np.sin(flap[:, 0]), flap[:, 1]
 
-    def _turning(self) -> Array:
-        """[B, n], rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, fling included (Eqs. 4, 7)."""
-        on, peel = float("clap_and_peel" in self.setting.terms), self.angles.peel
+    def _turning(self) -> tuple[Array, Array]:
+        """[B, n] each, rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, and what fling adds to it.
+
+        The term puts C_F in the place of C_R while the wings peel (Eqs. 4, 7). Here that of C_R goes on, and C_F + C_R
+        is added: the two are the same until one of them is late or stalls, which fling between two wings does not.
+        """
+        on, rate = float("clap_and_peel" in self.setting.terms), self.angles.pitch[:, 1]
         rotation, fling = self._coefficients("C_r", "C_F").T[:, :, None]
-        more = self.fling[:, None]
         turn = rotation * (ROTATION_POINT - self.setting.vehicle.pitch_axis)
-        return np.asarray((turn * (1.0 - peel * on) - (fling * on + more) * peel) * self.angles.pitch[:, 1])
+        more = (fling + turn) * on + self.fling[:, None]
+        return np.asarray(turn * rate), np.asarray(-more * self.angles.peel * rate)
 
     def _coefficients(self, *names: str) -> Array:
         """Genes [B, names], zero for terms that are off."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from sim.effects.contract import Effect, Parameter, Values
+from sim.effects.joints import Joints
 from sim.effects.wing import WingScene
 from sim.kernels.laws import connector_port
 from sim.kernels.vector import load, load0, load1, store, store0, store1
@@ -35,8 +36,8 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
 
 def _wing(scene: WingScene, values: Values) -> None:
     """Bending and torsion only: in its plane and across its sections the wing hardly strains."""
-    spring = scene.lanes.stiffness * values["k"]
-    scene.add_connector_law(_law, [spring[:, 0], spring[:, 1], 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
+    spring = Joints.of(scene.structure).out_of_plane(scene.lanes.stiffness * values["k"])
+    scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
 
 
 EFFECT = Effect(

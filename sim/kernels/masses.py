@@ -7,9 +7,9 @@ h' = h x omega + p x v, p' = p x omega, which keeps the energy exactly.
 its bodies, v_z relative to the wind. The kinetic energy is the sum of q_i . N_ij q_j / 2 over pairs of bodies of a
 strip and the wrench of the air is -N q', along the same three: pressure pushes along the normal. Kirchhoff's equations
 of a body in a perfect fluid have a pair of terms more, a force along the chord and the moment of Munk, which together
-do no work. At a section's edges they are suction; on a wing that carries circulation the moment is what puts the lift at the
-quarter of the chord (Theodorsen 1935, NACA Report 496), which strips do by where they place their lift. So what is
-left is the noncirculatory part of thin airfoils: in a stream U, m (h'' + U alpha') along the normal.
+do no work. At a section's edges they are suction; on a wing that carries circulation the moment is what puts the lift
+at the quarter of the chord (Theodorsen 1935, NACA Report 496), which strips do by where they place their lift. So what
+is left is the noncirculatory part of thin airfoils: in a stream U, m (h'' + U alpha') along the normal.
 
 All of it enters as inertia: fed back as a force, air that outweighs the wing would make the step unstable.
 """

@@ -114,6 +114,9 @@ def test_aerodynamic_effects_are_fitted_in_air_and_all_others_in_vacuum(small: t
         "aerodynamics",
         "structure",
     )
+    structure, air = plan(replace(SPEC, effects=("residual_air",)), dataset)
+    assert "residual_air.density" in structure.free, "what is left in a vacuum shows there alone"
+    assert "residual_air.density" not in air.free
     assert effect_of("E_f") is effect_of("bump") is effect_of("bump.colour") is effect_of("nothing.x") is None
 
 
@@ -195,6 +198,10 @@ def test_gauss_newton_finds_a_typical_offset_of_a_balance_on_each_recording(forc
     result = summarise(spec, dataset, Here(), last.checkpoint)
     told = {gene.name: gene.identifiable for gene in result.genes}
     assert told["balance_offset.z"] is False
+    shown = next(gene for gene in result.genes if gene.name == "balance_offset.x")
+    errors = [one.standard_errors["balance_offset.x"] for one in result.estimates]
+    assert shown.absolute_error == max(errors)
+    assert 0 < max(errors) < 0.1 * typical["balance_offset.x"]
     assert result.after < 0.5 * result.before
 
 
@@ -252,7 +259,7 @@ def test_an_effect_that_is_not_there_is_found_at_zero_and_its_place_not_determin
     assert not found.uncertainty.standing["bump.place"].identifiable
     assert not any("bound" in remark and "bump.size" in remark for remark in found.remarks)
     (said,) = absent(found.values, problem.free)
-    assert said == "effect 'bump' is switched off in the best genome, and bump.place are not determined"
+    assert said == "effect 'bump' is switched off in the best genome, and bump.place is not determined"
     assert absent(found.values | {"bump.size": 0.1}, problem.free) == ()
 
 

@@ -17,6 +17,7 @@ from workers import make_evaluator
 
 LOCAL = CalibrationSpec(mode="local")
 JOINT = CalibrationSpec(mode="joint")
+OFFSET_AND_BIAS = ("balance_offset.x", "stroke_bias.angle")
 
 
 @pytest.fixture(scope="module")
@@ -288,6 +289,21 @@ def test_a_low_pass_that_was_not_applied_is_said(dataset: Dataset) -> None:
     said = run(replace(LOCAL, low_pass=60.0), mixed)[1].remarks
     assert any("'test-1' says that it has been low-passed at 100 Hz; 60 Hz was not applied" in r for r in said)
     assert not any("was not applied" in remark for remark in run(LOCAL, mixed)[1].remarks)
+
+
+def test_a_prediction_is_of_the_vehicle_and_not_of_its_balance(local: ForceResult, dataset: Dataset) -> None:
+    law, condition = local.global_model, TRIALS[3].condition
+    assert law is not None
+    bare = predict(LOCAL, dataset, law, condition, points=100)
+    spec = replace(LOCAL, effects=("balance_offset", "stroke_bias"), fixed={"balance_offset.z": 0.02})
+    offset, bias = (replace(law.genes[0], name=n, constant=0.02, per_hz=0.0, per_rad=0.0) for n in OFFSET_AND_BIAS)
+    found = predict(spec, dataset, replace(law, genes=(*law.genes, offset)), condition, points=100)
+    assert found.values == bare.values
+    assert np.array_equal(found.forces["x"], bare.forces["x"])
+    assert np.array_equal(found.forces["z"], bare.forces["z"])
+    biased = predict(spec, dataset, replace(law, genes=(*law.genes, bias)), condition, points=100)
+    assert np.abs(biased.forces["x"] - bare.forces["x"]).max() > 1e-4
+    assert biased.values["stroke_bias.angle"] == 0.02
 
 
 def test_what_is_only_predicted_may_lack_the_fitted_axis(dataset: Dataset) -> None:

@@ -20,6 +20,7 @@ import typer
 
 from records import Dataset, save_dataset
 from service import cli
+from service.commands import runs
 from service.commands.output import duration, mm, number
 from service.commands.simulate import marker_distances
 from sim.effects.registry import EFFECTS
@@ -119,8 +120,23 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
     assert run["spec"]["effects"] == ["camera_shift", "clock_offset", "scale_error"]
     settings = " ".join(wingfit("runs", "show", run["id"])[1].split())
     assert "effects camera_shift clock_offset scale_error" in settings
-    code, _, err = wingfit(*words[:-1], "camera_shift,")
-    assert (code, "effects.1" in err) == (1, True)
+    for empty in ("camera_shift,", ""):
+        code, _, err = wingfit(*words[:-1], empty)
+        assert (code, "leave the option out" in " ".join(err.replace("│", " ").split())) == (2, True)
+    assert "in parts of the mean chord; in genomes and results the gene is in m" in shown
+
+
+def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
+    one: Any = {"name": "drive_harmonics.cos2", "nominal": 0.0, "best": 3.4e-5, "unit": "rad", "lower": -0.1}
+    one |= {"upper": 0.1, "searched": True, "standard_error_percent": 0.64, "identifiable": True}
+    runs.genes([one | {"standard_error": 3.2e-5}])
+    shown = capsys.readouterr().out
+    assert "± 3.2e-05 rad" in shown
+    assert "not different from zero" in shown
+    assert "%" not in shown
+    assert runs.told(one | {"standard_error": 1.6e-5}) == "yes"
+    assert runs.told(one | {"standard_error": 3.2e-5, "nominal": 1e-3}) == "yes"
+    assert runs.told(one) == "yes", "an answer of before"
     code, _, err = wingfit("simulate", "--dataset", dataset_id, "--with", "balance_offset")
     assert (code, "does not apply to a wing" in err) == (1, True)
 

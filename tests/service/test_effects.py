@@ -12,6 +12,7 @@ from records import Dataset, Genome
 from service import store
 from service.effect_schemas import EffectsOut
 from service.engine import ModelEngine
+from service.problems import ProblemError
 from service.spec_schemas import RunIn
 from service.spec_views import of_run, of_simulation, refuse_effects, run_name, spec_out
 from sim.balance import delfly
@@ -84,6 +85,21 @@ def test_a_gene_of_an_effect_that_is_not_included_says_so(api: Api) -> None:
     assert "effect 'camera_shift', which the request does not include; name it in 'effects'" in error["message"]
 
 
+def test_a_simulation_says_the_same_of_such_a_gene_and_lists_the_known_ones_once(api: Api) -> None:
+    genome = {"stifness": 1.0, "camera_shift.x": 1e-3, "dampng": 1.0}
+    body = {"dataset_id": api.upload()["id"], "recording": "slow", "genome": genome}
+    answer = api.client.post("/v1/simulations", json=body)
+    assert answer.status_code == 422
+    first, shift, last = answer.json()["errors"]
+    assert "name it in 'effects' (--with camera_shift)" in shift["message"]
+    assert "known are stiffness, damping" in first["message"]
+    assert last["message"] == "unknown gene; see those named above"
+    effects = {"dataset_id": body["dataset_id"], "effects": ["one", "two"]}
+    one, two = api.client.post("/v1/runs", json=effects).json()["errors"]
+    assert "there are damage" in one["message"]
+    assert two["message"] == "unknown effect 'two'; see those named above"
+
+
 def test_a_run_keeps_its_effects_and_is_named_after_them(api: Api) -> None:
     dataset = api.upload()["id"]
     run = api.submit(dataset, effects=["camera_shift"])
@@ -116,6 +132,12 @@ def test_a_vehicle_takes_effects_on_forces_and_no_others() -> None:
     refuse_effects(["balance_offset"], dataset)
     with pytest.raises(Exception, match="the model cannot contain these effects"):
         refuse_effects(["camera_shift"], dataset)
+    with pytest.raises(ProblemError) as refused:
+        refuse_effects(["tip_loss", "clap_and_peel"], dataset, RunIn(dataset_id="x"))
+    (error,) = refused.value.errors
+    assert error["where"] == "body.effects.1"
+    assert 'leave the effect out, or the term: without: ["clap_and_peel"] (--without clap_and_peel)' in error["message"]
+    refuse_effects(["clap_and_peel"], dataset, RunIn(dataset_id="x", without=["clap_and_peel"]))
     spec = CalibrationSpec(effects=("balance_offset",), without=("inertial",), mode="local")
     assert run_name(dataset, spec) == "delfly, proposed without inertial with balance_offset, local"
     names = ModelEngine().gene_names(spec, dataset)

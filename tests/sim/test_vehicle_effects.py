@@ -219,12 +219,34 @@ def test_clap_and_peel_is_the_term_of_that_name() -> None:
     assert beat_of(effect, clap_and_peel__coefficient=coefficient) == pytest.approx(beat_of(term), abs=1e-12)
 
 
-def test_fling_is_in_the_flow_that_other_effects_see() -> None:
-    term = scene_of(DELFLY, REC, **COEFFICIENTS)
-    effect = scene_of(DELFLY, REC, **COEFFICIENTS | {"C_F": 0.0})
-    effect.setting = replace(effect.setting, terms=chosen("proposed", ("clap_and_peel",)))
-    act("clap_and_peel", effect, coefficient=COEFFICIENTS["C_F"] + 0.75 * COEFFICIENTS["C_r"])
-    assert effect.flow.circulation == pytest.approx(term.flow.circulation, abs=1e-12)
+LATE: dict[str, dict[str, float]] = {
+    "dynamic_stall": {"share": 1.0, "angle": 0.4, "width": 0.1, "delay": 1.0, "advance": 0.0},
+    "circulation_lag": {"share": 1.0},
+}
+
+
+def test_fling_as_a_term_and_as_an_effect_are_one_whatever_else_acts() -> None:
+    term = BladeElementWing(DELFLY).with_effects(*LATE, "wake_capture")
+    effect = BladeElementWing(DELFLY, chosen("proposed", ("clap_and_peel",)))
+    effect = effect.with_effects("clap_and_peel", *LATE, "wake_capture")
+    more = {f"{name}__{key}": value for name, values in LATE.items() for key, value in values.items()}
+    coefficient = COEFFICIENTS["C_F"] + 0.75 * COEFFICIENTS["C_r"]
+    found = beat_of(effect, REC, clap_and_peel__coefficient=coefficient, wake_capture__share=0.2, **more)
+    assert found == pytest.approx(beat_of(term, REC, wake_capture__share=0.2, **more), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", LATE)
+def test_fling_is_neither_late_nor_stalled(name: str) -> None:
+    """It adds the same force whether the circulation beside it is late, stalled or neither; as on a wing."""
+    model = BladeElementWing(DELFLY, chosen("proposed", ("clap_and_peel",))).with_effects("clap_and_peel", name)
+    late = {f"{name}__{key}": value for key, value in LATE[name].items()}
+    added = [
+        beat_of(model, REC, clap_and_peel__coefficient=2.7, **more) - beat_of(model, REC, **more)
+        for more in (dict[str, float](), late)
+    ]
+    assert np.abs(added[0]).max() > 0.05
+    assert added[1] == pytest.approx(added[0], abs=1e-12)
+    assert np.abs(beat_of(model, REC, **late) - beat_of(model, REC)).max() > 0.01
 
 
 # -- the flow -----------------------------------------------------------------------------------------------------
@@ -249,21 +271,31 @@ def test_circulation_grows_as_wagner_says() -> None:
 def test_stall_takes_lift_where_the_angle_is_large_and_for_long() -> None:
     """With a short delay it is the steady law; with a long one every instant has the mean attachment."""
     bare = scene_of(DELFLY, REC, **COEFFICIENTS)
-    own, flow = bare.flow.circulation.copy(), bare.flow
+    flow, turned = bare.flow, scene_of(DELFLY, REC, **COEFFICIENTS | {"C_l": 0.0}).flow.circulation
+    own = flow.circulation - turned  # of the angle of attack
+    assert np.abs(turned).max() > 0.1 * np.abs(own).max()
     alpha = np.arctan2(np.abs(flow.normal), np.abs(flow.along))
     steady = 1 / (1 + np.exp((alpha - 0.6) / 0.1))
     quick = act("dynamic_stall", bare, share=1.0, angle=0.6, width=0.1, delay=1e-6, advance=0.0)
-    outer = quick.flow.circulation[..., 4:]  # the innermost hardly move
+    outer = (quick.flow.circulation - turned)[..., 4:]  # the innermost hardly move
     assert outer == pytest.approx((own * (0.5 + 0.5 * np.sqrt(steady)) ** 2)[..., 4:], abs=2e-3 * np.abs(own).max())
     late = act(
         "dynamic_stall", scene_of(DELFLY, REC, **COEFFICIENTS), share=1.0, angle=0.6, width=0.1, delay=2.0, advance=0.0
     )
     attached = late.follow(1.0 / (2.0 * np.tile(late.stations.chord, (1, 1))), steady)
-    assert late.flow.circulation == pytest.approx(own * (0.5 + 0.5 * np.sqrt(attached)) ** 2, abs=1e-5)
+    assert late.flow.circulation - turned == pytest.approx(own * (0.5 + 0.5 * np.sqrt(attached)) ** 2, abs=1e-5)
     slow = act("dynamic_stall", scene_of(DELFLY, REC, **COEFFICIENTS), share=1.0, angle=0.6, delay=1e6, advance=0.0)
-    left = slow.flow.circulation / own
+    left = (slow.flow.circulation - turned) / own
     assert np.ptp(left, axis=2).max() < 1e-3
     assert np.all((left > 0.25) & (left < 1.0))
+
+
+def test_circulation_of_rotation_does_not_stall() -> None:
+    """Nor what the tip leaves of it: without lift of the angle of attack there is nothing to stall."""
+    model = BladeElementWing(DELFLY).with_effects("dynamic_stall", "tip_loss")
+    own = {"C_l": 0.0, "tip_loss__spacing": 0.05, "dynamic_stall__angle": 0.2}
+    found = [beat_of(model, REC, dynamic_stall__share=share, **own) for share in (0.0, 1.0)]
+    assert found[1] == pytest.approx(found[0], abs=1e-12)
 
 
 @pytest.mark.parametrize(("speed", "pitch"), [(0.0, 1.4), (0.5, 1.2), (2.0, 0.5)])
@@ -292,7 +324,10 @@ def test_swept_area_and_apparent_mass() -> None:
 
 
 def test_wake_moves_as_the_wing_did() -> None:
-    """At a constant fading rate the wake lags the flapping as a first-order low-pass; the wing meets the difference."""
+    """At a constant fading rate the wake lags the flapping as a first-order low-pass.
+
+    The wing meets none of it while it is the faster, what overtakes it as it slows down, and all once it has turned.
+    """
     wing = plate(FourierFlap(0.0, (0.0,), (0.5,)), FourierPitch(np.pi / 2 - 0.5, (), ()))
     scene = scene_of(wing, recording(12.5, 0.0, 0.0), **COEFFICIENTS)
     flow, (cosine, sine) = scene.flow, scene.wings.turns
@@ -303,21 +338,25 @@ def test_wake_moves_as_the_wing_did() -> None:
     omega = 2 * np.pi * 12.5
     response = 1 / (1 + 1j * omega * 2.0 * 0.05 / 3.0)
     velocity = 0.5 * omega * scene.stations.r
-    air = 0.2 * ((response - 1) * np.exp(1j * psi)).real[:, None] * velocity
+    wake, own = (response * np.exp(1j * psi)).real, np.cos(psi)
+    met = np.select([wake * own <= 0, np.abs(wake) <= np.abs(own)], [wake, 0.0 * wake], wake - own)
+    assert 0.3 < np.mean(met == 0.0) < 0.6
+    air = 0.2 * met[:, None] * velocity
     assert flow.along[0, 0] == pytest.approx(before[0][0, 0] - air * cosine[0], abs=1e-3)
     assert flow.normal[0, 0] == pytest.approx(before[1][0, 0] + air * sine[0], abs=1e-3)
 
 
 def test_wake_adds_force_after_reversal() -> None:
-    """In the first half of each stroke the wing meets air that comes towards it; then the wake goes with it."""
+    """After each reversal the wing meets air that comes towards it; before, air that it set in motion pushes it."""
     wing = plate(FourierFlap(0.0, (0.0,), (0.5,)), FourierPitch(np.pi / 2, (), ()))
     model = BladeElementWing(wing).with_effects("wake_capture")
-    drag, captured = (
-        np.abs(beat_of(model, recording(12.5, 0.0, 0.0), wake_capture__share=share)[:, 1]) for share in (0.0, 0.2)
-    )
-    after, before = slice(110, 150), slice(60, 90)  # zeta' is zero at a quarter of the beat
-    assert captured[after].sum() > 1.05 * drag[after].sum()
-    assert captured[before].sum() < drag[before].sum()
+    own = {name: value for name, value in COEFFICIENTS.items() if name != "C_F"}
+    parts = model.term_forces(genome(model, **own, **{"wake_capture.share": 0.4}), recording(12.5, 0.0, 0.0))
+    drag, captured = parts["viscous"][:, 1], parts["effects"][:, 1]
+    early, after, before = slice(5, 20), slice(110, 150), slice(85, 98)  # zeta' is zero at a quarter of the beat
+    assert np.abs(captured[early]).max() < 1e-3 * np.abs(drag).max(), "the wing takes its wake along"
+    assert np.all(captured[after] / drag[after] > 0.05)
+    assert np.all(captured[before] / drag[before] < -0.01)
 
 
 # -- mass ---------------------------------------------------------------------------------------------------------

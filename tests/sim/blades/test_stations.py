@@ -137,14 +137,17 @@ def test_attachment_comes_late_where_the_angle_rises() -> None:
 
 
 def test_what_separation_leaves() -> None:
-    """Kirchhoff: all of it attached leaves all, none of it a quarter."""
+    """Kirchhoff: all of it attached leaves all, none of it a quarter; and all of what is of rotation."""
     attached = np.array([1.0, 0.0, 0.25, -1e-9])[None, None, :, None] * np.ones(8)
-    found = np.full_like(attached, 2.0)
-    separate(attached, np.array([1.0]), found)
+    found, rotation = np.full_like(attached, 2.0), np.zeros((1, 4, 8))
+    separate(attached, np.array([1.0]), rotation, found)
     assert found[0, 0, :, 0] == pytest.approx([2.0, 0.5, 1.125, 0.5])
     found[:] = 2.0
-    separate(attached, np.array([0.5]), found)
+    separate(attached, np.array([0.5]), rotation, found)
     assert found[0, 0, 1, 3] == pytest.approx(1.25)
+    found[:], rotation[:] = 2.0, [[-1.0], [-1.0], [2.0], [3.0]]
+    separate(attached, np.array([1.0]), rotation, found)
+    assert found[0, 0, :, 5] == pytest.approx([2.0, -0.25, 2.0, 2.75])
 
 
 def inflow(force: Array, slope: Array, mass: float, stream: tuple[float, float]) -> Array:

@@ -1,23 +1,24 @@
-"""A law of the connectors by itself, driven by hand; and the ledger of a whole beat."""
+"""A wing with one effect: its scene, a law of its connectors turned by hand, and the ledger of a whole beat."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from records import Condition, Genome
+from records import Condition, Genome, Wing
 from sim.division import Division
 from sim.effects.registry import EFFECTS
 from sim.effects.wing import WingScene
 from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
 from sim.kernels.arrays import Lanes, Work, new_work
-from sim.kernels.laws import AFTER, compiled
+from sim.kernels.laws import AFTER
 from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing, tunnel
 from sim.simulate import Beat
@@ -26,16 +27,27 @@ from sim.wing_genes import lanes, wing_genes
 from tests.sim.effects.rigs import CONDITIONS
 
 Array = npt.NDArray[np.float64]
-AIR = tunnel(0.05, 3.0, 6.0)
+AIR, VACUUM = tunnel(0.05, 3.0, 6.0), CONDITIONS["vacuum"]
+_LAW = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64), ctypes.c_int64)
+_NOMINAL: Mapping[str, float] = MappingProxyType({})
 
 
-def scene_of(structure: Structure, name: str, **values: float) -> WingScene:
-    """The scene of the nominal wing with one effect, all its other parameters as they are typical."""
-    genes, effect = wing_genes(structure.wing.estimates), EFFECTS[name]
-    found = WingScene.of(structure, AIR, lanes(structure, genes, np.array([Genome.nominal(genes).values])))
-    typical = {key.split(".")[1]: value for key, value in effect.typical(structure.wing).items()}
-    assert effect.wing is not None
-    effect.wing(found, {key: np.full(LANES, value) for key, value in (typical | values).items()})
+def told(name: str, wing: Wing, values: Mapping[str, float]) -> dict[str, float]:
+    """All parameters of an effect by their short names: typical, but where one size is told the others are zero."""
+    effect = EFFECTS[name]
+    typical = {key.partition(".")[2]: value for key, value in effect.typical(wing).items()}
+    sizes = {p.name: 0.0 for p in effect.size}
+    return {**typical, **(sizes if sizes.keys() & values.keys() else {}), **values}
+
+
+def scene_of(name: str, structure: Structure, condition: Condition = AIR, /, **values: float) -> WingScene:
+    """The scene of the nominal wing with one effect, its parameters as :func:`told`."""
+    genes = wing_genes(structure.wing.estimates)
+    nominal = lanes(structure, genes, np.array([Genome.nominal(genes).values]))
+    found = WingScene.of(structure, condition, nominal)
+    act = EFFECTS[name].wing
+    assert act is not None
+    act(found, {key: np.full(LANES, value) for key, value in told(name, structure.wing, values).items()})
     return found
 
 
@@ -46,19 +58,16 @@ class Bench:
     scene: WingScene
     frozen: Lanes
     work: Work
-    law: Callable[[object, int], None]
     at: int
 
     @classmethod
-    def of(
-        cls, name: str, law: Callable[[object, int], None], division: str = "4", at: int = 1, **values: float
-    ) -> Bench:
+    def of(cls, name: str, division: str = "4", at: int = 1, **values: float) -> Bench:
         """On the robird."""
-        scene = scene_of(build(robird_wing(), Division.parse(division)), name, **values)
+        scene = scene_of(name, build(robird_wing(), Division.parse(division)), **values)
         frozen = scene.frozen()
         work = new_work(scene.structure.wiring, scene.setting(64), frozen)
         work.Q[:, [0, 4, 8]] = 1.0
-        return cls(scene, frozen, work, law, at)
+        return cls(scene, frozen, work, at)
 
     def call(self, turn: Array, rate: Array, states: Array) -> None:
         """Ask the law at rotation vector ``turn`` [3], turning with ``rate`` [3] about A's axes, at ``states`` [K]."""
@@ -69,7 +78,7 @@ class Bench:
         for array in (work.more, work.more_k, work.more_d, work.lost, work.stored):
             array[:] = 0.0
         frame = work.connector_frames[0].ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
-        compiled(self.law).ctypes(frame, AFTER)
+        _LAW(int(self.frozen.laws.connector[0, 0]))(frame, AFTER)
 
     def states(self, array: Array) -> Array:
         """What an array [Z, W] says of the states [K] of the connector that is turned."""
@@ -146,28 +155,36 @@ class Bench:
 
 
 def beat_of(
-    name: str, division: str = "4", steps: int = 96, condition: Condition = CONDITIONS["vacuum"], **values: float
+    name: str,
+    condition: Condition = VACUUM,
+    steps: int = 96,
+    division: str = "4",
+    genes: Mapping[str, float] = _NOMINAL,
+    **values: float,
 ) -> Beat:
-    """A periodic beat of the nominal robird with an effect, the rest of its parameters typical; none for no name."""
-    model = FlexibleWing(robird_wing(), division, numerics=Numerics(steps=steps, periodic=1e-5, max_beats=40))
-    genes = Genome.nominal(model.genes)
+    """A periodic beat of the robird with an effect, its parameters as :func:`told`; without effects for no name.
+
+    ``genes``: of the wing, where not nominal.
+    """
+    model = FlexibleWing(robird_wing(), division, numerics=Numerics(steps=steps, periodic=2e-6, max_beats=40))
+    own = {}
     if name:
         model = model.with_effects(name)
-        typical = EFFECTS[name].typical(model.wing) | {f"{name}.{key}": value for key, value in values.items()}
-        genes = Genome.nominal(model.genes).replace(typical)
-    found = model.beat(genes.values, blank_recording(model.wing, condition))
+        own = {f"{name}.{key}": value for key, value in told(name, model.wing, values).items()}
+    genome = Genome.nominal(model.genes).replace(own | dict(genes))
+    found = model.beat(genome.values, blank_recording(model.wing, condition), with_motion=True)
     assert found.reason is None
     return found
 
 
 def ledger(beat: Beat, frequency: float) -> float:
-    """How far energy kept and power through all ports are from agreeing, as a part of what goes through in a beat."""
+    """How far energy kept and power through all ports are apart over a beat, as a part of the work of the motors."""
     stored, power, n = beat.energy.sum(axis=1), beat.power.sum(axis=1), len(beat.energy)
     turn = 2j * np.pi * frequency * np.arange(n // 2 + 1)
     turn[0] = 1.0
     given = np.fft.irfft(np.fft.rfft(power - power.mean()) / turn, n)
     apart = np.abs(given - given.mean() - stored + stored.mean()).max() + abs(power.mean()) / frequency
-    return float(apart / np.abs(beat.power).mean(axis=0).sum() * frequency)
+    return float(apart / np.abs(beat.power[:, 1:3].sum(axis=1)).mean() * frequency)
 
 
 def excursion(beat: Beat) -> float:

@@ -1,4 +1,4 @@
-"""A wing under one effect of its drive: its rods alone, a wing too stiff to bend, and the ledger of a beat."""
+"""A wing under one effect of its drive: its rods alone, and a wing too stiff to bend."""
 
 from __future__ import annotations
 
@@ -8,28 +8,21 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from records import Condition
 from sim.division import Division
-from sim.effects.registry import EFFECTS
 from sim.effects.wing import WingScene
-from sim.flexible_wing import FlexibleWing
 from sim.kernels import LANES
 from sim.kernels.arrays import new_work
 from sim.kernels.integrate import advance
 from sim.numerics import Numerics
-from sim.rig import blank_recording, robird_wing, tunnel, vacuum
+from sim.rig import robird_wing, vacuum
 from sim.scene import at_rest, drive_table, new_trace
-from sim.simulate import Beat
 from sim.structure import Structure, build
-from sim.wing_genes import wing_genes
-from tests.sim.plates import loaded
+from tests.sim.effects.bench import beat_of
 
 Array = npt.NDArray[np.float64]
 
-AIR = tunnel(0.05, 3.0, 6.0)
 SLOW = replace(vacuum(0.01, 0.0, 0.25), gravity=0.0)  # so slow that a stiff wing does not bend
 STIFF = {"E_f": 3e7, "E_r": 6e11, "G_f": 1.1e7, "G_r": 1.5e10}
 
@@ -50,16 +43,6 @@ class Rods(NamedTuple):
 @cache
 def robird() -> Structure:
     return build(robird_wing(), Division.parse("4"))
-
-
-def scene_of(name: str, structure: Structure, condition: Condition = AIR, **values: float) -> WingScene:
-    """The nominal wing with one effect, its other parameters at their typical values."""
-    effect, rig = EFFECTS[name], structure.wing
-    own = {p.name: 0.0 if p in effect.size else effect.typical(rig)[f"{name}.{p.name}"] for p in effect.parameters}
-    scene = WingScene.of(structure, condition, loaded(structure, {}))
-    assert effect.wing is not None
-    effect.wing(scene, {key: np.full(LANES, value) for key, value in (own | values).items()})
-    return scene
 
 
 def rods_of(scene: WingScene, steps: int) -> Rods:
@@ -93,38 +76,12 @@ def off_axis(rods: Rods, axis: Array, place: Array) -> tuple[float, float]:
     return float(np.abs(pose).max()), float(np.abs(rods.V.reshape(-1, 6) - twist).max())
 
 
-def model_of(name: str, steps: int, division: str = "4") -> FlexibleWing:
-    """The robird with one effect at fixed steps."""
-    numerics = Numerics(steps=steps, periodic=2e-6, max_beats=40)
-    return FlexibleWing(robird_wing(), division, numerics=numerics, effects=(name,))
-
-
-def beat_of(name: str, condition: Condition, steps: int, genes: dict[str, float], **values: float) -> Beat:
-    """The periodic beat of four bodies; ``genes`` of the wing and ``values`` of the effect that are not nominal."""
-    model = model_of(name, steps)
-    told = EFFECTS[name].typical(model.wing) | {f"{name}.{p.name}": 0.0 for p in EFFECTS[name].size}
-    told |= {g.name: g.nominal for g in wing_genes({})} | genes | {f"{name}.{key}": v for key, v in values.items()}
-    found = model.beat([told[g.name] for g in model.genes], blank_recording(model.wing, condition), with_motion=True)
-    assert found.reason is None
-    return found
-
-
 def stiff_tracks(name: str, steps: int = 64, **values: float) -> Array:
     """Markers [n, M, 3] of a wing that hardly bends, flapped slowly in vacuum."""
-    return beat_of(name, SLOW, steps, STIFF, **values).tracks
+    return beat_of(name, SLOW, steps, "4", STIFF, **values).tracks
 
 
 def turned(structure: Structure, angle: Array, axis: Array, place: Array) -> Array:
     """Where the markers [n, M, 3] of a rigid wing are at ``angle`` [n] about ``axis`` through ``place``."""
     rest = np.array([marker.position for marker in structure.wing.markers]) - place
     return np.stack([place + Rotation.from_rotvec(a * axis).apply(rest) for a in angle])
-
-
-def ledger(beat: Beat, frequency: float) -> float:
-    """How far energy kept and the work of the ports are apart over a beat, as a part of the work of the motors."""
-    stored, power = beat.energy.sum(axis=1), beat.power
-    times = np.arange(len(stored) + 1) / (len(stored) * frequency)
-    closed = np.concatenate([power, power[:1]])
-    work = CubicSpline(times, closed, bc_type="periodic").antiderivative()(times)[:-1]
-    motors = np.abs(power[:, 1:3].sum(axis=1)).mean() / frequency
-    return float(np.abs(stored - stored[0] - work.sum(axis=1)).max() / motors)

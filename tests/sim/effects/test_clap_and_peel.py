@@ -6,14 +6,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from records import FourierDrive, Hinge
+from records import Condition, FourierDrive, Hinge
 from sim.blade_element_wing import BladeElementWing
-from sim.effects.clap_and_peel import fling_near
+from sim.division import Division
+from sim.effects.clap_and_peel import EFFECT, fling_near
+from sim.effects.wing import WingScene
 from sim.kernels import LANES
 from sim.kernels.arrays import CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
+from sim.structure import build
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.effects.rigs import bare, force_recording
 from tests.sim.marching import CHORD, LENGTH, plank
+from tests.sim.plates import loaded
 
 Array = npt.NDArray[np.float64]
 
@@ -124,6 +128,17 @@ def test_the_plane_holds_the_hinge_above_the_top_of_the_stroke() -> None:
     assert np.all(below > 0)
     expected = 2.7 * CHORD * 3.0 * fling_near(below / CHORD)
     np.testing.assert_allclose(more, np.repeat(expected[:, None], LANES, axis=1), rtol=1e-6)
+
+
+def test_the_plane_stands_over_the_mean_of_both_rods() -> None:
+    """Two rods that swing by a about 0.1, the rear one late by phi: their mean swings by a cos(phi / 2)."""
+    lag, wing = 0.8, plank(FourierDrive(0.1, (0.4,), ()))
+    structure = build(wing, Division.parse("2x1"))
+    scene = WingScene.of(structure, Condition(3.0, lag, 101325.0, 293.15), loaded(structure, {}))
+    assert EFFECT.wing
+    EFFECT.wing(scene, {"coefficient": np.full(LANES, 2.7), "clearance": np.full(LANES, 0.05)})
+    _, sine, cosine, _ = scene.frozen().laws.parameters.reshape(4, 2, LANES)
+    np.testing.assert_allclose(np.arctan2(sine, cosine), 0.1 + 0.4 * np.cos(lag / 2) + 0.05, atol=2e-5)
 
 
 def test_a_vehicles_fling_falls_with_the_clearance_by_the_same_law() -> None:

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sim.effects.compliant_drive import GOVERNOR, LEARNING
 from sim.kernels import LANES
 from sim.kernels.arrays import new_work
 from sim.kernels.motor import give_way
 from sim.simulate import Beat
-from tests.sim.effects.driving import AIR, Array, beat_of, ledger, robird, scene_of
+from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of
+from tests.sim.effects.driving import robird
 
 OMEGA = 2 * np.pi * AIR.flap_frequency
 D, T = 0.01, 0.04
@@ -45,14 +45,23 @@ def respond(harmonic: int, mean: float, wave: float, beats: int = 6, steps: int 
 
 @pytest.mark.parametrize("harmonic", [1, 2, 4])
 def test_speed_under_a_wave_of_load_in_closed_form(harmonic: int) -> None:
-    """sigma (1 + s T + g w / s) = -d P s / (s + l w) with s = i n w; what mean load there is is not felt."""
+    """sigma (1 + s T + w / s) = -d P s / (s + w) with s = i n w; what mean load there is is not felt."""
     states = respond(harmonic, 5.0, 3.0)
     s = 1j * harmonic * OMEGA
-    sigma = -D * 3.0 * s / (s + LEARNING * OMEGA) / (1 + s * T + GOVERNOR * OMEGA / s)
+    sigma = -D * 3.0 * s / (s + OMEGA) / (1 + s * T + OMEGA / s)
     found = 2 * np.fft.rfft(states, axis=0)[harmonic] / len(states)
     assert found[1] == pytest.approx(sigma, rel=1e-5)
     assert found[0] == pytest.approx(sigma / s, rel=1e-5)
     np.testing.assert_allclose(states.mean(axis=0), [0.0, 0.0, 5.0], atol=1e-5)
+
+
+@pytest.mark.parametrize(("harmonic", "part", "early"), [(1, 0.86, 96.0), (2, 1.14, 38.0), (4, 1.05, 16.0)])
+def test_what_governor_and_mean_make_of_the_speed_is_as_the_page_says(harmonic: int, part: float, early: float) -> None:
+    """Beside a motor of the same droop without them, -d P / (1 + s T)."""
+    plain = -D * 3.0 / (1 + 1j * harmonic * OMEGA * T)
+    found = 2 * np.fft.rfft(respond(harmonic, 0.0, 3.0)[:, 1])[harmonic] / 400 / plain
+    assert abs(found) == pytest.approx(part, abs=0.005)
+    assert np.degrees(np.angle(found)) == pytest.approx(early, abs=0.6)
 
 
 def test_a_fast_motor_under_fast_load_falls_back_by_d_times_the_load() -> None:
@@ -65,7 +74,7 @@ def test_a_fast_motor_under_fast_load_falls_back_by_d_times_the_load() -> None:
 
 @cache
 def beat(d: float = 0.01, t: float = 0.02, steps: int = 192) -> Beat:
-    return beat_of("compliant_drive", AIR, steps, {}, d=d, t=t)
+    return beat_of("compliant_drive", AIR, steps, d=d, t=t)
 
 
 def states_of(one: Beat) -> Array:

@@ -13,7 +13,7 @@ from tests.sim.marching import LENGTH, plank
 
 def kept(structure: Structure, **values: float) -> Array:
     """Part [C] of each connector's stiffness that is left; of all axes, and of its damping, the same."""
-    whole, hurt = (scene_of(structure, "damage", **(values | more)).lanes for more in ({"loss": 0.0}, {}))
+    whole, hurt = (scene_of("damage", structure, **(values | more)).lanes for more in ({"loss": 0.0}, {}))
     found = hurt.stiffness[:, 0, 0] / whole.stiffness[:, 0, 0]
     np.testing.assert_allclose(hurt.stiffness, whole.stiffness * found[:, None, None], rtol=1e-12)
     np.testing.assert_allclose(hurt.damping, whole.damping * found[:, None, None], rtol=1e-12)
@@ -88,6 +88,6 @@ def test_a_damaged_wing_swings_further_and_a_mended_one_less() -> None:
 
 @pytest.mark.parametrize("loss", [0.9, -2.0])
 def test_ledger_of_the_whole_wing_closes(loss: float) -> None:
-    beat = beat_of("damage", "11", steps=200, loss=loss)
+    beat = beat_of("damage", division="11", steps=200, loss=loss)
     assert ledger(beat, 3.0) < 5e-4
     assert np.all(beat.power[:, 0] <= 0)

@@ -6,8 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sim.kernels.arrays import ALPHA, CIRCULATION, SPEED
+from sim.flexible_wing import FlexibleWing
+from sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, SPEED
+from sim.rig import blank_recording
 from tests.sim.effects.moved import History, Motion, Moved
+from tests.sim.effects.rigs import CONDITIONS, wing_model
 from tests.sim.marching import CHORD
 
 Array = npt.NDArray[np.float64]
@@ -52,6 +55,33 @@ def test_at_rest_the_lift_is_kirchhoffs() -> None:
     half = Moved("dynamic_stall", {"share": 0.5, "angle": ANGLE, "width": WIDTH}, airspeed=AIRSPEED, genes=PLAIN)
     _, less = lift(half.march(lambda _: Motion(pitch=alpha), 0.1 * CHORD / AIRSPEED, 100))
     np.testing.assert_allclose(less[-1], 0.5 * (5.0 * alpha + cl[-1]), rtol=1e-6)
+
+
+def test_the_slope_is_stalled_like_the_lift() -> None:
+    """At a held separation the lift is this part of the attached one, and so is its change with alpha."""
+    alpha = np.linspace(0.1, 0.7, 8)
+    values = {"share": 0.7, "angle": ANGLE, "width": WIDTH}
+    moved = Moved("dynamic_stall", values, airspeed=AIRSPEED, genes=PLAIN)
+    history = moved.march(lambda _: Motion(pitch=alpha), 0.1 * CHORD / AIRSPEED, 100)
+    left = 1 - 0.7 * (1 - kirchhoff(alpha))
+    assert left.min() < 0.5
+    np.testing.assert_allclose(history.loads[-1, 0, LIFT_SLOPE], 5.0 * AIRSPEED * left, rtol=1e-5)
+
+
+def test_circulation_of_rotation_does_not_stall() -> None:
+    """Kirchhoff's law is one of the angle of attack: a wing without such lift moves as without stall."""
+    model = wing_model().with_effects("dynamic_stall", "rotational_circulation")
+    assert isinstance(model, FlexibleWing)
+    recording = blank_recording(model.wing, CONDITIONS["air"])
+    told = {gene.name: gene.nominal for gene in model.genes} | {"L_a": 0.0, "L_b": 0.0}
+    told["dynamic_stall.angle"] = 0.15
+    tracks = []
+    for share, coefficient in ((0.0, 0.0), (0.0, 6.0), (1.0, 6.0)):
+        told |= {"dynamic_stall.share": share, "rotational_circulation.coefficient": coefficient}
+        tracks.append(model.beat([told[gene.name] for gene in model.genes], recording).tracks)
+    plain, rotating, stalled = tracks
+    assert np.abs(rotating - plain).max() > 5e-4
+    assert np.abs(stalled - rotating).max() < 2e-5, "but for what is left of the way to the periodic motion"
 
 
 def test_stall_is_late_on_the_way_up_and_more_so_at_higher_frequency() -> None:

@@ -5,19 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.sim.effects.driving import (
-    AIR,
-    SLOW,
-    Array,
-    beat_of,
-    ledger,
-    off_axis,
-    robird,
-    rods_of,
-    scene_of,
-    stiff_tracks,
-    turned,
-)
+from tests.sim.effects.bench import AIR, beat_of, ledger, scene_of
+from tests.sim.effects.driving import SLOW, Array, off_axis, robird, rods_of, stiff_tracks, turned
 from tests.sim.marching import ORDER, order
 
 X = np.array([1.0, 0.0, 0.0])
@@ -60,4 +49,4 @@ def test_raising_the_axis_carries_the_wing_outboard_on_the_upstroke() -> None:
 
 @pytest.mark.parametrize("end", [-0.025, 0.025])
 def test_the_work_of_the_motors_closes_the_ledger(end: float) -> None:
-    assert ledger(beat_of("hinge_offset", AIR, 96, {}, y=end, z=end), AIR.flap_frequency) < 1e-4
+    assert ledger(beat_of("hinge_offset", AIR, 96, y=end, z=end), AIR.flap_frequency) < 1e-4

@@ -6,18 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.sim.effects.driving import (
-    AIR,
-    SLOW,
-    beat_of,
-    ledger,
-    off_axis,
-    robird,
-    rods_of,
-    scene_of,
-    stiff_tracks,
-    turned,
-)
+from tests.sim.effects.bench import AIR, beat_of, ledger, scene_of
+from tests.sim.effects.driving import SLOW, off_axis, robird, rods_of, stiff_tracks, turned
 from tests.sim.marching import ORDER, order
 
 Y, Z = 0.08, -0.05
@@ -52,4 +42,4 @@ def test_a_stiff_wing_follows_the_tilted_axis() -> None:
 
 @pytest.mark.parametrize("end", [-0.2, 0.2])
 def test_the_work_of_the_motors_closes_the_ledger(end: float) -> None:
-    assert ledger(beat_of("hinge_tilt", AIR, 96, {}, y=end, z=end), AIR.flap_frequency) < 1e-4
+    assert ledger(beat_of("hinge_tilt", AIR, 128, y=end, z=end), AIR.flap_frequency) < 1e-4

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.effects.hysteresis import _law
 from sim.effects.joints import Joints
 from tests.sim.effects.bench import Array, Bench, beat_of, ledger
 
@@ -34,7 +33,7 @@ def textbook(phi: Array, beta: float, gamma: float, n: float) -> Array:
 
 @pytest.mark.parametrize(("gamma", "n"), [(0.5, 1.0), (-0.5, 1.0), (0.0, 2.5)])
 def test_loop_is_that_of_an_independent_integration(gamma: float, n: float) -> None:
-    bench = Bench.of("hysteresis", _law, k=K, yield_angle=YIELD, gamma=gamma, n=n)
+    bench = Bench.of("hysteresis", k=K, yield_angle=YIELD, gamma=gamma, n=n)
     top = largest(bench)
     phi = 2 * top * np.sin(np.linspace(0, 4 * np.pi, 801))
     moment, _, lost, _ = bench.swing(0, phi, 1e-3)
@@ -49,7 +48,7 @@ def test_loop_is_that_of_an_independent_integration(gamma: float, n: float) -> N
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_goes_to_its_plateau_exponentially(axis: int, side: float) -> None:
     """z_max = (1 / (beta + gamma))^(1 / n); on the way there, for n = 1, z = z_max (1 - exp(-phi / z_max))."""
-    bench = Bench.of("hysteresis", _law, k=K, yield_angle=YIELD, n=1.0)
+    bench = Bench.of("hysteresis", k=K, yield_angle=YIELD, n=1.0)
     top = largest(bench)
     phi = side * np.linspace(0, 12 * top, 601)
     moment, _, _, _ = bench.swing(axis, phi, 1e-3)
@@ -60,7 +59,7 @@ def test_goes_to_its_plateau_exponentially(axis: int, side: float) -> None:
 @pytest.mark.parametrize("gamma", [-0.5, 0.0, 0.5])
 @pytest.mark.parametrize("n", [1.0, 4.0])
 def test_never_gives_energy(gamma: float, n: float) -> None:
-    bench = Bench.of("hysteresis", _law, gamma=gamma, n=n)
+    bench = Bench.of("hysteresis", gamma=gamma, n=n)
     t = np.linspace(0, 1, 401)
     _, kept, lost, given = bench.swing(1, 0.05 * np.sin(20 * t) + 0.03 * np.sin(53 * t), t[1])
     np.testing.assert_allclose(kept + lost, given, atol=1e-3 * given[-1])
@@ -70,7 +69,7 @@ def test_never_gives_energy(gamma: float, n: float) -> None:
 
 @pytest.mark.parametrize("states", [(0.01, -0.02), (-0.012, 0.03)])
 def test_tells_its_derivatives(states: tuple[float, float]) -> None:
-    bench = Bench.of("hysteresis", _law, gamma=0.2, n=1.7)
+    bench = Bench.of("hysteresis", gamma=0.2, n=1.7)
     bench.derivatives(np.zeros(3), np.array([0.4, -0.3, 0.0]), np.array(states), [0, 1])
 
 

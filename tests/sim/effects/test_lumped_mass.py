@@ -25,7 +25,7 @@ MASS = 0.004
 def test_moves_with_the_energy_of_a_point(division: str, station: float, chord: float) -> None:
     """m v^2 / 2 of the point at that place of the wing, however its body turns and moves."""
     structure = build(robird_wing(), Division.parse(division))
-    group = scene_of(structure, "lumped_mass", mass=MASS, station=station, chord=chord).frozen()
+    group = scene_of("lumped_mass", structure, mass=MASS, station=station, chord=chord).frozen()
     (pair,) = group.pairs
     body, block = structure.bodies[pair[0]], group.masses[0, :, 0].reshape(6, 6)
     assert group.weighing == 1
@@ -87,4 +87,4 @@ def test_a_tip_mass_lags_more_than_one_at_the_root() -> None:
 
 @pytest.mark.parametrize("station", [0.0, 1.0])
 def test_ledger_of_the_whole_wing_closes(station: float) -> None:
-    assert ledger(beat_of("lumped_mass", "11", steps=200, station=station, chord=1.0), 3.0) < 5e-4
+    assert ledger(beat_of("lumped_mass", division="11", steps=200, station=station, chord=1.0), 3.0) < 5e-4

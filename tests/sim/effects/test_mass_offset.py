@@ -19,7 +19,7 @@ from tests.sim.marching import CHORD, DENSITY, LENGTH, THICKNESS, plank
 def test_every_body_moves_with_the_energy_of_its_own_mass_further_aft(distance: float, division: str) -> None:
     """m (v + omega x e)^2 / 2 + omega I omega / 2, and not the least energy more: nothing can have a negative one."""
     structure = build(robird_wing(), Division.parse(division))
-    group = scene_of(structure, "mass_offset", distance=distance).frozen()
+    group = scene_of("mass_offset", structure, distance=distance).frozen()
     assert group.weighing == len(group.pairs) == len(structure.bodies)
     rng = np.random.default_rng(2)
     for (first, second, _), block in zip(group.pairs, group.masses[..., 0].reshape(-1, 6, 6), strict=True):
@@ -60,4 +60,4 @@ def test_both_signs_move_the_wing_to_opposite_sides() -> None:
 def test_ledger_of_the_whole_wing_closes_at_both_ends(end: float) -> None:
     gene = EFFECTS["mass_offset"].genes(robird_wing())[0]
     distance = gene.upper if end > 0 else gene.lower
-    assert ledger(beat_of("mass_offset", "11", steps=200, distance=distance), 3.0) < 5e-4
+    assert ledger(beat_of("mass_offset", division="11", steps=200, distance=distance), 3.0) < 5e-4

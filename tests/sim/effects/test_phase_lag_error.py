@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.sim.effects.driving import AIR, Array, beat_of, ledger, robird, scene_of
+from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of
+from tests.sim.effects.driving import robird
 
 PSI = 2 * np.pi * np.arange(64) / 64
 
@@ -32,12 +33,12 @@ def test_a_late_rear_rod_is_lower_on_the_upstroke() -> None:
 
 
 def test_the_wing_moves_as_if_the_condition_had_that_lag() -> None:
-    told = beat_of("phase_lag_error", AIR, 64, {}, angle=0.03)
-    true = beat_of("phase_lag_error", replace(AIR, phase_lag=AIR.phase_lag + 0.03), 64, {}, angle=0.0)
+    told = beat_of("phase_lag_error", AIR, 64, angle=0.03)
+    true = beat_of("phase_lag_error", replace(AIR, phase_lag=AIR.phase_lag + 0.03), 64, angle=0.0)
     np.testing.assert_allclose(told.tracks, true.tracks, atol=5e-6)
-    assert np.abs(told.tracks - beat_of("phase_lag_error", AIR, 64, {}).tracks).max() > 1e-3
+    assert np.abs(told.tracks - beat_of("phase_lag_error", AIR, 64, angle=0.0).tracks).max() > 1e-3
 
 
 @pytest.mark.parametrize("end", [-0.15, 0.15])
 def test_the_work_of_the_motors_closes_the_ledger(end: float) -> None:
-    assert ledger(beat_of("phase_lag_error", AIR, 96, {}, angle=end), AIR.flap_frequency) < 1e-4
+    assert ledger(beat_of("phase_lag_error", AIR, 96, angle=end), AIR.flap_frequency) < 1e-4

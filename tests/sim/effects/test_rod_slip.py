@@ -7,17 +7,18 @@ import pytest
 
 from sim.division import Division
 from sim.effects.joints import Joints
-from sim.effects.rod_slip import _SHAKE, _law, of_rods
+from sim.effects.rod_slip import of_rods
 from sim.rig import robird_wing
 from sim.structure import build
 from sim.wing_genes import wing_genes
 from tests.sim.effects.bench import Array, Bench, beat_of, excursion, ledger, scene_of
 
 FRICTION, CLEARANCE, STICK = 0.05, 0.04, 0.3
+SHAKE = 0.1  # e of the page
 
 
 def bench_of(clearance: float = CLEARANCE) -> Bench:
-    return Bench.of("rod_slip", _law, friction=FRICTION, clearance=clearance, stick=STICK)
+    return Bench.of("rod_slip", friction=FRICTION, clearance=clearance, stick=STICK)
 
 
 def part_of(bench: Bench) -> float:
@@ -32,7 +33,7 @@ def spring_of(bench: Bench) -> float:
 def plateau(bench: Bench, friction: float, clearance: float) -> float:
     """Moment at which rods slip freely: h / h_max + e w / w_max = 1."""
     most = friction + clearance
-    h = (1 - _SHAKE * clearance / most) / (1 / friction + _SHAKE / most)
+    h = (1 - SHAKE * clearance / most) / (1 / friction + SHAKE / most)
     return spring_of(bench) * h * part_of(bench)
 
 
@@ -57,7 +58,7 @@ def test_dead_band_is_the_play() -> None:
     phi = there_and_back(bench, 0.6)[:1600]
     moment, _, _, _ = bench.swing(0, phi, 1e-3)
     dead = np.abs(np.diff(phi[800:])).mean() * np.count_nonzero(moment[800:] == 0.0)
-    share = _SHAKE * CLEARANCE / (CLEARANCE + FRICTION)
+    share = SHAKE * CLEARANCE / (CLEARANCE + FRICTION)
     stretched = np.log((1 + share) / (1 - share)) / (2 * share)
     assert dead == pytest.approx(2 * CLEARANCE * part_of(bench) * stretched, rel=0.02)
     assert stretched == pytest.approx(1, abs=0.01)
@@ -78,7 +79,7 @@ def test_loop_without_play_is_dahls() -> None:
     phi = np.linspace(0, 3 * most, 1001)
     moment, _, _, _ = bench.swing(0, phi, 1e-3)
     top = plateau(bench, FRICTION, 0.0)
-    np.testing.assert_allclose(moment, -top * (1 - np.exp(-phi * (1 + _SHAKE) / most)), atol=1e-5 * top)
+    np.testing.assert_allclose(moment, -top * (1 - np.exp(-phi * (1 + SHAKE) / most)), atol=1e-5 * top)
 
 
 def test_loses_the_area_of_its_loop() -> None:
@@ -100,7 +101,7 @@ def test_tells_its_derivatives(state: float, rate: float) -> None:
 def test_only_connectors_with_rods_slip_and_by_what_rods_add() -> None:
     """On a wing whose rods run all along a connector, E_r I_r over its length."""
     structure = build(robird_wing(), Division.parse("11"))
-    found = of_rods(scene_of(structure, "rod_slip"))[:, 0]
+    found = of_rods(scene_of("rod_slip", structure))[:, 0]
     modulus = {gene.name: gene.nominal for gene in wing_genes(structure.wing.estimates)}["E_r"]
     for k, c in enumerate(structure.connectors):
         whole = c.rods[c.parts > 0]

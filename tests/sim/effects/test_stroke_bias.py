@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.sim.effects.driving import AIR, SLOW, beat_of, ledger, robird, scene_of, stiff_tracks, turned
+from tests.sim.effects.bench import AIR, beat_of, ledger, scene_of
+from tests.sim.effects.driving import SLOW, robird, stiff_tracks, turned
 
 X = np.array([1.0, 0.0, 0.0])
 
@@ -20,10 +21,10 @@ def test_only_the_mean_moves_of_both_rods(angle: float) -> None:
 def test_a_stiff_wing_stands_higher_by_the_angle_at_every_phase() -> None:
     tracks = stiff_tracks("stroke_bias", angle=0.1)
     psi = 2 * np.pi * np.arange(len(tracks)) / len(tracks)
-    flap = scene_of("stroke_bias", robird(), SLOW).rods.angles(psi)[:, 0, 0, 0]
+    flap = scene_of("stroke_bias", robird(), SLOW, angle=0.0).rods.angles(psi)[:, 0, 0, 0]
     np.testing.assert_allclose(tracks, turned(robird(), flap + 0.1, X, np.zeros(3)), atol=1e-4)
 
 
 @pytest.mark.parametrize("end", [-0.2, 0.2])
 def test_the_work_of_the_motors_closes_the_ledger(end: float) -> None:
-    assert ledger(beat_of("stroke_bias", AIR, 96, {}, angle=end), AIR.flap_frequency) < 1e-4
+    assert ledger(beat_of("stroke_bias", AIR, 96, angle=end), AIR.flap_frequency) < 1e-4

@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.effects.viscoelastic import _law
 from tests.sim.effects.bench import Bench, beat_of, excursion, ledger
 
 K, TAU = 0.3, 0.05
@@ -12,7 +11,7 @@ K, TAU = 0.3, 0.05
 @pytest.mark.parametrize("axis", [0, 1])
 def test_relaxes_exponentially(axis: int) -> None:
     """A sudden strain makes K k times it, which dies as exp(-t / tau) (Ferry 1980, ch. 1)."""
-    bench = Bench.of("viscoelastic", _law, k=K, tau=TAU)
+    bench = Bench.of("viscoelastic", k=K, tau=TAU)
     held = np.concatenate([[0.0], np.full(200, 0.02)])
     moment, _, _, _ = bench.swing(axis, held, 1e-3)
     start = -K * bench.stiffness[axis] * 0.02
@@ -23,7 +22,7 @@ def test_relaxes_exponentially(axis: int) -> None:
 @pytest.mark.parametrize("speed", [0.3, 1.0, 3.0])
 def test_has_the_complex_modulus_of_the_standard_linear_solid(speed: float) -> None:
     """K k i x / (1 + i x) with x = omega tau, beside the spring that stays."""
-    bench = Bench.of("viscoelastic", _law, k=K, tau=TAU)
+    bench = Bench.of("viscoelastic", k=K, tau=TAU)
     n, omega = 128, speed / TAU
     beats = max(2, int(np.ceil(10 * TAU * omega / (2 * np.pi))) + 1)
     psi = 2 * np.pi / n * np.arange(beats * n + 1)
@@ -34,7 +33,7 @@ def test_has_the_complex_modulus_of_the_standard_linear_solid(speed: float) -> N
 
 
 def test_loses_what_it_does_not_keep() -> None:
-    bench = Bench.of("viscoelastic", _law)
+    bench = Bench.of("viscoelastic")
     t = np.linspace(0, 1, 301)
     _, kept, lost, given = bench.swing(0, 0.03 * np.sin(20 * t) + 0.01 * np.sin(47 * t), t[1])
     np.testing.assert_allclose(kept + lost, given, atol=1e-6 * given[-1])
@@ -43,7 +42,7 @@ def test_loses_what_it_does_not_keep() -> None:
 
 
 def test_tells_its_derivatives() -> None:
-    bench = Bench.of("viscoelastic", _law)
+    bench = Bench.of("viscoelastic")
     bench.derivatives(np.zeros(3), np.array([0.4, -0.3, 0.0]), np.array([0.02, -0.01]), [0, 1])
 
 
