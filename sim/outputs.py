@@ -29,6 +29,7 @@ from sim.structure import Structure
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Kind = Literal["root", "spanwise", "chordwise"]
+_ACROSS = [0, 1, 5]  # of a twist: what moves air along a plate's normal
 RODS = ("front rod", "rear rod")
 
 
@@ -182,6 +183,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
     for c in range(len(structure.connectors)):
         _connector(parts, c, groups, sums)
     _air_and_energies(parts, groups, sums)
+    _moved_air(parts, scene, motion, sums)
     incidence = _incidence(scene.condition)
     return Outputs(
         phase=np.arange(n) / n,
@@ -299,9 +301,36 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
         sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:kept, :n]
         kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
         add_energies(
-            group.pairs, group.masses, group.weighing, here.gravity, here.wind, work.R, work.p, work.V, kinetic, height
-        )
+            group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,
+            work.R, work.p, work.V, kinetic, height,
+        )  # fmt: skip
         sums.kinetic[rows], sums.gravitational[rows] = kinetic[:kept], height[:kept]
+
+
+def _moved_air(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> None:
+    """Add the reaction -N q' of air that the bodies move along (:mod:`sim.kernels.masses`), q' by the beat's series.
+
+    To the integrator it is inertia; to the wing it is a load of the air.
+    """
+    group, structure = parts.lanes, scene.structure
+    if len(group.pairs) == group.weighing:
+        return
+    n, bodies = motion.V.shape[0], len(structure.bodies)
+    turn = motion.R[:, :bodies].reshape(n, bodies, 3, 3)
+    q = motion.V[:, :bodies, _ACROSS].copy()
+    q[..., 2] -= turn[..., :, 2] @ parts.here.wind[:, 0]
+    momentum = np.zeros_like(q)
+    for (i, j, _), block in zip(group.pairs[group.weighing :], group.masses[group.weighing :, :, 0], strict=True):
+        momentum[:, i] += q[:, j] @ block.reshape(6, 6)[np.ix_(_ACROSS, _ACROSS)].T
+    order = 2j * np.pi * scene.condition.flap_frequency * np.arange(n // 2 + 1)
+    wrench = np.zeros((n, bodies, 6))
+    wrench[..., _ACROSS] = -np.fft.irfft(np.fft.rfft(momentum, axis=0) * order[:, None, None], n, axis=0)
+    force = turn[..., 2] * wrench[..., 5:]
+    power = (wrench * motion.V[:, :bodies]).sum(axis=2)
+    starts = structure.wiring.strip_start[:-1]
+    sums.air_wrench += wrench
+    sums.strip_force += np.add.reduceat(force, starts, axis=1)
+    sums.strip_power += np.add.reduceat(power, starts, axis=1)
 
 
 def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
