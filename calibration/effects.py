@@ -8,6 +8,9 @@ from sim.effects.contract import Effect
 from sim.effects.registry import EFFECTS
 from sim.wing_genes import Group, group
 
+# Aerodynamic, and yet fitted in vacuum: in air it only scales what the coefficients of the air scale as well.
+_SEEN_IN_VACUUM = ("residual_air",)
+
 
 def effect_of(gene: str) -> Effect | None:
     """The effect that a gene belongs to; None for a gene of the model itself."""
@@ -32,7 +35,14 @@ def group_of(gene: str) -> Group:
     effect = effect_of(gene)
     if effect is None:
         return group(gene)
-    return "aerodynamics" if effect.family == "aerodynamics" else "structure"
+    in_air = effect.family == "aerodynamics" and effect.name not in _SEEN_IN_VACUUM
+    return "aerodynamics" if in_air else "structure"
+
+
+def is_measured(gene: str) -> bool:
+    """Whether a gene belongs to a fault of a measurement, which the forces or the wing themselves know nothing of."""
+    effect = effect_of(gene)
+    return effect is not None and effect.family == "measurement"
 
 
 def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[str, float]) -> None:
@@ -54,6 +64,6 @@ def absent(genome: Mapping[str, float], free: Collection[str]) -> tuple[str, ...
         if any(genome[size] != 0.0 for size in sizes(effect)):
             continue
         idle = [name for name in free if effect_of(name) is effect and name not in sizes(effect)]
-        without = f", and {', '.join(idle)} are not determined" if idle else ""
+        without = f", and {', '.join(idle)} {'is' if len(idle) == 1 else 'are'} not determined" if idle else ""
         remarks.append(f"effect {effect.name!r} is switched off in the best genome{without}")
     return tuple(remarks)

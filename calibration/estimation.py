@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from calibration.beats import FEWEST_MEAN, without_mean_beat
 from calibration.cutting import Cut
-from calibration.effects import absent
+from calibration.effects import absent, is_measured
 from calibration.evaluation import POINTS, agreements, comparison, quantities
 from calibration.evaluator import Evaluator
 from calibration.force_result import (
@@ -131,15 +131,20 @@ def compare_forces(
 def predict(
     spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
 ) -> Prediction:
-    """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it."""
+    """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it.
+
+    They are those of the vehicle: faults of the measurement that the calibration found are left out.
+    """
     spec = resolved(spec, dataset)
     model = vehicle_model(dataset, spec)
+    law = replace(law, genes=tuple(gene for gene in law.genes if not is_measured(gene.name)))
+    fixed = {name: value for name, value in spec.fixed.items() if not is_measured(name)}
     values, remarks = _by_law(model, law, condition)
     times = np.arange(points) / (points * condition.flap_frequency)
     blank = Recording(
         "prediction", "wind_tunnel", condition, times, (), np.full((points, 2), np.nan), forces=("x", "z")
     )
-    forces = _observed(model, blank, [base_genome(model, spec.fixed).replace(values)])[0]
+    forces = _observed(model, blank, [base_genome(model, fixed).replace(values)])[0]
     phase = np.arange(points) / points
     return Prediction(phase, quantities(blank, forces), values, remarks)
 
@@ -269,8 +274,8 @@ def _lacking(judged: _Judged, everywhere: list[_Compared]) -> str | None:
     beside = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
     return (
         f"{judged.estimate.name}: the best coefficients leave {left * 1e3:.3g} mN, {beside}: the model or its motion "
-        f"lacks something, or the search was cut short. Standard errors count on at most {ADEQUATE:g} times the "
-        f"scatter, so no coefficient is called told"
+        f"lacks something ('wingfit effects' lists what can be added), or the search was cut short. Standard errors "
+        f"count on at most {ADEQUATE:g} times the scatter, so no coefficient is called told"
     )
 
 
@@ -322,7 +327,7 @@ def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]
 
 
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
-    """Genes with the mean of the estimates, the largest of their relative errors, and whether all can tell them."""
+    """Genes with the mean of the estimates, the largest of their errors, and whether all can tell them."""
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
     for gene in model.genes:
@@ -340,6 +345,7 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adeq
                 bool(standings),
                 max(s.standard_error for s in standings) if standings else None,
                 adequate and all(s.identifiable for s in standings) and all(free) if standings else None,
+                max(s.absolute for s in standings) if standings else None,
             )
         )
     return tuple(results)

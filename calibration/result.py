@@ -34,7 +34,7 @@ class GeneResult:
 
     ``standard_error`` is relative to the value (:mod:`calibration.uncertainty`); ``identifiable``
     says whether the data can tell the gene: an error of at most 7.5 %, a value off its bounds, and a misfit that noise
-    explains (ADEQUATE); None where the gene was not searched.
+    explains (ADEQUATE); None where the gene was not searched. ``absolute_error`` is the standard error in ``unit``.
     """
 
     name: str
@@ -47,6 +47,7 @@ class GeneResult:
     searched: bool
     standard_error: float | None
     identifiable: bool | None
+    absolute_error: float | None = None
 
 
 @dataclass(frozen=True)
@@ -140,8 +141,9 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
     if noise is not None and not adequate:
         remarks.append(
             f"the best genome leaves {after * 1e3:.2f} mm on the fitted recordings, {after / noise:.1f} times what "
-            f"tracking noise leaves: the search was cut short, or the model (its division, say) lacks something. "
-            f"Standard errors count on a misfit of at most {ADEQUATE:g} times the noise, so no gene is called told"
+            f"tracking noise leaves: the search was cut short, or the model lacks something: try a finer division, or "
+            f"effects ('wingfit effects' lists them). Standard errors count on a misfit of at most {ADEQUATE:g} times "
+            f"the noise, so no gene is called told"
         )
     remarks += absent(best.as_dict(), [name for stage in stages for name in stage.free])
     return Result(
@@ -194,9 +196,15 @@ def _genes(
             gene.name in known,
             known[gene.name].standard_error if gene.name in known else None,
             known[gene.name].identifiable and adequate and not _at_bound(gene, best) if gene.name in known else None,
+            _absolute(gene, known[gene.name], after[gene.name]) if gene.name in known else None,
         )
         for gene in model.genes
     )
+
+
+def _absolute(gene: Gene, found: Standing, best: float) -> float:
+    """Standard error in the gene's unit; of a share, of its normalised value ``best``."""
+    return found.absolute if gene.share_of is None else found.standard_error * best
 
 
 def _at_bound(gene: Gene, best: Genome) -> bool:

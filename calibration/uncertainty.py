@@ -25,10 +25,14 @@ SMALL = 0.05  # of the box: what a value of a linear gene is at least compared w
 
 @dataclass(frozen=True)
 class Standing:
-    """Relative standard error of a gene (of a share: when normalised), and whether it is at most IDENTIFIABLE."""
+    """Relative standard error of a gene (of a share: when normalised), and whether it is at most IDENTIFIABLE.
+
+    ``absolute`` is the standard error in the gene's unit (of a share: of its weight).
+    """
 
     standard_error: float
     identifiable: bool
+    absolute: float
 
 
 @dataclass(frozen=True)
@@ -72,7 +76,10 @@ class Uncertainty:
     def standing(self) -> dict[str, Standing]:
         """Standing of each gene."""
         errors = np.where(self.told, np.sqrt(np.diag(self.relative)), np.inf)
-        return {n: Standing(float(e), bool(e <= IDENTIFIABLE)) for n, e in zip(self.free, errors, strict=True)}
+        absolute = self.standard_errors
+        return {
+            n: Standing(float(e), bool(e <= IDENTIFIABLE), absolute[n]) for n, e in zip(self.free, errors, strict=True)
+        }
 
 
 def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
@@ -84,7 +91,7 @@ def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
     try:
         return uncertainty(problem, evaluator).standing
     except ValueError:
-        return {name: Standing(np.inf, False) for name in problem.free}
+        return {name: Standing(np.inf, False, np.inf) for name in problem.free}
 
 
 def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:

@@ -107,7 +107,7 @@ class HistoryItem(TypedDict):
 
 
 class GeneInfo(TypedDict):
-    """One gene, nominal and best, with its bounds and whether the data can tell it."""
+    """One gene, nominal and best, with its bounds and whether the data can tell it; ``standard_error`` in ``unit``."""
 
     name: str
     unit: str
@@ -119,6 +119,7 @@ class GeneInfo(TypedDict):
     searched: bool
     standard_error_percent: float | None
     identifiable: bool | None
+    standard_error: float | None
 
 
 class GenomeInfo(TypedDict):

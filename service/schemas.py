@@ -213,6 +213,7 @@ class GeneOut(BaseModel):
     searched: bool
     standard_error_percent: float | None
     identifiable: bool | None
+    standard_error: float | None = None
 
 
 class GenomeOut(BaseModel):

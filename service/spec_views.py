@@ -8,12 +8,16 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from calibration.effects import effect_of
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service.problems import ErrorItem, error_item, invalid
 from service.spec_parts import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
 from service.spec_schemas import RunIn, SpecOut, VehicleModel
 from service.units import MM, tidy_mm
+from sim.blade_element_wing import BladeElementWing
+from sim.blades.terms import PRESETS
+from sim.blades.terms import chosen as terms_of
 from sim.effects.registry import chosen
 
 # A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
@@ -74,16 +78,41 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
             raise invalid("the low-pass does not fit", [error_item("body.low_pass_hz", low_pass_hz, message)])
 
 
-def refuse_effects(names: Sequence[str], dataset: Dataset) -> None:
-    """A 422 for effects that are unknown, named twice, or of no use to what the dataset describes."""
-    faults = []
+def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel | None = None) -> None:
+    """A 422 for effects that are unknown, named twice, of no use to what the dataset describes, or terms already.
+
+    What is known is listed with the first that is not.
+    """
+    faults, listed = [], set[str]()
     for place, name in enumerate(names):
         try:
             chosen([name] * names[: place + 1].count(name), dataset.rig)
+            _refuse_terms(name, dataset, vehicle)
         except ValueError as error:
-            faults.append(error_item(f"body.effects.{place}", name, str(error)))
+            head, _, known = str(error).partition("; there are ")
+            message = f"{head}; see those named above" if known and known in listed else str(error)
+            listed.add(known)
+            faults.append(error_item(f"body.effects.{place}", name, message))
     if faults:
         raise invalid("the model cannot contain these effects; GET /v1/effects lists them all", faults)
+
+
+def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
+    """Faults for the genes among ``named`` (place in the request, name) that are not ``known``: listed once."""
+    faults, remedy = [], f"known are {', '.join(known)}"
+    for where, name in named:
+        if name in known:
+            continue
+        effect = effect_of(name)
+        if effect:
+            message = (
+                f"belongs to effect {effect.name!r}, which the request does not include; name it in 'effects' "
+                f"(--with {effect.name})"
+            )
+        else:
+            message, remedy = f"unknown gene; {remedy}", "see those named above"
+        faults.append(error_item(where, name, message))
+    return faults
 
 
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
@@ -117,6 +146,19 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
     if spec.finish:
         method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
     return ", ".join(part for part in (dataset.name, model, spec.mode, method) if part)[:LONGEST_NAME]
+
+
+def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:
+    """ValueError where the model of a vehicle has the effect as a term already, or its wings do not meet."""
+    if vehicle is None or dataset.kind != "forces" or set(vehicle.without) - set(PRESETS[vehicle.preset].terms):
+        return  # what is wrong with the terms is said of them
+    terms = terms_of(vehicle.preset, tuple(vehicle.without))
+    if name in terms:
+        raise ValueError(
+            f"effect {name!r} is a term of the model {vehicle.preset!r} already; leave the effect out, or the term: "
+            f'without: ["{name}"] (--without {name})'
+        )
+    BladeElementWing(dataset.vehicle, terms, effects=(name,))
 
 
 def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorItem]:

@@ -87,6 +87,7 @@ def gene(result: GeneResult) -> schemas.GeneOut:
         searched=result.searched,
         standard_error_percent=None if error is None else finite(100.0 * error),
         identifiable=result.identifiable,
+        standard_error=None if result.absolute_error is None else finite(result.absolute_error),
     )
 
 

@@ -15,10 +15,19 @@ With = Annotated[
     typer.Option("--with", help="Include these effects of 'wingfit effects', e.g. added_mass,hinge_offset."),
 ]
 
+MEASURES = {"span": "span", "chord": "mean chord", "mass": "mass of the wing"}
+
 
 def names(words: list[str] | None) -> list[str] | None:
     """Effects named in ``words``, each of which may name several, separated by commas; None where none is."""
-    return [name.strip() for word in words or [] for name in word.split(",")] or None
+    found = [name.strip() for word in words or [] for name in word.split(",")]
+    if "" in found:
+        raise typer.BadParameter(
+            "an effect without a name; give names of 'wingfit effects', such as added_mass,hinge_offset, or leave the "
+            "option out",
+            param_hint="--with",
+        )
+    return found or None
 
 
 def effects(
@@ -64,6 +73,8 @@ def _describe(effect: Effect) -> None:
     say("")
     columns = ["gene", ">typical", "bounds", "unit", "what it is"]
     table(columns, [_row(parameter) for parameter in effect["parameters"]])
+    for of, unit in dict.fromkeys((p["of"], p["unit"]) for p in effect["parameters"] if p["of"]):
+        say(f"'x {of}' is in parts of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
     say("zero in all genes marked 'size' switches it off; fit it: wingfit runs submit ID --with " + effect["name"])
 
 

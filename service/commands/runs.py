@@ -23,6 +23,7 @@ app = typer.Typer(no_args_is_help=True, help="Submit, watch and steer calibratio
 app.command()(forces)
 app.command()(predict)
 INTERRUPTED = 130
+CLEAR = 2.0  # standard errors from which a value differs from zero; the page says it alike (web/tables.js)
 
 
 @app.command("list")
@@ -293,7 +294,7 @@ def genes(items: list[a.GeneInfo]) -> None:
             number(g["best"]),
             g["unit"],
             f"[{number(g['lower'], 3)}, {number(g['upper'], 3)}]",
-            "–" if g["standard_error_percent"] is None else f"± {number(g['standard_error_percent'], 2)} %",
+            _error(g),
             told(g),
         ]
         for g in items
@@ -301,10 +302,21 @@ def genes(items: list[a.GeneInfo]) -> None:
     table(["gene", ">nominal", ">best", "unit", "bounds", ">error", "the data tell it"], rows)
 
 
+def _error(gene: a.GeneInfo) -> str:
+    """Standard error in per cent of the value or, where the nominal value is zero, in the gene's unit."""
+    absolute, percent = gene.get("standard_error"), gene["standard_error_percent"]
+    if gene["nominal"] == 0 and absolute is not None:
+        return f"± {number(absolute, 2)} {gene['unit'] if gene['unit'] != '1' else ''}".strip()
+    return "–" if percent is None else f"± {number(percent, 2)} %"
+
+
 def told(gene: a.GeneInfo) -> str:
     """Whether the data can tell a gene, in words."""
     if not gene["searched"]:
         return "not searched"
+    error = gene.get("standard_error")
+    if gene["nominal"] == 0 and error is not None and abs(gene["best"]) < CLEAR * error:
+        return "not different from zero"
     return {True: "yes", False: "no", None: "not known yet"}[gene["identifiable"]]
 
 

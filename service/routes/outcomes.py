@@ -167,7 +167,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     check_recording(dataset, body.recording, "body.recording")
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
-    spec_views.refuse_effects(body.effects, dataset)
+    spec_views.refuse_effects(body.effects, dataset, body)
     spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects, body)
     values = _asked(service, dataset, spec, body)
     try:
@@ -219,10 +219,9 @@ def _forces(
 def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
     """Full genome of a simulation; a 422 where it cannot be."""
     known = gene_names(service, spec, dataset)
-    unknown = [name for name in body.genome if name not in known]
-    if unknown:
-        message = f"unknown gene; known are {', '.join(known)}"
-        raise invalid("unknown genes", [error_item("body.genome", name, message) for name in unknown])
+    faults = spec_views.unknown_genes((("body.genome", name) for name in body.genome), known)
+    if faults:
+        raise invalid("the genome names genes that the model does not have", faults)
     try:
         return service.engine.genome(spec, dataset, body.genome)
     except ValueError as error:

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
 from starlette.responses import Response
 
-from calibration.effects import effect_of
 from calibration.search import CalibrationSpec
 from records import Dataset, EstimateError
 from service import http, spec_views, store, views
@@ -40,7 +39,7 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
     dataset = load(service, body.dataset_id)
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
-    spec_views.refuse_effects(body.effects, dataset)
+    spec_views.refuse_effects(body.effects, dataset, body)
     spec = _checked(service, spec_views.of_run(body), dataset)
     spec_views.refuse_idle(body, spec.method)
     name = body.name or spec_views.run_name(dataset, spec)
@@ -136,7 +135,8 @@ def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> Calib
     """The specification with everything decided, or a 422."""
     known_genes = gene_names(service, spec, dataset)
     known_recordings = tuple(recording.name for recording in dataset.recordings)
-    faults = _unknown("recordings", spec.recordings, known_recordings) + _unknown("genes", spec.genes, known_genes)
+    genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
+    faults = [*_unknown(spec.recordings, known_recordings), *spec_views.unknown_genes(genes, known_genes)]
     if faults:
         raise invalid("the request names what does not exist", faults)
     try:
@@ -145,16 +145,9 @@ def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> Calib
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
 
 
-def _remedy(name: str, known: tuple[str, ...]) -> str:
-    effect = effect_of(name)
-    if effect:
-        return f"belongs to effect {effect.name!r}, which the request does not include; name it in 'effects'"
-    return f"unknown; known are {', '.join(known)}"
-
-
-def _unknown(key: str, names: tuple[str, ...], known: tuple[str, ...]) -> list[dict[str, object]]:
+def _unknown(names: tuple[str, ...], known: tuple[str, ...]) -> list[dict[str, object]]:
     return [
-        error_item(f"body.{key}.{place}", name, _remedy(name, known))
+        error_item(f"body.recordings.{place}", name, f"unknown; known are {', '.join(known)}")
         for place, name in enumerate(names)
         if name not in known
     ]

@@ -123,9 +123,14 @@ function position({ lower, upper }, value) {
   return (f(value) - f(lower)) / (f(upper) - f(lower));
 }
 
+const CLEAR = 2; // standard errors from which a value differs from zero; the command line says it alike
+
 function told(gene) {
   if (!gene.searched) return "not searched";
   if (gene.identifiable === null) return "judged at the end";
-  const error = gene.standard_error_percent === null ? "" : ` ± ${kept(gene.standard_error_percent, 2)} %`;
-  return `${gene.identifiable ? "yes" : "no"}${error && `, ${error.trim()}`}`;
+  const absolute = gene.nominal === 0 ? gene.standard_error ?? null : null;
+  const percent = gene.standard_error_percent === null ? "" : `, ± ${kept(gene.standard_error_percent, 2)} %`;
+  if (absolute === null) return `${gene.identifiable ? "yes" : "no"}${percent}`;
+  const said = Math.abs(gene.best) < CLEAR * absolute ? "not different from zero" : gene.identifiable ? "yes" : "no";
+  return `${said}, ± ${significant(absolute, 2)} ${gene.unit === "1" ? "" : gene.unit}`.trim();
 }

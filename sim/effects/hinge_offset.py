@@ -20,8 +20,8 @@ EFFECT = Effect(
     family="actuation",
     port="drive",
     size=tuple(
-        Parameter(axis, "m", -0.15, 0.15, 0.03, f"how far the true axis lies {where} of the one told", of="chord")
-        for axis, where in (("y", "outboard"), ("z", "above"))
+        Parameter(axis, "m", -0.15, 0.15, 0.03, f"how far the true axis lies {where} the one told", of="chord")
+        for axis, where in (("y", "outboard of"), ("z", "above"))
     ),
     source="rotation about a displaced axis, p' = s + R (p - s) (Euler 1776; Goldstein 1950, Classical Mechanics, "
     "sect. 4-6); van der Grinten names the distance between axis and wing as a likely cause of an error of 2 cm",

@@ -124,6 +124,8 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
         code, _, err = wingfit(*words[:-1], empty)
         assert (code, "leave the option out" in " ".join(err.replace("│", " ").split())) == (2, True)
     assert "in parts of the mean chord; in genomes and results the gene is in m" in shown
+    code, _, err = wingfit("simulate", "--dataset", dataset_id, "--with", "balance_offset")
+    assert (code, "does not apply to a wing" in err) == (1, True)
 
 
 def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
@@ -137,8 +139,6 @@ def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.C
     assert runs.told(one | {"standard_error": 1.6e-5}) == "yes"
     assert runs.told(one | {"standard_error": 3.2e-5, "nominal": 1e-3}) == "yes"
     assert runs.told(one) == "yes", "an answer of before"
-    code, _, err = wingfit("simulate", "--dataset", dataset_id, "--with", "balance_offset")
-    assert (code, "does not apply to a wing" in err) == (1, True)
 
 
 def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
