@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from benchmarks.effect_rigs import RIGS, Rig, rig_of
+from benchmarks.effect_rigs import RIGS, AnyModel, Rig, rig_of
 from benchmarks.machine import commit, cpu
 from calibration.linearised import free_genes, linearise, residuals_of, unit_at, values_at
 from calibration.problem import Problem, base_genome
@@ -35,7 +35,7 @@ from workers.in_process import InProcessEvaluator
 
 Array = npt.NDArray[np.float64]
 
-REPEATS = 5
+REPEATS = 4
 SPREAD = 0.1  # of the genes of a batch whose cost is measured, in logarithm or part of the value
 SEEN = 1e-3  # mm or mN: less is the simulation's own error
 ITERATIONS = 12
@@ -56,9 +56,8 @@ class Moved:
     columns: Array
 
 
-def batch(rig: Rig, effect: Effect | None, count: int = 16) -> Array:
+def batch(rig: Rig, model: AnyModel, effect: Effect | None, count: int = 16) -> Array:
     """Genomes [count, G] near the nominal one, each with a motion of its own; the effect at its typical size."""
-    model = rig.model(effect)
     values = np.array([gene.nominal for gene in model.genes])
     wobble = np.random.default_rng(1).uniform(-1.0, 1.0, (count, len(values)))
     genomes = values * (1.0 + SPREAD * wobble)
@@ -72,7 +71,9 @@ def batch(rig: Rig, effect: Effect | None, count: int = 16) -> Array:
 
 def cost_ratio(rig: Rig, effect: Effect) -> float:
     """Processor time of a batch with the effect over that without: median of alternating repeats."""
-    pairs = [(rig.by_default(one, rig.stands_for(effect)), batch(rig, one)) for one in (None, effect)]
+    without = rig.stands_for(effect)
+    models = [(rig.by_default(one, without), one) for one in (None, effect)]
+    pairs = [(model, batch(rig, model, one)) for model, one in models]
     records = rig.timed()
     spent: list[list[float]] = [[], []]
     for _ in range(REPEATS + 1):  # the first warms up
