@@ -56,10 +56,10 @@ class Moved:
     columns: Array
 
 
-def batch(rig: Rig, model: AnyModel, effect: Effect | None, count: int = 16) -> Array:
+def batch(rig: Rig, model: AnyModel, effect: Effect | None, seed: int = 1, count: int = 16) -> Array:
     """Genomes [count, G] near the nominal one, each with a motion of its own; the effect at its typical size."""
     values = np.array([gene.nominal for gene in model.genes])
-    wobble = np.random.default_rng(1).uniform(-1.0, 1.0, (count, len(values)))
+    wobble = np.random.default_rng([seed, 1]).uniform(-1.0, 1.0, (count, len(values)))
     genomes = values * (1.0 + SPREAD * wobble)
     typical = effect.typical(rig.description) if effect else {}
     for k, gene in enumerate(model.genes):
@@ -70,14 +70,14 @@ def batch(rig: Rig, model: AnyModel, effect: Effect | None, count: int = 16) -> 
 
 
 def cost_ratio(rig: Rig, effect: Effect) -> float:
-    """Processor time of a batch with the effect over that without: median of alternating repeats."""
+    """Processor time of a batch with the effect over that without: median of alternating repeats, new genomes each."""
     without = rig.stands_for(effect)
     models = [(rig.by_default(one, without), one) for one in (None, effect)]
-    pairs = [(model, batch(rig, model, one)) for model, one in models]
     records = rig.timed()
     spent: list[list[float]] = [[], []]
-    for _ in range(REPEATS + 1):  # the first warms up
-        for times, (model, genomes) in zip(spent, pairs, strict=True):
+    for repeat in range(REPEATS + 1):  # the first warms up
+        for times, (model, one) in zip(spent, models, strict=True):
+            genomes = batch(rig, model, one, repeat)
             began = time.process_time()
             for recording in records:
                 model.observe(genomes, recording)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Condition
+from sim.atmosphere import density
 from sim.drive import RodDrive
 from sim.kernels import LANES
 from sim.kernels.arrays import Lanes, Laws, Setting
@@ -18,6 +19,7 @@ from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
+_SEA_LEVEL, _LEAST_FELT = 1.2, 1e-3  # kg/m^3; part
 _LEAST_STROKE = 0.01  # rad, of a drive that is held
 
 
@@ -105,9 +107,12 @@ class WingScene:
         """Let a law of the air act on every strip.
 
         ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: one number for each of its states, by
-        which a state is multiplied to be comparable with metres of motion (for the way to the periodic motion).
+        which a state is multiplied to be comparable with metres of motion (for the way to the periodic motion), in air
+        of sea level: in thinner air it is felt less.
         """
-        self._add(self._strip, len(self.structure.wiring.geometry), law, parameters, states or [])
+        felt = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_FELT)
+        sizes = [size * min(felt, 1.0) for size in states or []]
+        self._add(self._strip, len(self.structure.wiring.geometry), law, parameters, sizes)
 
     def add_connector_law(
         self, law: Law, parameters: list[Array], axes: list[int] | None = None, states: list[float] | None = None
