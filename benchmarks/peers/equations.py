@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_matrix
 
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import allocating, kernel
+from sim.kernels.jit import allocating
 
 Array = npt.NDArray[np.float64]
 V3 = tuple[float, float, float]
@@ -35,34 +35,34 @@ _TURN = math.sin(math.radians(15.0))
 _STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
-@kernel
+@allocating
 def _row(x: Array, i: int) -> V3:
     return x[i, 0], x[i, 1], x[i, 2]
 
 
-@kernel
+@allocating
 def _axis(R: Array, n: int, k: int) -> V3:
     """Axis k of body n in the world."""
     return R[n, 0, k], R[n, 1, k], R[n, 2, k]
 
 
-@kernel
+@allocating
 def _cross(x: V3, y: V3) -> V3:
     return x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]
 
 
-@kernel
+@allocating
 def _dot(x: V3, y: V3) -> float:
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 
 
-@kernel
+@allocating
 def _plus(x: V3, f: float, y: V3) -> V3:
     """x + f y."""
     return x[0] + f * y[0], x[1] + f * y[1], x[2] + f * y[2]
 
 
-@kernel
+@allocating
 def _turned(R: Array, n: int, x: V3) -> V3:
     """R_n x."""
     return (
@@ -72,13 +72,13 @@ def _turned(R: Array, n: int, x: V3) -> V3:
     )
 
 
-@kernel
+@allocating
 def _back(R: Array, n: int, x: V3) -> V3:
     """R_n^T x."""
     return _dot(_axis(R, n, 0), x), _dot(_axis(R, n, 1), x), _dot(_axis(R, n, 2), x)
 
 
-@kernel
+@allocating
 def _act(load: Array, n: int, force: V3, moment: V3) -> None:
     """Add to ``load`` [N + 2, 6] (force, moment about the centre, world)."""
     for i in range(3):
@@ -86,7 +86,7 @@ def _act(load: Array, n: int, force: V3, moment: V3) -> None:
         load[n, 3 + i] += moment[i]
 
 
-@kernel
+@allocating
 def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
     """Matrix of a quaternion of any length."""
     f = 2.0 / (w * w + x * x + y * y + z * z)
@@ -95,7 +95,7 @@ def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
     R[2, 0], R[2, 1], R[2, 2] = f * (x * z - w * y), f * (y * z + w * x), 1.0 - f * (x * x + y * y)
 
 
-@kernel
+@allocating
 def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -> None:
     """Frames of the two driving rods (rows N and N + 1): they turn about x through the hinge."""
     n = len(wing.mass)
@@ -108,7 +108,7 @@ def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -
         w[n + k, 0] = rate
 
 
-@kernel
+@allocating
 def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: Array) -> None:
     """Add what springs and dampers do to bodies and rods."""
     for c in range(len(wing.first)):
@@ -139,7 +139,7 @@ def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: A
         _act(load, i, _plus((0.0, 0.0, 0.0), -1.0, force), on_a)
 
 
-@kernel
+@allocating
 def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) -> tuple[V3, V3]:
     """Force of the air on a strip (thesis Eqs. 8-11), in the world; ``flow`` is the air's velocity past the strip."""
     along, across = _dot(flow, chord), _dot(flow, normal)
@@ -157,7 +157,7 @@ def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) 
     )
 
 
-@kernel
+@allocating
 def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None:
     """Add the air's force and moment on every body."""
     for strip in range(len(wing.area)):
@@ -182,7 +182,7 @@ def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None
                 _act(load, n, here, _cross(_turned(R, n, (place, y, 0.0)), here))
 
 
-@kernel
+@allocating
 def _accelerate(wing: PeerWing, n: int, R: Array, w: V3, load: Array, dy: Array) -> None:
     """Newton and Euler for one body: v' and w' in the world."""
     spin = _back(R, n, w)
@@ -195,12 +195,12 @@ def _accelerate(wing: PeerWing, n: int, R: Array, w: V3, load: Array, dy: Array)
     dy[V + 2] -= wing.gravity
 
 
-@kernel
+@allocating
 def _times(A: Array, n: int, x: V3) -> V3:
     return _dot(_row(A[n], 0), x), _dot(_row(A[n], 1), x), _dot(_row(A[n], 2), x)
 
 
-@kernel
+@allocating
 def _solved(A: Array, n: int, x: V3) -> V3:
     """A_n^-1 x for a 3 x 3 matrix, by Cramer's rule."""
     r0, r1, r2 = _axis(A, n, 0), _axis(A, n, 1), _axis(A, n, 2)

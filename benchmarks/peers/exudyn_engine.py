@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.peers.equations import air_loads
 from benchmarks.peers.scipy_engine import Cost, OutOfTimeError
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import allocating, kernel
+from sim.kernels.jit import allocating
 
 Array = npt.NDArray[np.float64]
 Law = Literal["angles", "logarithm", "energy"]
@@ -187,7 +187,7 @@ def _add_connectors(items: Any, system: Any, wing: PeerWing, bodies: list[Any], 
         )
 
 
-@kernel
+@allocating
 def tait_bryan(a: float, b: float, c: float, R: Array) -> None:
     """R = R_x(a) R_y(b) R_z(c)."""
     sa, ca, sb, cb, sc, cc = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.sin(c), np.cos(c)

@@ -14,7 +14,7 @@ from records import Condition, Gene
 from sim.atmosphere import density
 from sim.drive import flap_angle
 from sim.kernels.arrays import AREA
-from sim.kernels.jit import kernel
+from sim.kernels.jit import allocating
 from sim.structure import Structure
 from sim.wing_genes import lanes
 
@@ -121,7 +121,7 @@ def _drive_series(structure: Structure) -> tuple[float, Array]:
     return float(spectrum[0].real), np.stack([head.real, -head.imag], axis=-1)
 
 
-@kernel
+@allocating
 def rod_motion(wing: PeerWing, t: float, rod: int) -> tuple[float, float]:
     """Angle (rad) and rate (rad/s) of a rod at time ``t`` (s): the periodic drive, let in by a quintic ramp."""
     psi = wing.omega * t - wing.lag[rod]
