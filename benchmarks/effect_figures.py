@@ -11,23 +11,20 @@ import math
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.effect_rigs import DIVISION, FRAMES, PER_BEAT, STEPS, Rig, rig_of
+from benchmarks.effect_rigs import FRAMES, PER_BEAT, Rig, recorded, rig_of
 from benchmarks.effects import displacement
 from benchmarks.svg import Line, Panel, svg
-from records import Condition, Recording, Wing
+from records import Recording, Wing
 from sim.alignment import recorded_crossing
 from sim.effects.contract import Effect
 from sim.effects.markers import PLACE, nearest
 from sim.effects.registry import EFFECTS
-from sim.flexible_wing import FlexibleWing
-from sim.rig import FRAMES_PER_BEAT, blank_recording, name_of, tunnel, vacuum
+from sim.rig import tunnel, vacuum
 
 Array = npt.NDArray[np.float64]
 
@@ -139,20 +136,6 @@ def displacements(rig: Rig, effect: Effect, recordings: Sequence[Recording]) -> 
     ends = np.cumsum([one.values.size for one in recordings])[:-1]
     parts = np.split(whole, ends)
     return [(one, part.reshape(one.values.shape)) for one, part in zip(recordings, parts, strict=True)]
-
-
-@cache
-def recorded(rig: Rig, condition: Condition) -> Recording:
-    """The nominal wing as strobed under ``condition``: placed by itself, from a first look that gives its tracks."""
-    model = FlexibleWing(_wing_of(rig), DIVISION, numerics=STEPS)
-    nominal = np.array([[gene.nominal for gene in model.genes]])
-    blank = blank_recording(_wing_of(rig), condition, name_of(condition), FRAMES)
-    strobe = condition.flap_frequency * (FRAMES_PER_BEAT + 1) / FRAMES_PER_BEAT
-    blank = replace(blank, times=np.arange(FRAMES) / strobe)
-    beat = model.beat(nominal[0], blank).tracks
-    phase = np.round(len(beat) * condition.flap_frequency * blank.times).astype(int)
-    rough = replace(blank, values=beat[phase % len(beat)].reshape(FRAMES, -1))
-    return replace(blank, values=model.observe(nominal, rough).channels[0])
 
 
 def _wing_of(rig: Rig) -> Wing:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from records import Recording, Vehicle, Wing
+from records import Condition, Recording, Vehicle, Wing
 from sim.balance import TRIALS, delfly
 from sim.balance import blank_recording as blank_forces
 from sim.blade_element_wing import BladeElementWing
@@ -97,7 +97,8 @@ def rig_of(kind: str, quick: bool) -> Rig:
 
 @cache
 def _recorded(rig: Rig, without: str) -> tuple[Recording, ...]:
-    blanks = [_tracks(rig, k) for k in range(len(SMALL))] if rig.kind == "wing" else [_forces(k) for k in range(8)]
+    wing = rig.kind == "wing"
+    blanks = [_strobed(rig, condition) for condition, _ in SMALL] if wing else [_forces(k) for k in range(8)]
     if rig.quick:
         blanks = [blanks[k] for k in QUICK]
     model = rig.model(None, without=without)
@@ -105,10 +106,16 @@ def _recorded(rig: Rig, without: str) -> tuple[Recording, ...]:
     return tuple(_filled(model, nominal, blank) for blank in blanks)
 
 
-def _tracks(rig: Rig, number: int) -> Recording:
+@cache
+def recorded(rig: Rig, condition: Condition) -> Recording:
+    """What the nominal wing is recorded as under any ``condition``."""
+    model = rig.model(None)
+    return _filled(model, np.array([[gene.nominal for gene in model.genes]]), _strobed(rig, condition))
+
+
+def _strobed(rig: Rig, condition: Condition) -> Recording:
     if not isinstance(rig.description, Wing):
         raise TypeError("only wings have tracks")
-    condition = SMALL[number][0]
     blank = blank_recording(rig.description, condition, name_of(condition), FRAMES)
     strobe = condition.flap_frequency * (FRAMES_PER_BEAT + 1) / FRAMES_PER_BEAT
     return replace(blank, times=np.arange(FRAMES) / strobe)
