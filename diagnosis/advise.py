@@ -1,0 +1,93 @@
+"""What to record next: the condition under which the explanations that are still alive differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.problem import Problem
+from diagnosis.decide import PIECES, SURE, Weighed, tolerated
+from diagnosis.finding import Advice
+from diagnosis.refit import Refit
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+from records import Condition, Recording
+
+Array = npt.NDArray[np.float64]
+
+ALIVE = 0.02  # probability from which an explanation is alive
+RIVALS = 3
+TOLD = 5  # conditions
+
+
+def rivals(weighed: Weighed) -> list[Refit]:
+    """The explanations that are still alive, most probable first; at least two where there are two."""
+    order = np.argsort(-weighed.probabilities, kind="stable")
+    alive = [k for k in order if weighed.probabilities[k] >= ALIVE]
+    return [weighed.refits[k] for k in (alive if len(alive) > 1 else order[:2])[:RIVALS]]
+
+
+def advised(subject: Subject, stack: Stack, weighed: Weighed, evaluator: Evaluator) -> tuple[Advice, ...]:
+    """Conditions to record next, best first; empty where no two explanations are left or no other can be run."""
+    alive = rivals(weighed)
+    if len(alive) < 2:
+        return ()
+    found = []
+    for condition in subject.conditions():
+        apart = _apart(subject, stack, alive, condition, evaluator)
+        if apart is not None:
+            found.append((apart, condition))
+    found.sort(key=lambda pair: -pair[0])
+    return tuple(_advice(stack, weighed, alive, apart, condition) for apart, condition in found[:TOLD])
+
+
+def _apart(
+    subject: Subject, stack: Stack, alive: Sequence[Refit], condition: Condition, evaluator: Evaluator
+) -> float | None:
+    """Least root mean square difference (in noises) between the first explanation and another under ``condition``."""
+    first = alive[0].fit
+    genome = first.problem.genomes(np.array(list(first.values.values())))[0]
+    shell = subject.shown(subject.extended(alive[0].names), genome, condition)
+    if shell is None:
+        return None
+    differences = [_difference(shell, other, evaluator) for other in alive[1:]]
+    known = [one for one in differences if one is not None]
+    return min(known) / stack.noise if known else None
+
+
+def _difference(shell: Recording, other: Refit, evaluator: Evaluator) -> float | None:
+    fit = other.fit
+    problem = Problem(fit.problem.model, (shell,), fit.problem.free, fit.problem.base, fit.problem.axes)
+    evaluation = evaluator.evaluate(problem, np.array([list(fit.values.values())]), residuals=True)
+    residuals = evaluation.per_recording[0].residuals
+    if evaluation.reasons[0] is not None or residuals is None:
+        return None
+    return float(np.sqrt(np.nanmean(residuals[0] ** 2)))
+
+
+def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float, condition: Condition) -> Advice:
+    share = 1.0 / (len(stack.recordings) + 1.0)
+    unit = stack.noise**2
+    tau = tolerated(stack, weighed.left[0] * unit, 0.0) / unit + float(weighed.left.min())
+    gain = 0.5 * PIECES * (len(stack.recordings) + 1) * np.log1p(share * apart**2 / tau)
+    odds = np.log(SURE / (1.0 - SURE))
+    resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))
+    lag, incidence = float(np.degrees(condition.phase_lag)), float(np.degrees(condition.angle_of_attack))
+    where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"
+    if condition.airspeed > 0:
+        where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
+    names = tuple(" and ".join(one.names) or "nothing lacking" for one in alive)
+    return Advice(
+        f"record at {where}: {', '.join(names)} would differ by {apart:.2g} times the noise",
+        condition.flap_frequency,
+        lag,
+        condition.pressure / 100.0,
+        condition.airspeed,
+        incidence,
+        apart,
+        resolves,
+        names,
+    )

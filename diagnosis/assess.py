@@ -1,0 +1,138 @@
+"""The search for what is lacking: nominal fit, score tests, refits alone and together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from calibration.evaluator import Evaluator
+from diagnosis.decide import Weighed, tolerated, weighed
+from diagnosis.nominal import LIMIT, MATTERS, Nominal, first_fit, improves, settled
+from diagnosis.refit import Refit, again, pairs, partners, refitted, worth_a_refit
+from diagnosis.screen import Trial, screened
+from diagnosis.spec import DiagnosisSpec
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject, Suspect
+
+RIVALS = 3  # explanations to which a partner is sought
+
+
+@dataclass
+class Assessment:
+    """What is known so far; ``evaluations`` counts individuals."""
+
+    subject: Subject
+    stack: Stack
+    nominal: Nominal | None = None
+    trials: list[list[Trial]] = field(default_factory=list)
+    refits: list[Refit] = field(default_factory=list)
+    weighed: Weighed | None = None
+    evaluations: int = 0
+
+    @property
+    def best(self) -> Refit:
+        """The most probable explanation, be it the nominal model."""
+        if self.weighed is None:
+            raise ValueError("nothing has been weighed yet")
+        return self.weighed.refits[int(self.weighed.probabilities.argmax())]
+
+
+@dataclass(frozen=True)
+class Counted:
+    """An evaluator that counts the individuals it is given in ``of``."""
+
+    inner: Evaluator
+    of: Assessment
+
+    def evaluate(self, problem, values, *, residuals: bool = False):  # type: ignore[no-untyped-def]
+        """As the inner one."""
+        self.of.evaluations += len(values)
+        return self.inner.evaluate(problem, values, residuals=residuals)
+
+    def close(self) -> None:
+        """Nothing: the inner one is its owner's."""
+
+
+def assess(
+    state: Assessment, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
+) -> Iterator[tuple[float, str]]:
+    """Fill ``state``; yields the part of the work done and what comes next."""
+    evaluator = Counted(evaluator, state)
+    stack = state.stack
+    yield 0.0, "fitting the nominal model"
+    fit = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
+    yield 0.15, "comparing with a finer division"
+    nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
+    state.nominal, state.subject = nominal, nominal.subject
+    suspects = _suspects(state.subject, spec)
+    for k, (suspect, trials) in enumerate(screened(state.subject, stack, nominal.refit.fit, evaluator, suspects)):
+        state.trials.append(trials)
+        yield 0.25 + 0.35 * (k + 1) / len(suspects), f"score test of {suspect.name}"
+    yield from _refits(state, nominal, spec, evaluator)
+    yield 0.9, "comparing with a finer division"
+    if spec.refine:
+        _refined(state, nominal, evaluator)
+    floor = 0.0 if spec.refine else nominal.division or 0.0
+    state.weighed = weighed(stack, state.nominal.refit, state.refits, floor)
+
+
+def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
+    """Go to the finer division with all explanations where that does better with the best of them.
+
+    Beside a large effect a division's own misfit does not show before the effect is in the model.
+    """
+    stack, finer = state.stack, nominal.subject.finer()
+    best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
+    coarse = finer is None or nominal.division is None or nominal.division < MATTERS * stack.noise
+    if coarse or finer is None or best.excess < (LIMIT * stack.noise) ** 2:
+        return
+    better = again(finer, stack, evaluator, best)
+    if better is None or not improves(better, best):
+        return
+    first = again(finer, stack, evaluator, nominal.refit)
+    if first is None:
+        return
+    others = [better if one is best else again(finer, stack, evaluator, one) for one in state.refits]
+    remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
+    state.nominal = replace(nominal, subject=finer, refit=first, remarks=(*nominal.remarks, remark))
+    state.subject, state.refits = finer, [one for one in others if one is not None]
+
+
+def _refits(
+    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
+) -> Iterator[tuple[float, str]]:
+    stack, fit = state.stack, nominal.refit.fit
+    chosen = worth_a_refit(state.trials, spec.refits)
+    for k, trial in enumerate(chosen):
+        yield 0.6 + 0.15 * k / len(chosen), f"refit with {trial.suspect.name}"
+        _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
+    if not state.refits or min(one.excess for one in state.refits) <= tolerated(stack, nominal.refit.excess, 0.0):
+        return
+    tried: set[frozenset[str]] = set()
+    best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
+    for k, one in enumerate(best):
+        for trial in partners(stack, one, state.trials)[: 3 if k == 0 else 1]:
+            names = frozenset((*one.names, trial.suspect.name))
+            if names not in tried:
+                tried.add(names)
+                yield 0.76 + 0.03 * k, f"refit with {' and '.join(sorted(names))}"
+                _add(state, refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
+    for two in pairs(stack, fit, state.trials, 2):
+        names = frozenset(trial.suspect.name for trial in two)
+        if names not in tried:
+            tried.add(names)
+            yield 0.86, f"refit with {' and '.join(sorted(names))}"
+            _add(state, refitted(state.subject, stack, fit, evaluator, two))
+
+
+def _add(state: Assessment, refit: Refit | None) -> None:
+    if refit is not None:
+        state.refits.append(refit)
+
+
+def _suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
+    known = {suspect.name: suspect for suspect in subject.suspects}
+    for name in spec.suspects:
+        if name not in known:
+            raise ValueError(f"unknown suspect {name!r}; for this rig there are {', '.join(known)}")
+    return [suspect for name, suspect in known.items() if not spec.suspects or name in spec.suspects]

@@ -1,0 +1,78 @@
+"""The verdict: which explanation holds, if any, with probabilities.
+
+Recordings hold so many samples that noise decides nothing: a law of the right kind, written a little differently than
+nature does, is refuted by thousands of units of chi-squared. What decides is how much of the misfit an explanation
+takes away. So hypotheses are weighed by the mean square that they leave, above what no model can be expected to
+explain: a likelihood in which the misfit of a law that is right but for its form counts as noise of unknown size,
+
+    ln p = -nu/2 ln(tau^2 + E) - genes c,
+
+E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
+nu the number of independent pieces that such misfits have (a few for each recording). Two hypotheses always compete
+beside the effects: *nothing is lacking*, and *something that is not in the library*, which is taken to explain all but
+a part UNKNOWN of the misfit at the price of the genes that a law of its own would need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.refit import Refit
+from diagnosis.stack import Stack
+
+Array = npt.NDArray[np.float64]
+
+ADEQUATE = 0.3  # of the noise: a misfit beyond it that is no larger is none
+FORM = 0.1  # of the misfit of the nominal model: what a law right but for its form leaves
+PIECES = 6.0  # independent pieces of such misfits, per recording
+MOST_PIECES = 48.0
+GENE = 2.0  # price of a gene in units of the logarithm of the evidence
+UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
+UNKNOWN_GENES = 6.0
+PREDICTED = 0.25  # of the weight, for recordings left out
+SURE = 0.75  # probability from which a single explanation is named
+ALIKE = 0.05  # probability from which another explanation is said to be possible
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Hypotheses with probabilities: of each refit (the first is the nominal model), and of an unknown law."""
+
+    refits: tuple[Refit, ...]
+    evidence: Array
+    probabilities: Array
+    unknown: float
+    left: Array
+    floor: float
+
+
+def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float) -> Weighed:
+    """Weigh ``refits`` against the nominal model; ``floor`` (m or N) is what the model's division leaves."""
+    every = (nominal, *refits)
+    unit = stack.noise**2
+    left = np.array([max(_misfit(one), 0.0) / unit for one in every])
+    tau = tolerated(stack, left[0] * unit, floor) / unit
+    pieces = min(PIECES * len(stack.recordings), MOST_PIECES)
+    genes = np.array([one.freedom for one in every], float)
+    log = -0.5 * pieces * np.log(tau + left) - GENE * genes
+    unknown = -0.5 * pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
+    top = max(log.max(), unknown)
+    weight, other = np.exp(log - top), np.exp(unknown - top)
+    total = weight.sum() + other
+    return Weighed(every, log - log[0], weight / total, float(other / total), left, float(np.sqrt(tau) * stack.noise))
+
+
+def tolerated(stack: Stack, excess: float, floor: float) -> float:
+    """Mean square (m^2 or N^2) that a right explanation may leave of the nominal model's ``excess``."""
+    return (ADEQUATE * stack.noise) ** 2 + floor**2 + FORM**2 * max(excess, 0.0)
+
+
+def _misfit(refit: Refit) -> float:
+    """Mean square beyond the noise, as fitted and, to the part PREDICTED, as predicted."""
+    if refit.predicted is None:
+        return refit.excess
+    return (1.0 - PREDICTED) * refit.excess + PREDICTED * refit.predicted

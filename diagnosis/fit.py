@@ -1,0 +1,195 @@
+"""Fits in coefficients of the beat: Gauss-Newton in the box of the genes, with a Jacobian that learns on its way.
+
+A diagnosis refits a dozen extended models that differ little from the nominal one. Their Jacobian is taken over from
+it; only the columns of what was added are measured. Every step then improves it by what the step has shown (Broyden
+1965), and it is measured anew where it no longer foretells what a step does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+from calibration.evaluator import Evaluator
+from calibration.linearised import free_genes, values_at
+from calibration.problem import Problem
+from diagnosis.stack import Stack
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+STEP = 0.003  # of the box, of finite differences
+PRIOR = 0.5  # standard deviation of a gene in parts of its box
+# Dampings tried at once, times the last good one: a group of lanes, or two. Close to it they lie densely, because
+# valleys of stiffnesses that make up for each other bend.
+FEW = 10.0 ** np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0])
+MANY = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
+GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
+SETTLED = 2e-3  # relative decrease of the cost below which a fit ends
+SMALLEST = 1.0  # decrease of the cost (a chi-squared) that is worth another step
+FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    Attributes:
+        problem: the model with its free genes.
+        unit: [F] in parts of the boxes.
+        coefficients: [D] of the residuals there.
+        jacobian: [D, F] of the coefficients, per part of the box.
+        residuals: per recording [T, C].
+        cost: sum of squares of whitened coefficients, and of the prior.
+        damping: last good one.
+        fresh: whether the Jacobian was measured there.
+        evaluations: individuals it took.
+        converged: whether it ended because nothing was to be gained.
+    """
+
+    problem: Problem
+    unit: Array
+    coefficients: Array
+    jacobian: Array
+    residuals: tuple[Array, ...]
+    cost: float
+    damping: float = FIRST_DAMPING
+    fresh: bool = False
+    evaluations: int = 0
+    converged: bool = False
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Of the free genes."""
+        found = values_at(free_genes(self.problem), self.unit[None])[0]
+        return dict(zip(self.problem.free, found.tolist(), strict=True))
+
+
+def fitted(
+    stack: Stack,
+    problem: Problem,
+    evaluator: Evaluator,
+    start: Array,
+    jacobian: Array | None = None,
+    *,
+    known: Flags | None = None,
+    steps: int = 8,
+    thorough: bool = False,
+) -> Fit:
+    """Fit the free genes from ``start`` [F]; ValueError where that cannot be simulated.
+
+    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first. A ``thorough`` fit
+    measures the Jacobian anew at every step, and where it ends.
+    """
+    first = _at(stack, problem, evaluator, start)
+    columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
+    own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
+    every = np.ones(len(start), bool)
+    now = replace(_measured(stack, evaluator, replace(first, jacobian=own), ~columns), fresh=not columns.any())
+    for _ in range(steps):
+        better, gain = _step(stack, evaluator, now, MANY if thorough else FEW)
+        if better is None:
+            if now.fresh:
+                return replace(now, converged=True)
+            now = _measured(stack, evaluator, now, every)
+            continue
+        settled = now.cost - better.cost <= max(SMALLEST, SETTLED * now.cost)
+        now = better
+        if settled and gain > GOOD / 2:
+            now = replace(now, converged=True)
+            break
+        if thorough or gain < GOOD:
+            now = _measured(stack, evaluator, now, every)
+    return _measured(stack, evaluator, now, every) if thorough and not now.fresh else now
+
+
+def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
+    """Step [F] that minimises slope . d + d . curvature d / 2 inside the box, curvatures raised by ``damping``."""
+    diagonal = np.diag(curvature)
+    factor = np.linalg.cholesky(curvature + np.diag(damping * diagonal + 1e-12 * diagonal.max()))
+    aim = -np.linalg.solve(factor, slope)
+    return np.asarray(lsq_linear(factor.T, aim, (-unit - 1e-12, 1.0 - unit + 1e-12), method="bvls").x)
+
+
+def _cost(stack: Stack, coefficients: Array, unit: Array) -> Array:
+    white = coefficients / stack.scale
+    return np.asarray((white**2).sum(axis=-1) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
+
+
+def _at(stack: Stack, problem: Problem, evaluator: Evaluator, unit: Array) -> Fit:
+    found, reasons, residuals = stack.evaluate(problem, evaluator, values_at(free_genes(problem), unit[None]))
+    if reasons[0] is not None:
+        raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
+    cost = float(_cost(stack, found[0], unit))
+    empty = np.zeros((found.shape[1], 0))
+    return Fit(problem, unit, found[0], empty, tuple(r[0] for r in residuals), cost, evaluations=1)
+
+
+def _measured(stack: Stack, evaluator: Evaluator, fit: Fit, which: Flags) -> Fit:
+    """``fit`` with the columns ``which`` of its Jacobian measured by central differences inside the box."""
+    (columns,) = np.nonzero(which)
+    if not len(columns):
+        return fit
+    moves = STEP * np.eye(len(fit.unit))[columns]
+    around = np.clip(np.vstack([fit.unit + moves, fit.unit - moves]), 0.0, 1.0)
+    found, reasons, _ = stack.evaluate(fit.problem, evaluator, values_at(free_genes(fit.problem), around))
+    bad = np.array([reason is not None for reason in reasons])
+    found[bad] = fit.coefficients
+    around[bad] = fit.unit
+    up, down = np.arange(len(columns)), np.arange(len(columns)) + len(columns)
+    width = around[up, columns] - around[down, columns]
+    jacobian = fit.jacobian.copy()
+    jacobian[:, columns] = ((found[up] - found[down]) / np.where(width > 0, width, 1.0)[:, None]).T
+    return replace(
+        fit,
+        jacobian=jacobian,
+        fresh=bool(which.all()),
+        evaluations=fit.evaluations + len(around),
+    )
+
+
+def _step(stack: Stack, evaluator: Evaluator, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
+    """The best of several damped steps, its Jacobian improved by what they show, and gain over promise."""
+    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    prior = np.full(len(fit.unit), PRIOR)
+    curvature = slopes.T @ slopes + np.diag(prior**-2)
+    slope = slopes.T @ white + (fit.unit - 0.5) / prior**2
+    dampings = np.clip(fit.damping * relative, LEAST_DAMPING, LARGEST_DAMPING)
+    moves = np.array([bounded(curvature, slope, fit.unit, d) for d in dampings])
+    units = np.clip(fit.unit + moves, 0.0, 1.0)
+    promised = -2.0 * (moves @ slope) - np.einsum("df,fg,dg->d", moves, curvature, moves)
+    if promised.max() <= 1e-9 * fit.cost:
+        return None, 0.0
+    found, reasons, residuals = stack.evaluate(fit.problem, evaluator, values_at(free_genes(fit.problem), units))
+    bad = np.array([reason is not None for reason in reasons])
+    cost = np.where(bad, np.inf, _cost(stack, np.where(bad[:, None], FAILED, found), units))
+    k = int(np.argmin(cost))
+    evaluations = fit.evaluations + len(units)
+    if not cost[k] < fit.cost:
+        return None, 0.0
+    jacobian = fit.jacobian
+    for j in np.argsort(-cost):  # the best last: what it shows holds exactly
+        if not bad[j]:
+            jacobian = _broyden(jacobian, units[j] - fit.unit, found[j] - fit.coefficients)
+    better = Fit(
+        fit.problem,
+        units[k],
+        found[k],
+        jacobian,
+        tuple(r[k] for r in residuals),
+        float(cost[k]),
+        float(dampings[k]),
+        evaluations=evaluations,
+    )
+    return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))
+
+
+def _broyden(jacobian: Array, move: Array, change: Array) -> Array:
+    length = float(move @ move)
+    if length < 1e-12:
+        return jacobian
+    return jacobian + np.outer(change - jacobian @ move, move) / length

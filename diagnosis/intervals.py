@@ -1,0 +1,51 @@
+"""How well each gene is told: intervals from noise, and from what a model that is not perfect leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import norm
+
+from calibration.linearised import free_genes
+from diagnosis.finding import GeneValue, Interval
+from diagnosis.fit import PRIOR, Fit
+from diagnosis.stack import Stack
+
+Array = npt.NDArray[np.float64]
+
+CONFIDENCE = 0.9
+
+
+def covariance(stack: Stack, fit: Fit) -> Array:
+    """[F, F] of the genes in parts of their boxes.
+
+    Noise and the box as a weak prior; beside them, to the part to which the misfit is more than noise, the scatter of
+    what each recording by itself asks for (a sandwich with recordings as clusters: Liang and Zeger 1986).
+    """
+    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    information = slopes.T @ slopes
+    bread = np.linalg.inv(information + np.eye(len(fit.unit)) / PRIOR**2)
+    scores = np.array([slopes[part].T @ white[part] for part in stack.parts])
+    scores -= scores.mean(axis=0)
+    recordings = len(scores)
+    systematic = max(0.0, 1.0 - len(white) / float(white @ white))
+    meat = information + np.eye(len(fit.unit)) / PRIOR**2
+    if recordings > 1:
+        meat = meat + systematic * recordings / (recordings - 1.0) * scores.T @ scores
+    return np.asarray(bread @ meat @ bread)
+
+
+def gene_values(stack: Stack, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
+    """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
+    errors = np.sqrt(np.diag(covariance(stack, fit)))
+    reach = float(norm.ppf(0.5 + CONFIDENCE / 2))
+    off = sizes or {}
+    found = []
+    for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):
+        low, high = unit - reach * error, unit + reach * error
+        ends = [float(gene.from_unit(x)) if 0.0 <= x <= 1.0 else None for x in (low, high)]
+        value = Interval(float(gene.from_unit(unit)), ends[0], ends[1])
+        found.append(GeneValue(gene.name, gene.unit, gene.description, value, off.get(gene.name)))
+    return tuple(found)

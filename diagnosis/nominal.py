@@ -1,0 +1,101 @@
+"""The nominal model at its best: fitted, at a division that does not limit it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.linearised import free_genes, unit_at
+from calibration.problem import Problem, base_genome
+from diagnosis.fit import Fit, fitted
+from diagnosis.refit import Refit, again, judged
+from diagnosis.screen import Nuisance
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 20
+MATTERS = 0.25  # of the noise: a division that leaves less is fine enough
+BETTER = 0.25  # of the excess that a finer division must take away to be worth its cost
+LIMIT = 0.15  # of the noise: a misfit below needs no finer division
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """The nominal model fitted.
+
+    Attributes:
+        subject: with the division that was settled on.
+        refit: its fit.
+        division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
+        finer: in words.
+        remarks: for the reader.
+    """
+
+    subject: Subject
+    refit: Refit
+    division: float | None
+    finer: str
+    remarks: tuple[str, ...]
+
+
+def first_fit(
+    subject: Subject,
+    stack: Stack,
+    evaluator: Evaluator,
+    free: tuple[str, ...],
+    values: Mapping[str, float],
+    fixed: Mapping[str, float],
+) -> Fit:
+    """Fit the ``free`` genes from ``values``; ValueError where the model cannot be simulated there."""
+    base = base_genome(subject.model, {**values, **fixed})
+    problem = Problem(subject.model, stack.recordings, free, base, stack.axes)
+    genes = free_genes(problem)
+    start = unit_at(genes, np.array([base[gene.name] for gene in genes]))
+    return fitted(stack, problem, evaluator, start, steps=STEPS, thorough=True)
+
+
+def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, refine: bool) -> Nominal:
+    """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
+    now, remarks = judged(stack, fit), list[str]()
+    while True:
+        finer = subject.finer()
+        if finer is None:
+            return Nominal(subject, now, None, "", tuple(remarks))
+        left = _leaves(finer, stack, evaluator, now.fit)
+        excess = max(now.excess, 0.0)
+        if left is None or not refine or left < MATTERS * stack.noise or excess < (LIMIT * stack.noise) ** 2:
+            return Nominal(subject, now, left, finer.told, tuple(remarks))
+        better = again(finer, stack, evaluator, now)
+        if better is None or not improves(better, now):
+            return Nominal(subject, now, left, finer.told, tuple(remarks))
+        remarks.append(
+            f"the division limits the model: {finer.told} leaves {_percent(better.excess, now.excess)} of the excess "
+            f"misfit that {subject.told} leaves, and was taken instead"
+        )
+        subject, now = finer, better
+
+
+def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> float | None:
+    """Root mean square of what the finer model says differently and the genes cannot make up for; None if it fails."""
+    problem = Problem(finer.model, stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
+    found, reasons, _ = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+    if reasons[0] is not None:
+        return None
+    change = (found[0] - fit.coefficients) / stack.scale
+    rest = Nuisance(fit.jacobian, stack.scale).rest(change) * stack.scale
+    return float(np.sqrt(stack.weight @ rest**2))
+
+
+def improves(finer: Refit, coarse: Refit) -> bool:
+    """Whether a finer division takes away so much of the excess that it is worth its cost."""
+    return finer.excess < (1.0 - BETTER) * coarse.excess
+
+
+def _percent(part: float, whole: float) -> str:
+    return f"{100 * max(part, 0.0) / whole:.0f} %"

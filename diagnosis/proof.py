@@ -1,0 +1,119 @@
+"""Misfits to recordings, fitted and held out, before and after, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.problem import Problem
+from diagnosis.finding import Interval, Proof, RecordingMisfit
+from diagnosis.fit import Fit
+from diagnosis.stack import Stack
+
+Array = npt.NDArray[np.float64]
+
+DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
+CONFIDENCE = 0.9
+FLOORED = 1.15  # of the floor: as good as it gets
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Residuals [T, C] of each recording of a stack, with the nominal model and with what was found.
+
+    An entry of ``failed`` says why a model could not be simulated; its residuals are then NaN.
+    """
+
+    stack: Stack
+    before: tuple[Array, ...]
+    after: tuple[Array, ...]
+    failed: tuple[str, ...] = ()
+
+
+def predicted(stack: Stack, evaluator: Evaluator, before: Fit, after: Fit) -> Predicted:
+    """Predict recordings that neither model was fitted to."""
+    found, failed = [], []
+    for fit in (before, after):
+        problem = Problem(fit.problem.model, stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
+        _, reasons, residuals = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+        failed += [reason for reason in reasons if reason]
+        found.append(tuple(one[0] for one in residuals))
+    return Predicted(stack, found[0], found[1], tuple(failed))
+
+
+def recording_misfits(predicted: Predicted, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
+    """Misfit to each recording; ``floor`` (m or N) is what the model's division leaves beside the noise."""
+    rows = []
+    for r, recording in enumerate(predicted.stack.recordings):
+        view, condition = predicted.stack.views[r], recording.condition
+        own = Predicted(predicted.stack, (predicted.before[r],), (predicted.after[r],))
+        before, after, _ = _misfits(own, [view.used], [recording.kind])
+        noise = float(np.sqrt(np.mean(view.noise[view.used] ** 2)))
+        rows.append(
+            RecordingMisfit(
+                recording.name,
+                held_out,
+                condition.flap_frequency,
+                float(np.degrees(condition.phase_lag)),
+                condition.pressure / 100.0,
+                condition.airspeed,
+                before,
+                after,
+                float(np.hypot(noise, floor)),
+            )
+        )
+    return tuple(rows)
+
+
+def proof(predicted: Predicted, floor: float, unit: str) -> Proof:
+    """What the held-out recordings say of both models together; ``floor`` as in :func:`recording_misfits`."""
+    stack = predicted.stack
+    used, kinds = [view.used for view in stack.views], [one.kind for one in stack.recordings]
+    before, after, better = _misfits(predicted, used, kinds)
+    least = float(np.hypot(stack.noise, floor))
+    told = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
+    words = (
+        f"{len(stack.recordings)} held-out recordings: {told[0] * before.value:.3g} {told[1]} before, "
+        f"{told[0] * after.value:.3g} {told[1]} after, {after.value / least:.2f} times the floor"
+    )
+    if predicted.failed:
+        words += f"; {predicted.failed[0]}"
+    return Proof(before, after, least, better, words)
+
+
+def _misfits(
+    predicted: Predicted, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
+) -> tuple[Interval, Interval, bool]:
+    """Root mean squares before and after with intervals over markers, and whether after is surely less."""
+    groups: list[Array] = []
+    for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
+        width = 3 if kind == "tracks" else 1
+        squares = np.stack([np.where(own, one, np.nan) ** 2 for one in (before, after)])
+        count = np.isfinite(squares[0]).sum(axis=0)
+        total = np.nansum(squares, axis=1)
+        rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
+        groups.append(rows[:, rows[2] > 0])
+    every = np.concatenate(groups, axis=1)
+    if every.shape[1] < 4:  # forces: stretches of time instead of markers
+        every = _stretches(predicted, used)
+    drawn = np.random.default_rng(0).integers(0, every.shape[1], (DRAWS, every.shape[1]))
+    sums = every[:, drawn].sum(axis=2)
+    rms = np.sqrt(sums[:2] / sums[2])
+    whole = np.sqrt(every[:2].sum(axis=1) / every[2].sum())
+    ends = np.quantile(rms, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=1)
+    found = [Interval(float(w), float(a), float(b)) for w, a, b in zip(whole, *ends, strict=True)]
+    return found[0], found[1], bool(np.mean(rms[1] < rms[0]) >= 0.5 + CONFIDENCE / 2)
+
+
+def _stretches(predicted: Predicted, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+    rows = []
+    for before, after, own in zip(predicted.before, predicted.after, used, strict=True):
+        for part in np.array_split(np.arange(len(before)), count):
+            squares = [np.where(own, one[part], np.nan) ** 2 for one in (before, after)]
+            rows.append([np.nansum(squares[0]), np.nansum(squares[1]), np.isfinite(squares[0]).sum()])
+    found = np.array(rows, float).T
+    return np.asarray(found[:, found[2] > 0])

@@ -1,0 +1,163 @@
+"""Full refits of the strongest suspects, alone and together, and what they predict of recordings left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.problem import Problem, base_genome
+from diagnosis.fit import Fit, fitted
+from diagnosis.screen import Nuisance, Trial, off_units, size_columns
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 6  # of a refit
+WORTH = 0.25  # of the best gain: a suspect with less is not refitted
+PARTNERS = 4  # tried beside the best, and as pairs without it
+FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
+HALVINGS = 3  # of a start that cannot be simulated
+
+
+@dataclass(frozen=True)
+class Refit:
+    """The nominal model with suspects put in, fitted in full.
+
+    Attributes:
+        trials: the trial that each suspect began from; empty for the nominal model.
+        fit: the fit.
+        excess: mean square beyond the noise that it leaves, m^2 or N^2.
+        predicted: the same for each recording when the others were fitted, averaged; None with a single recording.
+    """
+
+    trials: tuple[Trial, ...]
+    fit: Fit
+    excess: float
+    predicted: float | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the suspects."""
+        return tuple(trial.suspect.name for trial in self.trials)
+
+    @property
+    def freedom(self) -> int:
+        """Genes that the suspects add."""
+        return sum(trial.freedom for trial in self.trials)
+
+
+def judged(stack: Stack, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
+    """``fit`` with what it leaves and predicts."""
+    return Refit(tuple(trials), fit, stack.excess(fit.coefficients), left_out(stack, fit))
+
+
+def left_out(stack: Stack, fit: Fit) -> float | None:
+    """Mean square beyond the noise in each recording when the others alone were fitted, by the linearised model.
+
+    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation.
+    """
+    if len(stack.recordings) < 2:
+        return None
+    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    grams = [slopes[part].T @ slopes[part] for part in stack.parts]
+    scores = [slopes[part].T @ white[part] for part in stack.parts]
+    gram, score = sum(grams) + np.eye(len(fit.unit)) / FREE**2, sum(scores)
+    total = 0.0
+    for r, part in enumerate(stack.parts):
+        move = -np.linalg.solve(gram - grams[r], score - scores[r])
+        move = np.clip(fit.unit + move, 0.0, 1.0) - fit.unit
+        there = fit.coefficients[part] + fit.jacobian[part] @ move
+        total += float(stack.weight[part] @ (there**2 - stack.variance[part]))
+    return total
+
+
+def refitted(
+    subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, trials: Sequence[Trial], base: Fit | None = None
+) -> Refit | None:
+    """Fit the nominal model with the suspects of ``trials``, each beginning at its trial's place and size.
+
+    ``base`` is a fit that contains all but the last of them already. None where no start can be simulated.
+    """
+    before = base or nominal
+    model = subject.extended([trial.suspect.name for trial in trials])
+    added = [trials[-1]] if base else list(trials)
+    free = (*before.problem.free, *(gene.name for trial in added for gene in trial.suspect.genes))
+    values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
+    problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
+    width = len(free) - len(before.unit)
+    known = np.concatenate([np.ones(len(before.unit), bool), np.zeros(width, bool)])
+    jacobian = np.hstack([before.jacobian, np.zeros((len(before.jacobian), width))])
+    for part in 0.5 ** np.arange(HALVINGS):
+        start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
+        try:
+            fit = fitted(stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+        except ValueError:
+            continue
+        return judged(stack, fit, trials)
+    return None
+
+
+def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:
+    """The same fitted with another subject's model, from where it ended; None where that cannot be simulated."""
+    before = refit.fit
+    model = subject.extended(refit.names)
+    problem = Problem(model, stack.recordings, before.problem.free, before.problem.base, stack.axes)
+    known = np.ones(len(before.unit), bool)
+    try:
+        fit = fitted(stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
+    except ValueError:
+        return None
+    return judged(stack, fit, refit.trials)
+
+
+def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
+    """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
+    best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
+    return [trial for trial in best[:most] if trial.gain >= WORTH * best[0].gain and trial.gain > 0.0]
+
+
+def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
+    """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
+    nuisance = Nuisance(base.fit.jacobian, stack.scale)
+    left = nuisance.rest(base.fit.coefficients / stack.scale)
+    scored = []
+    for trials in found:
+        if not trials or trials[0].suspect.name in base.names:
+            continue
+        gains = [_gain(nuisance.rest(trial.fields / stack.scale), left) for trial in trials]
+        k = int(np.argmax(gains))
+        scored.append((gains[k], trials[k]))
+    scored.sort(key=lambda pair: -pair[0])
+    return [trial for _, trial in scored[:most]]
+
+
+def pairs(
+    stack: Stack, nominal: Fit, found: Sequence[list[Trial]], most: int = PARTNERS
+) -> Iterator[tuple[Trial, Trial]]:
+    """Pairs of suspects that together would take most of what the nominal model leaves, best first."""
+    nuisance = Nuisance(nominal.jacobian, stack.scale)
+    left = nuisance.rest(nominal.coefficients / stack.scale)
+    best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
+    own = [nuisance.rest(trial.fields / stack.scale) for trial in best]
+    scored = [(_gain(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
+    scored.sort(key=lambda triple: -triple[0])
+    for _, one, other in scored[:most]:
+        yield (one, other) if one.gain >= other.gain else (other, one)
+
+
+def _gain(own: Array, left: Array) -> float:
+    inner = own @ own.T
+    score = own @ left
+    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
+
+
+def _scaled(trial: Trial, part: float) -> Array:
+    """Start of the suspect's genes with its size at ``part`` of what the trial says."""
+    start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
+    start[size] = off[size] + part * (start[size] - off[size])
+    return start

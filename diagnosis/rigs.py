@@ -1,0 +1,346 @@
+"""The two rigs that are known, under diagnosis: a flexible wing that cameras see, a vehicle on a balance."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise, product
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.effects import sizes
+from calibration.spec import CalibrationSpec, model_for
+from diagnosis.subject import Place, Subject, Suspect
+from records import Condition, Dataset, Recording, Vehicle, Wing
+from records.dataset import ForceAxis
+from sim.alignment import recorded_crossing
+from sim.blade_element_wing import BladeElementWing
+from sim.blades.terms import PRESETS
+from sim.division import Division
+from sim.effects.contract import Effect
+from sim.effects.registry import EFFECTS
+from sim.flexible_wing import FlexibleWing
+from sim.model import Model
+from sim.planform import Planform
+
+Array = npt.NDArray[np.float64]
+
+MOST_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
+MOST_ELEMENTS = 640
+CONVERGED = 1e-3  # of the root mean square force: far below what any balance tells
+MOST_CONDITIONS = 40
+MERGED = 0.05  # of the range of a variable: conditions nearer than that are meant to be the same
+_PLACES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
+
+
+def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
+    """The rig of ``dataset`` with the nominal model that ``spec`` asks for; ValueError where there is none such.
+
+    Effects that ``spec`` names are part of the nominal model and no suspects.
+    """
+    model = model_for(dataset, spec)
+    if isinstance(model, FlexibleWing):
+        return WingSubject(dataset, model)
+    return VehicleSubject(dataset, model)
+
+
+@dataclass(frozen=True, eq=False)
+class WingSubject:
+    """A flexible wing that was recorded as tracks of markers."""
+
+    dataset: Dataset
+    model: FlexibleWing
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Effects of the library that a wing can have and the nominal model has not."""
+        return _suspects(self.model.wing, self.model.effects)
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """Leading edge from root to tip and trailing edge back, (x, y) in m, closed."""
+        stations = self.model.wing.stations
+        front = [(s.leading_edge, s.y) for s in stations]
+        rear = [(s.leading_edge + s.chord, s.y) for s in reversed(stations)]
+        return (*front, *rear, front[0])
+
+    @property
+    def told(self) -> str:
+        """The model in words."""
+        bodies = Division.parse(self.model.division).bodies
+        along = ", ".join(map(str, bodies)) if len(set(bodies)) > 1 else f"{bodies[0]} each"
+        words = f"flexible wing of {sum(bodies)} bodies in {len(bodies)} strips ({along})"
+        return words + _with(self.model.effects)
+
+    def extended(self, names: Sequence[str]) -> FlexibleWing:
+        """The nominal model with suspects put in, switched off."""
+        return self.model.with_effects(*names)
+
+    def finer(self) -> WingSubject | None:
+        """Two strips more, and along the chord the next even number of bodies; None beyond MOST_BODIES.
+
+        Both at once: strips alone would not show the bending along the chord that a division leaves out, and that is
+        most of its error (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm).
+        Even, since an odd number is worse than one fewer: of 18 bodies, 3 along the chord, 3 to 5 mm.
+        """
+        bodies = Division.parse(self.model.division).bodies
+        strips, chordwise = len(bodies) + 2, max(bodies) // 2 * 2 + 2
+        if strips * chordwise > MOST_BODIES:
+            return None
+        return replace(self, model=replace(self.model, division=f"{strips}x{chordwise}"))
+
+    def places(self, recording: Recording) -> tuple[Place, ...]:
+        """Where each channel of ``recording`` is measured: three of each marker, at its place at rest."""
+        wing, planform, found = self.model.wing, Planform(self.model.wing), []
+        for name in recording.markers:
+            x, y, _ = wing.marker(name).position
+            span = float(np.clip((y - wing.stations[0].y) / wing.span, 0.0, 1.0))
+            found += [Place(name, axis, span, planform.fraction(x, y), x, y) for axis in "xyz"]
+        return tuple(found)
+
+    def origin(self, recording: Recording) -> float:
+        """Phase (rad) at which the reference markers rise through the height of the hinge."""
+        return recorded_crossing(self.model.wing, recording)
+
+    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """Tracks of all markers under ``condition``, at the phases of the recording made under the most similar one."""
+        blank = _blank(self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers))
+        if not isinstance(model, FlexibleWing):
+            raise TypeError(f"a wing is shown by a flexible wing, not by {type(model).__name__}")
+        beat = model.beat(genome, blank)
+        if beat.reason is not None:
+            return None
+        place = np.round(len(beat.tracks) * condition.flap_frequency * blank.times).astype(int) % len(beat.tracks)
+        rough = replace(blank, values=beat.tracks[place].reshape(len(blank.times), -1))  # so that it can be aligned
+        seen = model.observe(genome[None], rough)
+        return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that one might record next."""
+        return _conditions(self.dataset)
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleSubject:
+    """A flapping vehicle that was recorded as forces."""
+
+    dataset: Dataset
+    model: BladeElementWing
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Effects of the library that a vehicle can have and the nominal model has not, as an effect or as a term."""
+        known = {*self.model.effects, *self.model.terms}
+        return _suspects(self.model.vehicle, known if self.model.vehicle.claps else known | {"clap_and_peel"})
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """None: forces do not tell a place."""
+        return ()
+
+    @property
+    def told(self) -> str:
+        """The model in words."""
+        terms = set(self.model.terms)
+        preset = min(PRESETS.values(), key=lambda one: len(terms ^ set(one.terms)))
+        lacking = [name for name in preset.terms if name not in terms]
+        more = [name for name in self.model.terms if name not in preset.terms]
+        changed = [f"without {', '.join(lacking)}"] * bool(lacking) + [f"with {', '.join(more)}"] * bool(more)
+        words = f"quasi-steady blade elements, model {preset.name!r} ({preset.description})"
+        return words + "".join(f", {one}" for one in changed) + _with(self.model.effects)
+
+    def extended(self, names: Sequence[str]) -> BladeElementWing:
+        """The nominal model with suspects put in, switched off."""
+        return self.model.with_effects(*names)
+
+    def finer(self) -> VehicleSubject | None:
+        """Twice as many elements and instants; None where this changes no recorded force by CONVERGED, or too many."""
+        finer = replace(self.model, elements=2 * self.model.elements, instants=2 * self.model.instants)
+        if finer.elements > MOST_ELEMENTS or not self._changes(finer):
+            return None
+        return replace(self, model=finer)
+
+    def _changes(self, finer: BladeElementWing) -> bool:
+        nominal = np.array([[gene.nominal for gene in self.model.genes]])
+        for recording in self.dataset.recordings:
+            own, other = (model.beat(nominal, recording)[0] for model in (self.model, finer))
+            if np.sqrt(np.mean((own - other[::2]) ** 2)) > CONVERGED * np.sqrt(np.mean(own**2)):
+                return True
+        return False
+
+    def places(self, recording: Recording) -> tuple[Place, ...]:
+        """Which axis each channel of ``recording`` is measured along."""
+        return tuple(Place(f"force_{axis}", axis) for axis in recording.forces)
+
+    def origin(self, recording: Recording) -> float:  # noqa: ARG002 - the protocol's
+        """Zero: times of forces count from the start of a beat."""
+        return 0.0
+
+    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """Forces along both axes under ``condition``, at the phases of the recording under the most similar one."""
+        blank = _blank(self.dataset, condition, forces=("x", "z"))
+        seen = model.observe(genome[None], blank)
+        return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that one might record next."""
+        return _conditions(self.dataset)
+
+
+# -- suspects --------------------------------------------------------------------------------------------------
+
+
+def _suspects(rig: Wing | Vehicle, known: Collection[str]) -> tuple[Suspect, ...]:
+    return tuple(
+        _suspect(effect, rig) for effect in EFFECTS.values() if effect.applies_to(rig) and effect.name not in known
+    )
+
+
+def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
+    places = {_PLACES[p.name]: f"{effect.name}.{p.name}" for p in effect.parameters if p.place and p.name in _PLACES}
+    return Suspect(
+        name=effect.name,
+        title=effect.title,
+        family=effect.family,
+        genes=effect.genes(rig),
+        sizes=sizes(effect),
+        typical=effect.typical(rig),
+        source=effect.source,
+        signature=effect.signature,
+        places=places,
+        page=f"docs/effects/{effect.name}.md",
+    )
+
+
+def _with(effects: Sequence[str]) -> str:
+    """The effects that a model has, in words."""
+    return f", with {', '.join(repr(EFFECTS[name].title) for name in effects)}" if effects else ""
+
+
+# -- conditions ------------------------------------------------------------------------------------------------
+
+
+def _blank(
+    dataset: Dataset, condition: Condition, markers: tuple[str, ...] = (), forces: tuple[ForceAxis, ...] = ()
+) -> Recording:
+    """A recording of such channels without data, otherwise like the one made under the most similar condition.
+
+    Its instants are at the same phases of the beat, so that it shows as much as that one.
+    """
+    like = min(dataset.recordings, key=lambda recording: _unlike(dataset, recording.condition, condition))
+    times = like.times * (like.condition.flap_frequency / condition.flap_frequency)
+    values = np.full((len(times), 3 * len(markers) + len(forces)), np.nan)
+    return replace(
+        like,
+        name=_name(condition),
+        condition=condition,
+        times=times,
+        markers=markers,
+        forces=forces,
+        values=values,
+        standard_deviation=None,
+    )
+
+
+def _name(condition: Condition) -> str:
+    """Of a recording made under ``condition``."""
+    lag, incidence = np.degrees(condition.phase_lag), np.degrees(condition.angle_of_attack)
+    return (
+        f"{condition.flap_frequency:g}hz-lag{lag:.3g}deg-{condition.pressure / 100.0:g}mbar-{condition.airspeed:g}ms-"
+        f"{incidence:.3g}deg"
+    )
+
+
+def _unlike(dataset: Dataset, one: Condition, other: Condition) -> tuple[bool, float]:
+    """Whether only one of two conditions has a stream, and how far apart they are otherwise."""
+    places = _places([one, other], [recording.condition for recording in dataset.recordings])
+    return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(places[0] - places[1]))
+
+
+def _conditions(dataset: Dataset) -> tuple[Condition, ...]:
+    """What the rigs of ``dataset`` can run and did not, at most MOST_CONDITIONS that are far from all else.
+
+    Every frequency and lag that a rig ran, and those half-way between neighbours, with every stream (pressure,
+    airspeed, incidence) alike. In free flight the vehicle, not the experimenter, chooses what goes with what: there
+    nothing is proposed.
+    """
+    recorded, able = [recording.condition for recording in dataset.recordings], list[Condition]()
+    for rig in dict.fromkeys(r.rig for r in dataset.recordings if r.rig != "free_flight"):
+        able += _combined([r.condition for r in dataset.recordings if r.rig == rig])
+    return tuple(_spread(able, recorded, MOST_CONDITIONS))
+
+
+def _combined(ran: Sequence[Condition]) -> Iterator[Condition]:
+    """All combinations of what one rig ran."""
+    frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
+    for f, lag, stream in product(_between(frequencies), _between(lags), _streams(ran)):
+        yield replace(stream, flap_frequency=f, phase_lag=lag)
+
+
+def _streams(ran: Sequence[Condition]) -> list[Condition]:
+    """Conditions with unlike streams, and half-way between neighbours: pressures are halved in their logarithm."""
+    names = ("pressure", "airspeed", "angle_of_attack")
+    levels = {name: _levels([getattr(c, name) for c in ran], logarithm=name == "pressure") for name in names}
+    snapped = {tuple(_nearest(levels[name], getattr(c, name)) for name in names): c for c in ran}
+    streams = [replace(c, **dict(zip(names, key, strict=True))) for key, c in sorted(snapped.items())]
+    streams.sort(key=lambda c: (c.airspeed, c.pressure))
+    for one, other in list(pairwise(streams)):
+        half = {name: 0.5 * (getattr(one, name) + getattr(other, name)) for name in names}
+        streams.append(replace(one, **half | {"pressure": float(np.sqrt(one.pressure * other.pressure))}))
+    return streams
+
+
+def _levels(values: Sequence[float], *, logarithm: bool = False) -> list[float]:
+    """Values that are meant to differ: those within MERGED of their range, or half of it of the largest, are one."""
+    ordered = sorted(values)
+    scaled = [_logarithm(value) for value in ordered] if logarithm else ordered
+    apart = MERGED * max(scaled[-1] - scaled[0], 0.5 * abs(scaled[-1]))
+    groups, first = [[ordered[0]]], scaled[0]
+    for value, at in zip(ordered[1:], scaled[1:], strict=True):
+        if at - first > apart:
+            groups.append([])
+            first = at
+        groups[-1].append(value)
+    return [group[len(group) // 2] for group in groups]
+
+
+def _logarithm(pressure: float) -> float:
+    """Of a pressure in Pa; below 1 Pa there is nothing to tell apart."""
+    return float(np.log(max(pressure, 1.0)))
+
+
+def _between(levels: Sequence[float]) -> list[float]:
+    """The levels, and the middles between neighbours."""
+    return [*levels, *(0.5 * (one + other) for one, other in pairwise(levels))]
+
+
+def _nearest(levels: Sequence[float], value: float) -> float:
+    return min(levels, key=lambda level: abs(level - value))
+
+
+def _spread(able: Sequence[Condition], recorded: Sequence[Condition], most: int) -> Iterator[Condition]:
+    """Up to ``most`` of those ``able``, each the farthest from all that are recorded or taken already."""
+    if not able:
+        return
+    places, taken = _places(able, recorded), _places(recorded, recorded)
+    near = np.linalg.norm(places[:, None] - taken[None], axis=2).min(axis=1)
+    for _ in range(most):
+        k = int(np.argmax(near))
+        if near[k] <= MERGED:
+            return
+        yield able[k]
+        near = np.minimum(near, np.linalg.norm(places - places[k], axis=1))
+
+
+def _places(conditions: Sequence[Condition], ran: Sequence[Condition]) -> Array:
+    """Conditions [N, 5] in parts of the range that was run: frequency, lag, log pressure, airspeed, incidence."""
+
+    def numbers(some: Sequence[Condition]) -> Array:
+        rows = [(c.flap_frequency, c.phase_lag, _logarithm(c.pressure), c.airspeed, c.angle_of_attack) for c in some]
+        return np.array(rows, float)
+
+    reach = np.ptp(numbers(ran), axis=0)
+    return numbers(conditions) / np.where(reach > 0, reach, 1.0)

@@ -1,0 +1,181 @@
+"""The score test of every suspect: how much of the misfit it would take, the nominal genes free to adapt.
+
+A suspect is put in at the sizes at which it is met in practice, at several places and shapes, and the changes that this
+makes to the simulated recordings are fitted to what is left, after what the nominal genes can do has been taken out of
+both (a score test with nuisance parameters: Rao 1948; here with finite sizes: many effects have no slope at zero).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from calibration.evaluator import Evaluator
+from calibration.linearised import free_genes, unit_at, values_at
+from calibration.problem import Problem, base_genome
+from diagnosis.fit import Fit
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject, Suspect
+
+Array = npt.NDArray[np.float64]
+
+PLACES = 16  # of a suspect that acts at a place
+SHAPES = 8  # of one with other shape genes
+INDEPENDENT = 1e-7  # of the largest direction of what the nominal genes can do
+SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One size (or several, one by one) of a suspect at one place: what it does.
+
+    Attributes:
+        suspect: which.
+        unit: [S, E] its genes in parts of their boxes, one row for each size.
+        fields: [S, D] what each changes of the coefficients.
+        gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
+        amounts: [S] by how much each must be multiplied.
+        freedom: degrees of freedom, genes of place and shape included.
+    """
+
+    suspect: Suspect
+    unit: Array
+    fields: Array
+    gain: float
+    amounts: Array
+    freedom: int
+
+    @property
+    def start(self) -> Array:
+        """Genes [E] of the suspect, in parts of their boxes, where the fit puts them."""
+        off = off_units(self.suspect)
+        size = size_columns(self.suspect)
+        start = self.unit[0].copy()
+        start[size] = off[size] + self.amounts @ (self.unit[:, size] - off[size])
+        return np.clip(start, 0.0, 1.0)
+
+
+class Nuisance:
+    """What the nominal genes can do: projections of whitened vectors [..., D] on what they cannot."""
+
+    def __init__(self, jacobian: Array, scale: Array) -> None:
+        basis, power, _ = np.linalg.svd(jacobian / scale[:, None], full_matrices=False)
+        self.basis: Array = np.asarray(basis[:, power > INDEPENDENT * power.max(initial=0.0)])
+
+    def rest(self, white: Array) -> Array:
+        """``white`` without what they can do."""
+        rest: Array = white - (white @ self.basis) @ self.basis.T
+        return rest
+
+
+def off_units(suspect: Suspect) -> Array:
+    """Genes [E] in parts of their boxes with the suspect switched off."""
+    return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
+
+
+def size_columns(suspect: Suspect) -> list[int]:
+    """Columns of the genes that are its size."""
+    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.sizes]
+
+
+def screened(
+    subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, suspects: Sequence[Suspect]
+) -> Iterator[tuple[Suspect, list[Trial]]]:
+    """Try every suspect about the nominal fit; yields its trials, best first (none where it cannot be simulated)."""
+    nuisance = Nuisance(nominal.jacobian, stack.scale)
+    left = nuisance.rest(nominal.coefficients / stack.scale)
+    values = nominal.problem.base.replace(nominal.values).as_dict()
+    for suspect in suspects:
+        model = subject.extended([suspect.name])
+        free = tuple(gene.name for gene in suspect.genes)
+        problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
+        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance, left)
+
+
+def _tried(
+    stack: Stack,
+    problem: Problem,
+    nominal: Fit,
+    evaluator: Evaluator,
+    suspect: Suspect,
+    nuisance: Nuisance,
+    left: Array,
+) -> list[Trial]:
+    blocks = list(_blocks(suspect))
+    units = np.concatenate(blocks)
+    found, reasons, _ = stack.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    bad = np.array([reason is not None for reason in reasons])
+    changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
+    trials, row = [], 0
+    for block in blocks:
+        rows = slice(row, row + len(block))
+        row += len(block)
+        if not bad[rows].any():
+            trials.append(_trial(stack, suspect, block, changes[rows], nuisance, left))
+    return sorted(trials, key=lambda trial: -trial.gain)
+
+
+def _trial(stack: Stack, suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance, left: Array) -> Trial:
+    own = nuisance.rest(fields / stack.scale)
+    amounts = _amounts(own, left, _limits(suspect, block), seen=SEEN * np.sqrt(len(left)))
+    gain = float(left @ left - np.sum((left + amounts @ own) ** 2))
+    return Trial(suspect, block, fields, max(gain, 0.0), amounts, len(suspect.genes))
+
+
+def _amounts(own: Array, left: Array, limits: tuple[Array, Array], *, seen: float) -> Array:
+    """Multiples [S] of the fields ``own`` [S, D] that fit -left best within ``limits``."""
+    length = np.linalg.norm(own, axis=1)
+    told = length > seen
+    amounts = np.zeros(len(own))
+    if not told.any():
+        return amounts
+    part = own[told]
+    inner = part @ part.T + 1e-9 * np.diag(length[told] ** 2)
+    best = -np.linalg.solve(inner, part @ left)
+    low, high = limits[0][told], limits[1][told]
+    if ((best < low) | (best > high)).any() and len(best) == 1:
+        best = np.clip(best, low, high)
+    elif ((best < low) | (best > high)).any():
+        best = best * min(
+            1.0,
+            float(np.min(np.where(best > 0, high / np.maximum(best, 1e-300), 1.0))),
+            float(np.min(np.where(best < 0, low / np.minimum(best, -1e-300), 1.0))),
+        )
+    amounts[told] = best
+    return amounts
+
+
+def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
+    """Least and largest multiples [S] of each size that stay in the box."""
+    off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
+    for row, unit in enumerate(block):
+        column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
+        move = unit[column] - off[column]
+        ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
+        low[row], high[row] = ends
+    return low, high
+
+
+def _blocks(suspect: Suspect) -> Iterator[Array]:
+    """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
+    off, size = off_units(suspect), size_columns(suspect)
+    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    shape = [k for k in range(len(off)) if k not in size]
+    wide = len(suspect.places) > 0
+    count = (PLACES if wide else SHAPES) if shape else 0
+    spots = [typical[shape], *qmc.Halton(max(len(shape), 1), scramble=False).random(count + 1)[1:, : len(shape)]]
+    for spot in spots if shape else [typical[shape]]:
+        for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
+            block = []
+            for k in size:
+                row = off.copy()
+                row[shape] = spot
+                row[k] = np.clip(off[k] + part * (typical[k] - off[k]), 0.0, 1.0)
+                if row[k] != off[k]:
+                    block.append(row)
+            if len(block) == len(size):
+                yield np.array(block)

@@ -1,0 +1,115 @@
+"""What a diagnosis needs of a rig: a model that can be extended, the suspects, a finer model, and where channels lie.
+
+The two rigs that are known are adapted in :mod:`diagnosis.rigs`; any other that meets :class:`Subject` will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from records import Condition, Gene, Recording
+from sim.model import Model
+
+Array = npt.NDArray[np.float64]
+Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """A piece of physics, or a fault of the measurement, that the nominal model lacks and that may be put in.
+
+    Attributes:
+        name: by which :meth:`Subject.extended` puts it in.
+        title: for people.
+        family: physics, or "measurement".
+        genes: those it adds; all sizes at zero switch it off exactly.
+        sizes: names of the genes that are its size.
+        places: names of genes that say where on the wing it acts: "span" and "chord" in parts, or nothing.
+        typical: values of all its genes at which it is as large as it is met in practice.
+        source: where its law is from.
+        signature: what it looks like in a recording.
+        page: where one reads more, or "".
+    """
+
+    name: str
+    title: str
+    family: Family
+    genes: tuple[Gene, ...]
+    sizes: tuple[str, ...]
+    typical: Mapping[str, float]
+    source: str
+    signature: str
+    places: Mapping[Literal["span", "chord"], str]
+    page: str = ""
+
+    @property
+    def shapes(self) -> tuple[str, ...]:
+        """Names of the genes that are not its size."""
+        return tuple(gene.name for gene in self.genes if gene.name not in self.sizes)
+
+
+class Place(NamedTuple):
+    """Where a channel is measured: ``name`` of the marker or force axis, ``axis`` ("x", "y", "z"), place on the wing.
+
+    ``span`` and ``chord`` in parts, ``x`` and ``y`` in m; None for a force.
+    """
+
+    name: str
+    axis: str
+    span: float | None = None
+    chord: float | None = None
+    x: float | None = None
+    y: float | None = None
+
+
+class Subject(Protocol):
+    """A rig under diagnosis."""
+
+    @property
+    def model(self) -> Model:
+        """The nominal model."""
+        ...
+
+    @property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """All that may be put in."""
+        ...
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """Outline of the wing, (x, y) in m, closed; empty where there is nothing to draw."""
+        ...
+
+    @property
+    def told(self) -> str:
+        """The model in words."""
+        ...
+
+    def extended(self, names: Sequence[str]) -> Model:
+        """The nominal model with suspects put in; their genes follow its own, switched off."""
+        ...
+
+    def finer(self) -> Subject | None:
+        """The same with the next finer division; None where there is none, or it would cost too much."""
+        ...
+
+    def places(self, recording: Recording) -> tuple[Place, ...]:
+        """Where each channel of ``recording`` is measured."""
+        ...
+
+    def origin(self, recording: Recording) -> float:
+        """Phase 2 pi f t (rad) of ``recording`` at which a beat begins."""
+        ...
+
+    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """What ``model`` with ``genome`` [G] shows under ``condition``, recorded as the rig does; None if it fails."""
+        ...
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that one might record next."""
+        ...
