@@ -2,14 +2,16 @@
 
 A recording shows y = H w + S g + noise: y what was recorded less what the nominal model says, H the responses to unit
 loads (a :class:`sim.effects.probe.Probe`), w their sizes under this condition, S the sensitivities to the nominal genes
-and g what the genes are wrong by, the same for all recordings. A priori loads are smooth along the span and in the beat;
-how strong they are under each condition, and how smooth, is what makes the data most probable (evidence: MacKay, Neural
-Computation 4, 1992, Eqs. 2.8-2.14). Genes may be wrong by a good part of their box.
+and g what the genes are wrong by, the same for all recordings. Tracks tell well when a load acts, and its moment about
+the root, but hardly how it is spread along the span. So several kinds of load are possible a priori, smooth ones and
+those of one place, of free shape in the beat; the evidence (MacKay, Neural Computation 4, 1992, Eqs. 2.8-2.14) says how
+probable each kind is and how strong the load under each condition, and all that is told is averaged over the kinds.
+Genes may be wrong by a good part of their box.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -23,13 +25,18 @@ Array = npt.NDArray[np.float64]
 
 PHASES = 36  # instants of a beat that loads are told at
 GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
-_LENGTHS = (0.12, 0.25, 0.5)  # of the span, over which loads are alike
-_DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
-_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
+LINEAR = 0.03  # of a response: what is not proportional to the load
 TOLD = 3.0  # natural logarithm of the evidence for a load over none: less is none
 SIGNIFICANT = 2.0  # standard errors
+_LENGTHS = (0.25, 0.5)  # of the span, over which smooth loads are alike
+_CENTRES = np.linspace(0.0, 1.0, 41)  # of loads of one place, parts of the span
+_WIDTHS = (0.07, 0.15, 0.3)  # their standard deviation
+_DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
+_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
+_LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
+_MOST = 24  # kinds to average over
 _DRAWS = 400
-_FINE = 81
+_FINE = 41
 
 
 @dataclass(frozen=True)
@@ -83,51 +90,53 @@ def _decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) ->
 
 
 @dataclass(frozen=True)
-class Inferred:
-    """Loads under each of R conditions: sizes [R, P] of the unit loads, their covariance [R, P, P], evidence [R].
+class Kind:
+    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P], genes [F].
 
-    ``evidence``: natural logarithm, for a load in this recording over none; ``names`` and ``crossings`` of the
-    recordings; ``genes`` [F]: what the nominal genes are wrong by at the same time, unit coordinates; ``floor`` [R]: by
-    which the noise was taken to be larger than told, because no load explains the rest.
+    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span; None for smooth loads.
+    """
+
+    probability: float
+    centre: float | None
+    width: float | None
+    sizes: Array
+    covariance: Array
+    genes: Array
+
+
+@dataclass(frozen=True)
+class Inferred:
+    """Loads under each of R conditions.
+
+    Attributes:
+        probe: whose unit loads they are made of.
+        names: of the recordings.
+        crossings: of the recordings, :attr:`Case.crossing`.
+        kinds: of load, the most probable first.
+        evidence: [R] natural logarithm, for a load in this recording over none.
+        floor: [R], by which the noise was taken to be larger than told, because no load explains the rest.
     """
 
     probe: Probe
     names: tuple[str, ...]
     crossings: tuple[float, ...]
-    sizes: Array
-    covariance: Array
+    kinds: tuple[Kind, ...]
     evidence: Array
-    genes: Array
     floor: Array
 
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
         """Loads and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
         values, errors = [], []
         for r, crossing in enumerate(self.crossings):
-            basis = _basis(self.probe, span, phase + crossing)
-            values.append(basis @ self.sizes[r])
-            errors.append(np.sqrt(np.einsum("np,pq,nq->n", basis, self.covariance[r], basis)))
+            basis = np.kron(self.probe.hats(span), self.probe.terms(phase + crossing))
+            each = np.array([basis @ kind.sizes[r] for kind in self.kinds])
+            own = [np.einsum("np,pq,nq->n", basis, k.covariance[r], basis, optimize=True) for k in self.kinds]
+            weight = np.array([kind.probability for kind in self.kinds])
+            mean = weight @ each
+            values.append(mean)
+            errors.append(np.sqrt(weight @ (np.array(own) + (each - mean) ** 2)))
         shape = (len(self.names), len(span), len(phase))
         return np.reshape(values, shape), np.reshape(errors, shape)
-
-
-def _basis(probe: Probe, span: Array, phase: Array) -> Array:
-    """[span * phase, P]."""
-    return np.kron(probe.hats(span), probe.terms(phase))
-
-
-@dataclass(frozen=True)
-class LoadPlace:
-    """Where and when the missing load acts: centres with 90 % intervals, and from where to where it is significant.
-
-    ``span`` in parts of it, ``phase`` in beats from the start of the beat; None where it is spread over the whole
-    beat. ``reach`` and ``lasts`` hold 90 % of it; ``lasts`` may begin below 0 or end beyond 1 where it passes the start.
-    """
-
-    span: Interval
-    reach: tuple[float, float]
-    phase: Interval | None
-    lasts: tuple[float, float]
 
 
 class _Normal:
@@ -137,7 +146,9 @@ class _Normal:
         H, S, y = case.responses, case.sensitivities, case.lacking
         both = np.concatenate([H, S], axis=1)
         left = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
-        self.floor = float(np.sqrt(max(1.0, left @ left / max(len(y) - both.shape[1], 1))))
+        size, left_over = both.shape[1], float(left @ left)
+        told = max(float(y @ y) - left_over - size, 0.0) / size  # mean square, in the directions of loads and genes
+        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + LINEAR**2 * told))
         scale = self.floor**-2
         self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
         self.h, self.s = scale * (H.T @ y), scale * (S.T @ y)
@@ -158,30 +169,45 @@ def infer(cases: Sequence[Case], probe: Probe) -> Inferred:
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
     normals = [_Normal(case) for case in cases]
-    roots = [_root(probe, length, decay) for length, decay in product(_LENGTHS, _DECAYS)]
-    evidence = np.array([[normal.evidence(root) for root in roots] for normal in normals])
-    best = int(np.argmax(evidence.max(axis=2).sum(axis=0)))
-    strengths = _STRENGTHS[evidence[:, best].argmax(axis=1)]
-    sizes, covariance, genes = _solved(normals, [strength * roots[best] for strength in strengths])
+    roots = list(_roots(probe))
+    evidence = np.array([[normal.evidence(root) for normal in normals] for _, _, _, root in roots])  # [kinds, R, .]
+    best = evidence.max(axis=2)
+    prior = np.log([share for share, _, _, _ in roots])
+    total = best.sum(axis=1) + prior
+    weight = np.exp(total - total.max())
+    kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
+    kinds = []
+    for k in kept:
+        _, centre, width, root = roots[k]
+        strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
+        solved = _solved(normals, [strength * root for strength in strengths])
+        kinds.append(Kind(float(weight[k] / weight[kept].sum()), centre, width, *solved))
     return Inferred(
         probe,
         tuple(case.name for case in cases),
         tuple(case.crossing for case in cases),
-        sizes,
-        covariance,
-        evidence[:, best].max(axis=1),
-        genes,
+        tuple(kinds),
+        best[kept[0]],
         np.array([normal.floor for normal in normals]),
     )
 
 
-def _root(probe: Probe, length: float, decay: float) -> Array:
-    """Square root [P, P] of the covariance of loads of strength one."""
-    y = np.array(probe.stations)
-    alike = np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))
-    order = np.arange(1, probe.harmonics + 1)
-    spread = np.concatenate([[1.0], np.tile(order**-decay, 2)])
-    return np.kron(np.linalg.cholesky(alike), np.diag(spread))
+def _roots(probe: Probe) -> Iterator[tuple[float, float | None, float | None, Array]]:
+    """Kinds of load: probability a priori, centre and width if it has a place, and a square root [P, Z] of its
+    covariance at strength one. Smooth loads and loads of one place are equally probable."""
+    y, order = np.array(probe.stations), np.arange(1, probe.harmonics + 1)
+    span = np.linspace(0.0, 1.0, 401)
+    hats = probe.hats(span)
+    spreads = [np.diag(np.concatenate([[1.0], np.tile(order**-decay, 2)])) for decay in _DECAYS]
+    for length, spread in product(_LENGTHS, spreads):
+        alike = np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))
+        yield 0.5 / (len(_LENGTHS) * len(_DECAYS)), None, None, np.kron(np.linalg.cholesky(alike), spread)
+    share = 0.5 / (len(_CENTRES) * len(_WIDTHS) * len(_DECAYS))
+    for centre, width in product(_CENTRES, _WIDTHS):
+        bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
+        shape = np.linalg.lstsq(hats, bump, rcond=None)[0][:, None]  # of the same force and moment
+        for spread in spreads:
+            yield share, float(centre), width, np.kron(shape, spread)
 
 
 def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -190,7 +216,7 @@ def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, 
     precision, slope = np.eye(F) / GENES**2, np.zeros(F)
     inner = []
     for one, root in zip(normals, roots, strict=True):
-        V = root @ np.linalg.solve(np.eye(len(root)) + root.T @ one.A @ root, root.T)
+        V = root @ np.linalg.solve(np.eye(root.shape[1]) + root.T @ one.A @ root, root.T)
         inner.append(V)
         precision = precision + one.C - one.B.T @ V @ one.B
         slope = slope + one.s - one.B.T @ V @ one.h
@@ -220,14 +246,13 @@ def missing_force(
     beat); ``noise`` its standard deviation (N) with correlation ``memory`` from sample to sample.
     """
     seen = np.isfinite(residuals)
-    probe = Probe((0.0, 1.0), harmonics)
-    rows = np.concatenate([-residuals[seen, None], probe.terms(phase[seen])], axis=1)
+    series = Probe((0.0, 1.0), harmonics).terms
+    rows = np.concatenate([-residuals[seen, None], series(phase[seen])], axis=1)
     white = _decorrelated(rows, np.flatnonzero(seen), memory) / noise
     spread = np.linalg.pinv(white[:, 1:].T @ white[:, 1:])
     at = np.arange(PHASES) / PHASES
-    basis = probe.terms(at)
-    values = basis @ spread @ white[:, 1:].T @ white[:, 0]
-    errors = np.sqrt(np.einsum("np,pq,nq->n", basis, spread, basis))
+    values = series(at) @ spread @ white[:, 1:].T @ white[:, 0]
+    errors = np.sqrt(np.einsum("np,pq,nq->n", series(at), spread, series(at)))
     return MissingLoad(name, (0.0,), tuple(at.tolist()), _table(values[None]), _table(errors[None]), "N")
 
 

@@ -82,7 +82,12 @@ def proof(predicted: Predicted, floor: float, unit: str) -> Proof:
     )
     if predicted.failed:
         words += f"; {predicted.failed[0]}"
-    return Proof(before, after, least, better, words)
+    return Proof(_over(before, least), _over(after, least), least, better, words)
+
+
+def _over(interval: Interval, floor: float) -> Interval:
+    low, high = interval.low, interval.high
+    return Interval(interval.value / floor, low and low / floor, high and high / floor)
 
 
 def _misfits(

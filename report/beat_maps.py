@@ -1,0 +1,250 @@
+"""The misfit and the missing load over span and phase."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
+from diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
+from report.layout import figure, panels
+from report.markup import Markup, joined, tag
+from report.svg import (
+    LEVELS,
+    SIDES,
+    Axis,
+    area,
+    axis,
+    cells,
+    colour_bar,
+    curve,
+    drawing,
+    legend,
+    level,
+    line,
+    side,
+    text,
+    x_axis,
+    y_axis,
+)
+from report.words import Scale, capital, change, channel_scale, number, scale_for, share, shortened, stages
+
+WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
+BOTTOM = TOP + HEIGHT
+PHASE = "phase of the beat"
+BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
+NINETY = 1.645  # standard errors of a two-sided 90 % interval
+MOST_ROWS, MOST_COLUMNS, MOST_LOADS = 32, 64, 6
+Pool = Callable[[Sequence[float]], float]
+
+
+def misfit_maps(finding: Finding) -> Markup | None:
+    """Misfit over span and phase, before and after, against the noise; curves where there is one row."""
+    given = finding.phase_map
+    if given is None or not given.bands or not given.phase:
+        return None
+    scale = channel_scale(finding)
+    if len(given.bands) == 1:
+        lines = [(f"{stage}-line", name) for stage, name in stages(finding).items()]
+        key = legend(*lines, ("noise-line", "what noise alone leaves"))
+        return figure(_misfit_told(finding, given, scale), panels(_misfit_curves(finding, given, scale)), key)
+    most = max(max(map(max, given.before)), max(map(max, given.after)), given.noise)
+    drawings = panels(
+        *(_misfit_map(capital(name), given, getattr(given, s), most, scale) for s, name in stages(finding).items())
+    )
+    note = "Root mean square over all recordings. The line on the colour bar is what noise alone leaves in a cell."
+    return figure(_misfit_told(finding, given, scale), drawings, note=note)
+
+
+def missing_loads(finding: Finding) -> Markup | None:
+    """The load that the nominal model lacks, under the conditions where it is largest."""
+    loads = [m for m in finding.missing if m.stations and m.phase]
+    if not loads:
+        return None
+    shown = sorted(loads, key=lambda m: -_peak(m)[2])[:MOST_LOADS]
+    scale = scale_for((v for load in shown for row in load.values for v in row), shown[0].unit)
+    single = all(len(load.stations) == 1 for load in shown)
+    drawings = panels(
+        *(_load_curve(load, scale) if len(load.stations) == 1 else _load_map(load, scale) for load in shown)
+    )
+    left = len(loads) - len(shown)
+    more = f" {left} more conditions, where it is smaller, are in the JSON." if left else ""
+    if single:
+        return figure(
+            _load_told(shown[0], scale), drawings, legend(("band", "90 % interval")), note=more.strip() or None
+        )
+    note = f"Positive along the flap normal. Each map has its own scale.{more}"
+    key = legend(("hatched", "cannot be told from nothing (90 %)"))
+    return figure(_load_told(shown[0], scale), drawings, key, note=note)
+
+
+def _misfit_told(finding: Finding, given: PhaseMap, scale: Scale) -> str:
+    i, j = _largest(given.before)
+    before, after = given.before[i][j], given.after[i][j]
+    where = f"phase {number(given.phase[j], 2)}"
+    if len(given.bands) > 1:
+        where += f" and {share(given.bands[i])} of the span"
+    if before <= given.noise:
+        return f"Nowhere in the beat does the misfit rise above the noise of {scale.text(given.noise)}"
+    return (
+        f"The misfit peaks at {where}: {change(finding, scale.text(before), scale.text(after))}, "
+        f"where noise alone leaves {scale.text(given.noise)}"
+    )
+
+
+def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: Scale) -> Markup:
+    bands = _pooled([given.bands], MOST_ROWS, _mean)[0]
+    classes: list[list[str | None]] = [[f"l{level(v, most)}" for v in row] for row in _small(values, _rms)]
+    bar = colour_bar(
+        Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
+        BOTTOM + 52,
+        [f"l{k}" for k in range(LEVELS)],
+        f"misfit, {scale.unit}",
+        (given.noise * scale.factor, "noise"),
+    )
+    return drawing(WIDTH, BOTTOM + 94, f"{title}: misfit over span and phase", _grid(title, bands, classes), bar)
+
+
+def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
+    rows = {stage: [v * scale.factor for v in getattr(given, stage)[0]] for stage in stages(finding)}
+    noise = given.noise * scale.factor
+    across, up = (
+        Axis(0, 1, LEFT, RIGHT),
+        axis([noise, *(v for row in rows.values() for v in row)], BOTTOM, TOP, zero=True),
+    )
+    return drawing(
+        WIDTH,
+        BOTTOM + 34,
+        _misfit_told(finding, given, scale),
+        text(LEFT, 14, "Misfit over the beat", class_="title"),
+        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
+        y_axis(up, LEFT, RIGHT, f"misfit, {scale.unit}"),
+        line(LEFT, up.at(noise), RIGHT, up.at(noise), "noise"),
+        *(
+            curve([(across.at(p), up.at(v)) for p, v in zip(given.phase, row, strict=True)], f"curve {stage}")
+            for stage, row in rows.items()
+        ),
+    )
+
+
+def _load_told(load: MissingLoad, scale: Scale) -> str:
+    i, j, ratio = _peak(load)
+    if ratio < NINETY:
+        return "No missing load stands out from its error"
+    where = f"phase {number(load.phase[j], 2)}"
+    if len(load.stations) > 1:
+        where += f" and {share(load.stations[i])} of the span"
+    size = number(load.values[i][j] * scale.factor)
+    error = number(NINETY * load.errors[i][j] * scale.factor, 2)
+    return f"The missing load is clearest at {where}: {size} ± {error} {scale.unit} ({shortened(load.recording, 40)})"
+
+
+def _load_map(load: MissingLoad, scale: Scale) -> Markup:
+    stations = _pooled([load.stations], MOST_ROWS, _mean)[0]
+    values, errors = _small(load.values, _mean), _small(load.errors, _rms)
+    most = max(abs(v) for row in values for v in row) or 1.0
+    classes: list[list[str | None]] = [[f"d{side(v, most)}" for v in row] for row in values]
+    faint: list[list[str | None]] = [
+        ["faint" if abs(v) < NINETY * e else None for v, e in zip(row, errs, strict=True)]
+        for row, errs in zip(values, errors, strict=True)
+    ]
+    bar = colour_bar(
+        Axis(-most * scale.factor, most * scale.factor, LEFT, RIGHT),
+        BOTTOM + 44,
+        [f"d{k}" for k in range(2 * SIDES + 1)],
+        f"missing load, {scale.unit}",
+    )
+    title = shortened(load.recording, 42)
+    return drawing(WIDTH, BOTTOM + 86, f"Missing load, {title}", _grid(title, stations, classes, faint), bar)
+
+
+def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
+    values, errors = ([v * scale.factor for v in table[0]] for table in (load.values, load.errors))
+    low = [v - NINETY * e for v, e in zip(values, errors, strict=True)]
+    high = [v + NINETY * e for v, e in zip(values, errors, strict=True)]
+    across, up = Axis(0, 1, LEFT, RIGHT), axis([*low, *high], BOTTOM, TOP, zero=True)
+    places = [across.at(p) for p in load.phase]
+    ends = [*zip(places, low, strict=True), *reversed(list(zip(places, high, strict=True)))]
+    title = shortened(load.recording, 42)
+    return drawing(
+        WIDTH,
+        BOTTOM + 34,
+        f"Missing load over the beat, {title}",
+        text(LEFT, 14, title, class_="title"),
+        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
+        y_axis(up, LEFT, RIGHT, f"missing load, {scale.unit}"),
+        area([(x, up.at(v)) for x, v in ends], "band"),
+        line(LEFT, up.at(0), RIGHT, up.at(0), "axis"),
+        curve([(x, up.at(v)) for x, v in zip(places, values, strict=True)], "curve after"),
+    )
+
+
+def _grid(
+    title: str, bands: Numbers, classes: list[list[str | None]], over: list[list[str | None]] | None = None
+) -> Markup:
+    """Cells with the tip on top; phase to the right."""
+    across, down = Axis(0, 1, LEFT, RIGHT), Axis(0, 1, TOP, BOTTOM)
+    tall = HEIGHT / len(bands)
+    labels: list[Markup] = []
+    every = math.ceil(13 / tall)
+    for k, band in enumerate(reversed(bands)):
+        if k % every == 0:
+            y = TOP + (k + 0.5) * tall
+            labels.append(text(LEFT - 4, y + 3.5, number(round(100 * band), 3), anchor="end", class_="tick"))
+    turned = tag(
+        "text",
+        "span, % (tip on top)",
+        transform=f"translate(14,{(TOP + BOTTOM) / 2:g}) rotate(-90)",
+        text_anchor="middle",
+        class_="label",
+    )
+    return joined(
+        text(LEFT, 14, title, class_="title"),
+        cells(classes[::-1], across, down),
+        cells(over[::-1], across, down) if over else None,
+        x_axis(across, BOTTOM, BOTTOM + 3, PHASE, BEATS),
+        *labels,
+        turned,
+    )
+
+
+def _largest(table: Table) -> tuple[int, int]:
+    places = [(i, j) for i, row in enumerate(table) for j in range(len(row))]
+    return max(places, key=lambda place: table[place[0]][place[1]])
+
+
+def _peak(load: MissingLoad) -> tuple[int, int, float]:
+    """Row and column where the load is largest in standard errors, and how many."""
+    ratios = tuple(
+        tuple(abs(v) / e if e > 0 else 0.0 for v, e in zip(row, errs, strict=True))
+        for row, errs in zip(load.values, load.errors, strict=True)
+    )
+    i, j = _largest(ratios)
+    return i, j, ratios[i][j]
+
+
+def _pooled(table: Sequence[Sequence[float]], most: int, pool: Pool) -> list[tuple[float, ...]]:
+    """The same with at most ``most`` columns: neighbours are pooled."""
+    columns = len(table[0])
+    if columns <= most:
+        return [tuple(row) for row in table]
+    ends = [round(k * columns / most) for k in range(most + 1)]
+    return [tuple(pool(row[a:b]) for a, b in pairwise(ends)) for row in table]
+
+
+def _small(table: Sequence[Sequence[float]], pool: Pool) -> list[tuple[float, ...]]:
+    """The same with at most as many rows and columns as a drawing shows."""
+    rows = _turned(_pooled(_turned(table), MOST_ROWS, pool))
+    return _pooled(rows, MOST_COLUMNS, pool)
+
+
+def _turned(table: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    return [tuple(column) for column in zip(*table, strict=True)]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(sum(v * v for v in values) / len(values))

@@ -1,0 +1,47 @@
+"""HTML and SVG from parts. Text that is not :class:`Markup` is escaped, so nothing a dataset says becomes markup."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")  # no HTML file may contain these
+_EMPTY = frozenset({"meta", "br", "line", "rect", "circle", "path"})
+
+
+class Markup(str):
+    """Text that is markup already."""
+
+    __slots__ = ()
+
+
+def escaped(value: object) -> Markup:
+    """``value`` as markup: itself where it is, else its text, escaped."""
+    return value if isinstance(value, Markup) else Markup(escape(_CONTROL.sub("\ufffd", str(value))))
+
+
+def tag(element: str, *children: object, **attributes: object) -> Markup:
+    """An element; children that are None and attributes that are None are left out.
+
+    Names of attributes: ``class_`` is "class", ``stroke_width`` is "stroke-width"; numbers are rounded to 1/100.
+    """
+    shown = "".join(f' {_name(k)}="{_value(v)}"' for k, v in attributes.items() if v is not None)
+    inside = joined(*children)
+    if element in _EMPTY and not inside:
+        return Markup(f"<{element}{shown}>" if element in {"meta", "br"} else f"<{element}{shown}/>")
+    return Markup(f"<{element}{shown}>{inside}</{element}>")
+
+
+def joined(*children: object) -> Markup:
+    """Children one after the other."""
+    return Markup("".join(escaped(child) for child in children if child is not None))
+
+
+def _name(attribute: str) -> str:
+    return attribute.rstrip("_").replace("_", "-")
+
+
+def _value(value: object) -> str:
+    if isinstance(value, float):
+        return f"{round(value, 2) + 0.0:g}"
+    return escape(_CONTROL.sub("\ufffd", str(value)))

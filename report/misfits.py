@@ -1,0 +1,227 @@
+"""Before and after: against the floor, for every recording, and in the samples themselves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
+from report.layout import figure, folded, panels, table
+from report.markup import Markup, joined, tag
+from report.svg import Axis, axis, curve, dots, drawing, legend, line, text, whisker, x_axis, y_axis
+from report.words import Scale, bounds, change, channel_scale, condition, number, shortened, stages
+
+WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
+ROW, MOST_ROWS, MOST_OVERLAYS = 38.0, 18, 12
+DECADE = 12.0  # an axis whose ends are further apart than this is logarithmic
+BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+def proof(finding: Finding) -> Markup | None:
+    """Misfit on held-out recordings, in floors."""
+    given = finding.proof
+    if given is None:
+        if finding.verdict == "adequate":
+            return None
+        held_out = any(r.held_out for r in finding.recordings)
+        why = "They were not judged together" if held_out else "No recording was held out"
+        words = f"{why}, so nothing here proves that the fit is better on recordings it has not seen."
+        return tag("p", words, class_="warning")
+    rows: list[tuple[str, Interval]] = [(stage, getattr(given, stage)) for stage in stages(finding)]
+    ends = [v for _, i in rows for v in (i.value, i.low, i.high) if v is not None]
+    along = _along([*ends, 1.0])
+    parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings, over the floor")]
+    for k, (name, interval) in enumerate(rows):
+        y = 34.0 + 38 * k
+        parts.append(text(LEFT, y - 10, f"{name}: {number(interval.value)} ({_range(interval)})", class_="said"))
+        parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
+        parts.append(whisker(along, y + 1, (interval.low, interval.high), interval.value, name))
+    return figure(
+        proof_told(finding, given),
+        panels(drawing(WIDTH, 120, proof_told(finding, given), *parts)),
+        legend(
+            *stages(finding).items(),
+            ("floor", "floor: what a right model would leave"),
+        ),
+        note=given.words or None,
+    )
+
+
+def proof_told(finding: Finding, given: Proof) -> str:
+    """What the proof shows, in a sentence."""
+    if "after" not in stages(finding):
+        return f"On recordings that the fit has not seen, the misfit is {number(given.before.value)} times the floor"
+    times = f"from {number(given.before.value)} to {number(given.after.value)} times the floor"
+    if given.improved:
+        return f"On recordings that the fit has not seen, the misfit falls {times}"
+    return f"On recordings that the fit has not seen, the misfit does not improve surely: {times}"
+
+
+def recordings(finding: Finding) -> Markup | None:
+    """A row for every recording, those held out first."""
+    if not finding.recordings:
+        return None
+    scale = channel_scale(finding)
+    along = _along([v * scale.factor for r in finding.recordings for v in _values(r)])
+    drawings: list[Markup] = []
+    for held_out, name in ((True, "held out"), (False, "fitted")):
+        group = [r for r in finding.recordings if r.held_out == held_out]
+        chunks = [group[k : k + MOST_ROWS] for k in range(0, len(group), MOST_ROWS)]
+        for k, chunk in enumerate(chunks):
+            title = (
+                f"{name.capitalize()} ({len(group)})"
+                if len(chunks) == 1
+                else f"{name.capitalize()} ({k + 1} of {len(chunks)})"
+            )
+            drawings.append(_recordings(finding, title, chunk, along, scale))
+    return joined(
+        figure(
+            recordings_told(finding),
+            panels(*drawings),
+            legend(
+                *stages(finding).items(),
+                ("floor", "floor"),
+            ),
+            note="Root mean square of one channel, with 90 % intervals.",
+        ),
+        folded("The same in numbers", _table(finding, scale)),
+    )
+
+
+def recordings_told(finding: Finding) -> str:
+    """What the rows show, in a sentence."""
+    scale = channel_scale(finding)
+    group = [r for r in finding.recordings if r.held_out] or list(finding.recordings)
+    kind = "held-out" if group[0].held_out else "fitted"
+    better = sum(r.after.value < r.before.value for r in group)
+    before, after = (_median([getattr(r, name).value for r in group]) for name in ("before", "after"))
+    values = change(finding, scale.text(before), scale.text(after))
+    if len(group) == 1:
+        return f"The {kind} recording: {values}"
+    if "after" not in stages(finding):
+        return f"Over {len(group)} {kind} recordings the median misfit is {values}"
+    return f"{better} of {len(group)} {kind} recordings are fitted better; median {values}"
+
+
+def overlays(finding: Finding) -> Markup | None:
+    """Recorded samples with both simulations, as small multiples."""
+    shown = [o for o in finding.overlays if o.phase][:MOST_OVERLAYS]
+    if not shown:
+        return None
+    scale = channel_scale(finding)
+    left = len(finding.overlays) - len(shown)
+    return figure(
+        overlays_told(finding, shown, scale),
+        panels(*(_overlay(finding, o, scale) for o in shown), small=True),
+        legend(
+            ("recorded", "recorded"),
+            *((f"{stage}-line", name) for stage, name in stages(finding).items()),
+        ),
+        note=f"{left} more in the JSON." if left else None,
+    )
+
+
+def overlays_told(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
+    """What the overlays show, in a sentence."""
+    before, after = (_median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
+    values = change(finding, scale.text(before), scale.text(after))
+    return f"Distance between simulated and recorded beats, typically: {values}"
+
+
+def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], along: Axis, scale: Scale) -> Markup:
+    bottom = 24 + ROW * len(rows)
+    parts: list[Markup] = [x_axis(along, 22, bottom, f"misfit, {scale.unit}")]
+    for k, row in enumerate(rows):
+        y = 24 + ROW * k
+        parts.append(tag("text", tag("title", row.name), _held(row, 48), x=LEFT, y=y + 11, class_="said"))
+        floor = along.at(row.floor * scale.factor)
+        parts.append(line(floor, y + 15, floor, y + 35, "floor"))
+        for at, name in zip((y + 21, y + 29), stages(finding), strict=False):
+            interval: Interval = getattr(row, name)
+            ends = tuple(None if v is None else v * scale.factor for v in (interval.low, interval.high))
+            parts.append(whisker(along, at, (ends[0], ends[1]), interval.value * scale.factor, name))
+    label = f"{title}: misfit by recording"
+    return drawing(WIDTH, bottom + 30, label, text(LEFT, 14, title, class_="title"), *parts)
+
+
+def _held(row: RecordingMisfit, letters: int) -> str:
+    said = condition(row)
+    return f"{shortened(row.name, max(14, letters - len(said)))} \u2002 {said}"
+
+
+def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
+    """The beat, and below it on a scale of its own what either simulation leaves of it."""
+    left, right = 50.0, 292.0
+    simulated = {name: [v * scale.factor for v in getattr(overlay, name)] for name in stages(finding)}
+    recorded = [v * scale.factor for v in overlay.recorded]
+    left_over = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
+    across = Axis(0, 1, left, right)
+    places = [across.at(p) for p in overlay.phase]
+    up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
+    rest = axis([v for values in left_over.values() for v in values], 226, 160, zero=True)
+    title = shortened(overlay.channel, 28)
+    below = f"{shortened(overlay.recording, 30)}, {'held out' if overlay.held_out else 'fitted'}"
+    return drawing(
+        300,
+        258,
+        f"{title}, {below}: recorded and simulated over one beat, and their difference",
+        text(left, 14, title, class_="title"),
+        text(left, 30, below, class_="tick"),
+        x_axis(across, 42, 226, "phase of the beat", BEATS),
+        y_axis(up, left, right, scale.unit),
+        y_axis(rest, left, right, f"left over, {scale.unit}", count=3),
+        line(left, rest.at(0), right, rest.at(0), "axis"),
+        dots([(x, up.at(v)) for x, v in zip(places, recorded, strict=True)], "samples"),
+        *(
+            curve([(x, on.at(v)) for x, v in zip(places, values[name], strict=True)], f"curve {name}")
+            for on, values in ((up, simulated), (rest, left_over))
+            for name in simulated
+        ),
+    )
+
+
+def _table(finding: Finding, scale: Scale) -> Markup:
+    def cell(interval: Interval) -> str:
+        return f"{number(interval.value * scale.factor)} ({bounds(interval, scale)})"
+
+    rows = [
+        (
+            r.name,
+            "held out" if r.held_out else "fitted",
+            condition(r),
+            *(cell(getattr(r, stage)) for stage in stages(finding)),
+            number(r.floor * scale.factor),
+        )
+        for r in finding.recordings
+    ]
+    columns = [f"{stage}, {scale.unit}" for stage in stages(finding)]
+    head = ("recording", "", "condition", *columns, f"floor, {scale.unit}")
+    return table(head, rows, numbers=len(columns) + 1)
+
+
+def _along(values: Sequence[float]) -> Axis:
+    """From zero, or logarithmic where the values are too far apart to be told apart near zero."""
+    positive = [v for v in values if v > 0]
+    low, high = min(positive, default=1.0), max(positive, default=1.0)
+    if high > DECADE * low:
+        return Axis(low / 1.3, high * 1.3, LEFT, RIGHT, logarithmic=True)
+    return Axis(0.0, 1.08 * high, LEFT, RIGHT)
+
+
+def _values(row: RecordingMisfit) -> list[float]:
+    ends = [v for i in (row.before, row.after) for v in (i.value, i.low, i.high)]
+    return [v for v in (*ends, row.floor) if v is not None]
+
+
+def _range(interval: Interval) -> str:
+    return f"90 %: {bounds(interval, Scale(1.0, ''))}"
+
+
+def _median(values: Sequence[float]) -> float:
+    ordered = sorted(values)
+    middle = len(ordered) // 2
+    return ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
+
+
+def _distance(one: Sequence[float], other: Sequence[float]) -> float:
+    return math.sqrt(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) / len(one))

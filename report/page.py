@@ -1,0 +1,176 @@
+"""The page: verdict first, then the proof, the place, the ranking, the numbers."""
+
+from __future__ import annotations
+
+from diagnosis.finding import VERDICTS, Finding, Floors
+from report import beat_maps, misfits, place, ranking, tables, wing_map
+from report.layout import figure, panels, section
+from report.markup import Markup, joined, tag
+from report.style import style_sheet
+from report.svg import Axis, bar, drawing, text, x_axis
+from report.words import Scale, best_of, channel_scale, listed, number, percent, stages, title_of, titles
+
+_PROVED = "Is the fit better on recordings it has not seen?"
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def html(finding: Finding) -> str:
+    """One HTML file that shows all of ``finding``: no script, nothing loaded, for screen, phone and paper."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("title", f"{headline(finding)} ({finding.dataset})"),
+        tag("style", Markup(style_sheet())),
+    )
+    body = tag("body", _hatch(), tag("main", *_parts(finding)))
+    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def headline(finding: Finding) -> str:
+    """The verdict in a line."""
+    known = titles(finding)
+    named = [title_of(name, known) for name in finding.named]
+    if finding.verdict == "adequate":
+        return "Nothing is missing that these recordings could show"
+    if finding.verdict == "named":
+        return f"Left out: {' + '.join(named)}" if named else "A named effect was left out"
+    if finding.verdict == "ambiguous":
+        return (
+            f"Left out: {listed(named, 'or')}; these recordings cannot say which"
+            if named
+            else "Several explanations fit"
+        )
+    if finding.verdict == "unnamed":
+        return "Something was left out that nothing in the library explains"
+    return f"The measurement is at fault: {' + '.join(named)}" if named else "The measurement is at fault"
+
+
+def _parts(finding: Finding) -> list[object]:
+    return [
+        *_verdict(finding),
+        _section(
+            _PROVED if finding.verdict != "adequate" else "How well the model fits",
+            misfits.proof(finding),
+            misfits.recordings(finding),
+        ),
+        _section("Where and when", place.place(finding), wing_map.wing_map(finding), beat_maps.misfit_maps(finding)),
+        _section("The load that is missing", beat_maps.missing_loads(finding)),
+        _section("What was considered", ranking.ranking(finding)),
+        tables.law(finding.law),
+        _section("Recorded and simulated", misfits.overlays(finding)),
+        tables.genes(finding),
+        tables.advice(finding),
+        _section("How small the misfit can be", _floors(finding)),
+        tables.sources(finding),
+        tables.remarks(finding),
+        _made(finding),
+    ]
+
+
+def _section(heading: str, *parts: Markup | None) -> Markup | None:
+    shown = [part for part in parts if part is not None]
+    return section(heading, *shown) if shown else None
+
+
+def _verdict(finding: Finding) -> list[object]:
+    rows = []
+    for name in (*VERDICTS, *(k for k in finding.probabilities if k not in VERDICTS)):
+        part = finding.probabilities.get(name, 0.0)
+        chosen = " chosen" if name == finding.verdict else ""
+        shown = bar(part, "strong" if chosen else "pale")
+        rows += [
+            tag("span", name, class_=f"name{chosen}"),
+            shown,
+            tag("span", percent(part), class_=f"said{chosen}"),
+        ]
+    return [
+        tag("p", f"Diagnosis of {finding.dataset} · verdict: {finding.verdict}", class_="over"),
+        tag("h1", headline(finding)),
+        tag("p", finding.summary),
+        tag("div", *rows, class_="bars verdicts", role="group", aria_label="Probability of every verdict"),
+        _tiles(finding),
+    ]
+
+
+def _tiles(finding: Finding) -> Markup:
+    scale = channel_scale(finding)
+    tiles = [
+        ("Strength d", number(finding.strength), "misfit after the best nominal refit, over the noise"),
+        ("Noise", scale.text(finding.floors.noise), f"memory {number(finding.floors.memory, 2)} from sample to sample"),
+        ("Floor", scale.text(finding.floors.total), "what a right model would leave"),
+    ]
+    if finding.proof is not None and "after" in stages(finding):
+        change = f"{number(finding.proof.before.value)} → {number(finding.proof.after.value)}"
+        tiles.append(("Held-out misfit, over the floor", change, "nominal model → with what was found"))
+    best = best_of(finding)
+    if best is not None and finding.verdict != "adequate":
+        tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {best.title}"))
+    shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
+    return tag("dl", *shown, class_="tiles")
+
+
+def _floors(finding: Finding) -> Markup:
+    scale = channel_scale(finding)
+    floors = finding.floors
+    rows = [
+        ("noise, from the scatter between beats", floors.noise, "pale"),
+        ("simulation", floors.simulation, "pale"),
+        ("floor: these together", floors.total, "strong"),
+        ("nominal model, refitted", finding.strength * floors.noise, "plain"),
+    ]
+    if floors.division is not None:
+        rows.insert(1, (f"division, compared with {floors.finer}", floors.division, "pale"))
+    most = max(value for _, value, _ in rows) * scale.factor or 1.0
+    along = Axis(0, 1.1 * most, 12, 348)
+    bottom = 8 + 34.0 * len(rows)
+    parts: list[Markup] = [x_axis(along, 6, bottom, f"root mean square of one channel, {scale.unit}")]
+    for k, (name, value, class_) in enumerate(rows):
+        y = 34.0 * k + 8
+        wide = along.at(value * scale.factor) - along.at(0)
+        parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="said"))
+        parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
+    return figure(_floors_told(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)))
+
+
+def _floors_told(finding: Finding, floors: Floors, scale: Scale) -> str:
+    left = finding.strength * floors.noise
+    return (
+        f"A right model would leave {scale.text(floors.total)}; the nominal model, refitted, leaves {scale.text(left)} "
+        f"(strength d = {number(finding.strength)})"
+    )
+
+
+def _made(finding: Finding) -> Markup:
+    versions = ", ".join(f"{name} {version}" for name, version in finding.versions.items())
+    minutes = (
+        f"{number(finding.seconds / 60, 2)} minutes"
+        if finding.seconds >= 60
+        else f"{number(finding.seconds, 2)} seconds"
+    )
+    spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
+    lines = [f"Model: {finding.model}", f"Took {spent}" if finding.seconds else None, versions or None]
+    return tag("footer", *(tag("p", words, class_="quiet") for words in lines if words))
+
+
+def _hatch() -> Markup:
+    """Patterns: cells that are not significant (a veil with lines over their colour), bars that are estimates."""
+    pattern = tag(
+        "pattern",
+        tag("rect", width=6, height=6, class_="veil"),
+        tag("path", d="M0 6L6 0", class_="hatch"),
+        id="hatch",
+        width=6,
+        height=6,
+        patternUnits="userSpaceOnUse",
+    )
+    stripes = tag(
+        "pattern",
+        tag("path", d="M1.5 0V8", class_="guess-line"),
+        id="guess",
+        width=5,
+        height=8,
+        patternUnits="userSpaceOnUse",
+    )
+    return joined(tag("svg", tag("defs", pattern, stripes), class_="defs", aria_hidden="true"))

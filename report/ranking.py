@@ -1,0 +1,126 @@
+"""What was considered: every hypothesis with what it explains, what it predicts, its evidence and its probability."""
+
+from __future__ import annotations
+
+from diagnosis.finding import Finding, Hypothesis
+from report.layout import figure, folded, table
+from report.markup import Markup, joined, tag
+from report.svg import bar
+from report.words import best_of, channel_scale, listed, number, percent, title_of, titles
+
+MOST_SHOWN = 8
+_NOTE = (
+    "Explained and predicted are parts of the nominal model's misfit beyond the noise (mean square): explained in a "
+    "fit to all fitted recordings, predicted for recordings left out of the fit one by one. Evidence is the natural "
+    "logarithm of its ratio to the nominal model's: 5 is strong, and every further 2.3 is a factor of ten."
+)
+
+
+def ranking(finding: Finding) -> Markup | None:
+    """The strongest hypotheses as bars, the others as a table."""
+    if not finding.hypotheses:
+        return None
+    # the nominal model is always among those shown: it is what all others are compared with
+    shown = [h for k, h in enumerate(finding.hypotheses) if k < MOST_SHOWN or not h.effects]
+    others = [h for h in finding.hypotheses if h not in shown]
+    top = max((h.evidence for h in finding.hypotheses), default=0.0)
+    rows = [_row(h, finding, top) for h in shown]
+    rest = folded(f"{len(others)} weaker ones", _table(others, finding)) if others else None
+    return joined(
+        figure(
+            told(finding),
+            tag("ol", *rows, class_="ranking"),
+            note=_NOTE,
+        ),
+        rest,
+        _alike(finding),
+    )
+
+
+def told(finding: Finding) -> str:
+    """What the ranking shows, in a sentence."""
+    best = best_of(finding)
+    if best is None:
+        return "Only the nominal model was considered"
+    parts = [f"{best.title} explains {percent(best.explained)} of the misfit beyond the noise"]
+    if best.predicted is not None:
+        parts.append(f"and predicts {percent(best.predicted)} of it in recordings left out")
+    overlapping = set(best.effects)
+    rivals = [h for h in finding.hypotheses if h.effects and not overlapping & set(h.effects)]
+    rival = max(rivals, key=lambda h: h.explained, default=None)
+    if rival is not None:
+        parts.append(f"; without it, at most {percent(rival.explained)} ({rival.title})")
+    return " ".join(parts).replace(" ;", ";")
+
+
+def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
+    names, effects = set(finding.named), set(hypothesis.effects)
+    named = bool(effects) and (effects == names or (finding.verdict == "ambiguous" and effects <= names))
+    scale = channel_scale(finding)
+    evidence = hypothesis.evidence / top if top > 0 else 0.0
+    sure = hypothesis.refitted or not hypothesis.effects
+    bars = [
+        _bar("probability", hypothesis.probability, percent(hypothesis.probability), "strong"),
+        _bar("explained", hypothesis.explained, percent(hypothesis.explained), "plain" if sure else "guess"),
+    ]
+    if hypothesis.predicted is not None:
+        bars.append(_bar("predicted", hypothesis.predicted, percent(hypothesis.predicted), "plain"))
+    bars.append(_bar("evidence", evidence, _signed(hypothesis.evidence), "pale"))
+    about = [
+        tag("h3", hypothesis.title, _family(hypothesis)),
+        tag("p", hypothesis.signature) if hypothesis.signature else None,
+        tag(
+            "p",
+            f"Leaves {scale.text(hypothesis.misfit)}{'' if sure else ' (linear estimate, not refitted)'}.",
+            class_="quiet",
+        ),
+        tag("p", hypothesis.source, class_="quiet") if hypothesis.source else None,
+    ]
+    return tag("li", tag("div", *about), tag("div", *bars, class_="bars"), class_="named" if named else None)
+
+
+def _family(hypothesis: Hypothesis) -> Markup | None:
+    if not hypothesis.effects:
+        return tag("span", "nominal model", class_="badge")
+    kind = "measurement" if hypothesis.family == "measurement" else "physics"
+    words = kind if hypothesis.family in ("measurement", "") else f"{kind}: {hypothesis.family}"
+    return tag("span", words, class_=f"badge {kind}")
+
+
+def _bar(name: str, part: float, said: str, class_: str) -> Markup:
+    return joined(
+        tag("span", name, class_="name"),
+        bar(part, class_),
+        tag("span", said, class_="said negative" if part < 0 else "said"),
+    )
+
+
+def _table(hypotheses: list[Hypothesis], finding: Finding) -> Markup:
+    scale = channel_scale(finding)
+    rows = [
+        (
+            h.title,
+            h.family,
+            percent(h.probability),
+            f"{number(h.score)} ({h.freedom})",
+            percent(h.explained),
+            "" if h.predicted is None else percent(h.predicted),
+            _signed(h.evidence),
+            scale.text(h.misfit),
+        )
+        for h in hypotheses
+    ]
+    head = ("hypothesis", "family", "probability", "score (genes)", "explained", "predicted", "evidence", "leaves")
+    return table(head, rows, numbers=6)
+
+
+def _alike(finding: Finding) -> Markup | None:
+    if not finding.alike:
+        return None
+    known = titles(finding)
+    sets = [tag("li", listed((title_of(name, known) for name in names), "or")) for names in finding.alike]
+    return joined(tag("h3", "These recordings cannot tell apart"), tag("ul", *sets, class_="plain"))
+
+
+def _signed(value: float) -> str:
+    return f"+{number(value)}" if value > 0 else number(value)

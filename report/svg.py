@@ -1,0 +1,238 @@
+"""A small kit for figures: axes with round numbers, marks, colour levels.
+
+Panels are drawn about 360 units wide, so that on a phone, where each fills the width, letters keep their size. Colours
+are classes, given in :mod:`report.style` for light and for dark.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from report.markup import Markup, joined, tag
+from report.words import number
+
+LEVELS = 12  # colours of a map from nothing to most, classes l0 to l11
+SIDES = 6  # colours of a map on either side of nothing, classes d0 to d12
+Points = Sequence[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Values from ``low`` to ``high`` at places from ``start`` to ``end`` in the drawing."""
+
+    low: float
+    high: float
+    start: float
+    end: float
+    logarithmic: bool = False
+
+    def at(self, value: float) -> float:
+        """Place of ``value``; values beyond the ends are put on them."""
+        value = min(max(value, self.low), self.high)
+        if self.logarithmic:
+            part = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            part = (value - self.low) / (self.high - self.low)
+        return self.start + part * (self.end - self.start)
+
+    def ticks(self, count: int = 5) -> list[float]:
+        """Round values on the axis, about ``count``."""
+        if self.logarithmic:
+            powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+            found = [m * 10.0**p for p in powers for m in (1, 2, 5)]
+            inside = [v for v in found if self.low * 0.999 <= v <= self.high * 1.001]
+            return inside if len(inside) <= count + 3 else [v for v in inside if f"{v:e}"[0] == "1"]
+        step = _step(self.high - self.low, count)
+        first, last = math.ceil(self.low / step - 1e-9), math.floor(self.high / step + 1e-9)
+        return [round(k * step, 12) for k in range(first, last + 1)]
+
+
+def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> Axis:
+    """A linear axis that holds all ``values``, and zero where wanted, with a little room."""
+    held = [*values, 0.0] if zero or not values else list(values)
+    low, high = min(held), max(held)
+    room = 0.05 * (high - low) or abs(high) * 0.1 or 1.0
+    bottom = 0.0 if zero and low == 0 else low - room
+    return Axis(bottom, high + room, start, end)
+
+
+def drawing(width: float, height: float, label: str, *parts: object, wide: bool = False) -> Markup:
+    """An SVG that scales to the width it is given; ``label`` is read out to those who cannot see it."""
+    return tag(
+        "svg",
+        *parts,
+        viewBox=f"0 0 {width:g} {height:g}",
+        role="img",
+        aria_label=label,
+        class_="wide" if wide else None,
+    )
+
+
+def text(x: float, y: float, words: object, *, anchor: str = "start", class_: str | None = None) -> Markup:
+    """Words whose base line is at ``y``."""
+    return tag("text", words, x=x, y=y, text_anchor=None if anchor == "start" else anchor, class_=class_)
+
+
+def line(x1: float, y1: float, x2: float, y2: float, class_: str = "grid") -> Markup:
+    """A straight line."""
+    return tag("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_)
+
+
+def curve(points: Points, class_: str) -> Markup | None:
+    """A line through ``points``."""
+    if not points:
+        return None
+    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points), class_=class_)
+
+
+def area(points: Points, class_: str) -> Markup | None:
+    """The area inside ``points``."""
+    if not points:
+        return None
+    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + "Z", class_=class_)
+
+
+def dots(points: Points, class_: str) -> Markup | None:
+    """Points as one path; the class says how large (its line has round ends)."""
+    return tag("path", d="".join(f"M{x:.1f} {y:.1f}h0" for x, y in points), class_=class_) if points else None
+
+
+def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
+    """An arrow from (x, y) along (dx, dy); its head shrinks with it."""
+    length = math.hypot(dx, dy)
+    if length < 0.5:
+        return tag("circle", cx=x, cy=y, r=1.2, class_=class_)
+    head = min(5.0, 0.5 * length) / length
+    ends = "".join(
+        f"M{x + dx:.1f} {y + dy:.1f}L{x + dx - head * (dx + s * dy):.1f} {y + dy - head * (dy - s * dx):.1f}"
+        for s in (0.55, -0.55)
+    )
+    return tag("path", d=f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}{ends}", class_=class_)
+
+
+def whisker(along: Axis, y: float, ends: tuple[float | None, float | None], value: float, class_: str) -> Markup:
+    """A dot with its interval; an end that nothing bounds runs to the end of the axis and has an arrow there."""
+    parts: list[Markup] = []
+    for bound, edge in zip(ends, (along.start, along.end), strict=True):
+        if bound is None:
+            parts.append(arrow(along.at(value), y, edge - along.at(value), 0, f"whisker {class_}"))
+        else:
+            parts.append(line(along.at(value), y, along.at(bound), y, f"whisker {class_}"))
+            if abs(along.at(bound) - along.at(value)) > 5:
+                at = along.at(bound)
+                parts.append(line(at, y - 2.5, at, y + 2.5, f"whisker {class_}"))
+    return joined(*parts, tag("circle", cx=along.at(value), cy=y, r=3.6, class_=f"dot {class_}"))
+
+
+def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[float] | None = None) -> Markup:
+    """Grid lines, their numbers below, and the label below these (27 units in all)."""
+    parts: list[Markup] = []
+    for value in along.ticks() if ticks is None else ticks:
+        at = along.at(value)
+        parts += [line(at, top, at, bottom), text(at, bottom + 12, number(value), anchor="middle", class_="tick")]
+    middle = (along.start + along.end) / 2
+    return joined(*parts, text(middle, bottom + 25, label, anchor="middle", class_="label"))
+
+
+def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -> Markup:
+    """Grid lines, their numbers to the left, and the label turned beside these (about 46 units in all)."""
+    parts: list[Markup] = []
+    for value in up.ticks(count):
+        at = up.at(value)
+        parts += [line(left, at, right, at), text(left - 4, at + 3.5, number(value), anchor="end", class_="tick")]
+    middle = (up.start + up.end) / 2
+    turned = tag(
+        "text",
+        label,
+        transform=f"translate({left - 36:g},{middle:g}) rotate(-90)",
+        text_anchor="middle",
+        class_="label",
+    )
+    return joined(*parts, turned)
+
+
+def level(value: float, most: float) -> int:
+    """Colour of ``value`` on a map from 0 to ``most``, 0 to LEVELS - 1."""
+    return min(LEVELS - 1, max(0, int(LEVELS * value / most))) if most > 0 else 0
+
+
+def side(value: float, most: float) -> int:
+    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; SIDES is nothing."""
+    return SIDES + max(-SIDES, min(SIDES, round(SIDES * value / most))) if most > 0 else SIDES
+
+
+def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> Markup:
+    """A grid of cells, rows downwards, one path for each class; None leaves a cell out."""
+    rows, columns = len(classes), len(classes[0])
+    width, height = (across.end - across.start) / columns, (down.end - down.start) / rows
+    paths: dict[str, list[str]] = {}
+    for i, row in enumerate(classes):
+        for j, name in enumerate(row):
+            if name is not None:
+                x, y = across.start + j * width, down.start + i * height
+                # a hair wider than the cell, so that no seam shows
+                piece = f"M{x:.2f} {y:.2f}h{width + 0.2:.2f}v{height + 0.2:.2f}h-{width + 0.2:.2f}z"
+                paths.setdefault(name, []).append(piece)
+    return joined(*(tag("path", d="".join(pieces), class_=name) for name, pieces in sorted(paths.items())))
+
+
+def colour_bar(
+    across: Axis, y: float, classes: Sequence[str], label: str, mark: tuple[float, str] | None = None
+) -> Markup:
+    """A bar of ``classes`` over the values of ``across``, 44 units high with its numbers; ``mark`` is a named value."""
+    width = (across.end - across.start) / len(classes)
+    parts = [
+        tag("rect", x=across.start + k * width, y=y, width=width + 0.3, height=9.0, class_=name)
+        for k, name in enumerate(classes)
+    ]
+    for value in across.ticks(4):
+        at = across.at(value)
+        parts += [line(at, y + 9, at, y + 12, "axis"), text(at, y + 23, number(value), anchor="middle", class_="tick")]
+    if mark is not None:
+        at = across.at(mark[0])
+        anchor = "start" if at < (across.start + across.end) / 2 else "end"
+        parts += [line(at, y - 4, at, y + 11, "mark"), text(at, y - 6, mark[1], anchor=anchor, class_="tick")]
+    middle = (across.start + across.end) / 2
+    return joined(*parts, text(middle, y + 37, label, anchor="middle", class_="label"))
+
+
+def bar(part: float, class_: str) -> Markup:
+    """A bar that fills ``part`` of the width it is given."""
+    shown = min(1.0, max(0.0, part))
+    return tag(
+        "svg",
+        tag("rect", x=0, y=0, width=100, height=8, class_="trough"),
+        tag("rect", x=0, y=0, width=100 * shown, height=8, class_=class_) if shown else None,
+        viewBox="0 0 100 8",
+        preserveAspectRatio="none",
+        aria_hidden="true",
+        class_="bar",
+    )
+
+
+def legend(*entries: tuple[str, str]) -> Markup:
+    """Names beside what they stand for: (kind, name), kind being one of the swatches below."""
+    swatches: dict[str, Callable[[], object]] = {
+        "before": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot before"),
+        "after": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot after"),
+        "floor": lambda: line(9, 1, 9, 11, "floor"),
+        "before-line": lambda: line(1, 6, 17, 6, "curve before"),
+        "after-line": lambda: line(1, 6, 17, 6, "curve after"),
+        "noise-line": lambda: line(1, 6, 17, 6, "noise"),
+        "recorded": lambda: dots([(3, 6), (9, 6), (15, 6)], "samples"),
+        "hatched": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="faint"),
+        "band": lambda: tag("rect", x=2, y=2, width=14, height=8, class_="band"),
+        "place": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="place"),
+    }
+    items = [
+        tag("li", tag("svg", swatches[kind](), viewBox="0 0 18 12", aria_hidden="true"), name) for kind, name in entries
+    ]
+    return tag("ul", *items, class_="legend")
+
+
+def _step(extent: float, count: int) -> float:
+    raw = extent / count
+    size = 10.0 ** math.floor(math.log10(raw))
+    return next(m * size for m in (1, 2, 2.5, 5, 10) if m * size >= raw * 0.999)

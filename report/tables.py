@@ -1,0 +1,136 @@
+"""Genes, a free-form law, advice, sources: what is read rather than looked at."""
+
+from __future__ import annotations
+
+from diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Interval
+from report.layout import folded, section, table
+from report.markup import Markup, joined, tag
+from report.words import bounds, number, percent, scale_for, title_of, titles, with_unit
+
+MOST_GENES = 12
+_ADVICE = (
+    "",
+    "flapping, Hz",
+    "lag, °",
+    "pressure, mbar",
+    "airspeed, m/s",
+    "angle of attack, °",
+    "apart, standard deviations",
+    "chance to settle it",
+)
+
+
+def genes(finding: Finding) -> Markup | None:
+    """Genes of the effects first; nominal ones after them, folded where there are many."""
+    if not finding.genes:
+        return None
+    effects = [g for g in finding.genes if g.off is not None or "." in g.name]
+    nominal = [g for g in finding.genes if g not in effects]
+    shown = nominal if len(nominal) <= MOST_GENES else []
+    many = folded(f"{len(nominal)} genes of the nominal model", _genes(nominal)) if not shown and nominal else None
+    return section(
+        "Values of the genes, with 90 % intervals",
+        joined(tag("h3", "What was put in"), _genes(effects)) if effects else None,
+        joined(tag("h3", "The nominal model's own"), _genes(shown)) if shown else None,
+        many,
+    )
+
+
+def law(given: FreeLaw | None) -> Markup | None:
+    """The free-form law for what nothing in the library explains."""
+    if given is None:
+        return None
+    rows = [
+        (term.feature, number(term.coefficient.value), _bounds(term.coefficient, term.unit), term.unit)
+        for term in given.terms
+    ]
+    return section(
+        "What is left, as a law without a name",
+        tag("p", given.words),
+        table(("term", "coefficient", "90 % interval", "unit"), rows, numbers=0) if rows else None,
+        tag("p", f"It explains {percent(given.explained)} of the misfit beyond the noise, in recordings left out."),
+    )
+
+
+def advice(finding: Finding) -> Markup | None:
+    """What to record next."""
+    if not finding.advice:
+        return None
+    known = titles(finding)
+    best = finding.advice[0]
+    between = ", ".join(title_of(name, known) for name in best.between)
+    rows = [_advice(k, a) for k, a in enumerate(finding.advice, 1)]
+    return section(
+        "What to record next",
+        tag("p", tag("strong", best.words)),
+        tag("p", f"It is to tell apart: {between}.", class_="quiet") if between else None,
+        table(_ADVICE, rows, numbers=7),
+    )
+
+
+def sources(finding: Finding) -> Markup | None:
+    """Where the laws of the effects named are from."""
+    known = titles(finding)
+    found = {
+        h.effects[0]: h.source
+        for h in finding.hypotheses
+        if len(h.effects) == 1 and h.effects[0] in finding.named and h.source
+    }
+    for h in finding.hypotheses:
+        if h.source and set(h.effects) <= set(finding.named) and not set(h.effects) <= set(found):
+            found.update({name: h.source for name in h.effects if name not in found})
+    if not found:
+        return None
+    items = [tag("li", tag("strong", title_of(name, known)), ": ", source) for name, source in found.items()]
+    return section("Sources of the effects named", tag("ul", *items, class_="plain"))
+
+
+def remarks(finding: Finding) -> Markup | None:
+    """What a reader must know besides."""
+    said = [*finding.floors.remarks, *finding.remarks]
+    if not said:
+        return None
+    return section("Remarks", tag("ul", *(tag("li", words) for words in said), class_="plain"))
+
+
+def _genes(given: list[GeneValue]) -> Markup:
+    rows = [("gene", "value", "90 % interval", "off at", "what it is"), *(_gene(g) for g in given)]
+    if all(g.off is None for g in given):
+        rows = [(*row[:3], row[4]) for row in rows]
+    return table([str(name) for name in rows[0]], rows[1:])
+
+
+def _gene(gene: GeneValue) -> tuple[object, ...]:
+    value = gene.value
+    scale = scale_for((value.value, value.low, value.high), gene.unit)
+    off = "" if gene.off is None else with_unit(number(gene.off * scale.factor), scale.unit)
+    inside = gene.off is not None and _holds(value, gene.off)
+    return (
+        tag("code", gene.name),
+        tag("strong", with_unit(number(value.value * scale.factor), scale.unit)),
+        with_unit(bounds(value, scale), scale.unit if value.low is not None or value.high is not None else ""),
+        f"{off} (inside)" if inside else off,
+        gene.description,
+    )
+
+
+def _holds(interval: Interval, value: float) -> bool:
+    above = interval.low is None or interval.low <= value
+    return above and (interval.high is None or value <= interval.high)
+
+
+def _bounds(interval: Interval, unit: str) -> str:
+    return bounds(interval, scale_for((), unit)) if unit != "rad" else bounds(interval, scale_for((), "1"))
+
+
+def _advice(rank: int, a: Advice) -> tuple[object, ...]:
+    return (
+        rank,
+        number(a.flap_frequency_hz),
+        number(a.phase_lag_deg),
+        number(a.pressure_mbar, 4),
+        number(a.airspeed),
+        number(a.angle_of_attack_deg),
+        number(a.separation, 2),
+        percent(a.resolves),
+    )

@@ -1,0 +1,326 @@
+"""The rigs under diagnosis: what they tell of themselves, and that the third one is right."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from calibration.spec import CalibrationSpec
+from diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
+from diagnosis.subject import Subject
+from records import Dataset
+from sim.balance import TRIALS, delfly
+from sim.balance import blank_recording as blank_forces
+from sim.flexible_wing import FlexibleWing
+from sim.model import Array
+from sim.rig import SMALL, blank_recording, name_of, robird_wing
+from tests.diagnosis.pendulum_rig import (
+    FREQUENCIES,
+    GENES,
+    MARKERS,
+    REACH,
+    SLIDING,
+    SUSPECTS,
+    TORQUE,
+    Pendulum,
+    PendulumRig,
+    at,
+    blank,
+    recorded,
+)
+
+FEW = CalibrationSpec(division="4")
+NOMINAL = {gene.name: gene.nominal for gene in GENES}
+TYPICAL = {name: value for suspect in SUSPECTS for name, value in suspect.typical.items()}
+
+
+@pytest.fixture(scope="module")
+def wing() -> Dataset:
+    robird = robird_wing()
+    return Dataset("wing", robird, tuple(blank_recording(robird, c, name_of(c), frames=40) for c, _ in SMALL))
+
+
+@pytest.fixture(scope="module")
+def vehicle() -> Dataset:
+    blanks = [blank_forces(trial.condition, trial.name, 64) for trial in TRIALS]
+    return Dataset("vehicle", delfly(), tuple(replace(b, forces=("x",), values=b.values[:, :1]) for b in blanks))
+
+
+@pytest.fixture(scope="module")
+def subjects(wing: Dataset, vehicle: Dataset) -> dict[str, Subject]:
+    return {"wing": subject_of(wing, FEW), "vehicle": subject_of(vehicle, CalibrationSpec()), "pendulum": PendulumRig()}
+
+
+def nominal(subject: Subject) -> Array:
+    return np.array([[gene.nominal for gene in subject.model.genes]])
+
+
+RIGS = ("wing", "vehicle", "pendulum")
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_suspects_put_in_and_switched_off_change_nothing(subjects: dict[str, Subject], rig: str) -> None:
+    """The nominal model's own genes first, then those told of the suspects; all at nominal simulate to what it did."""
+    subject = subjects[rig]
+    names = [suspect.name for suspect in subject.suspects]
+    extended = subject.extended(names)
+    own = len(subject.model.genes)
+    assert extended.genes[:own] == tuple(subject.model.genes)
+    assert extended.genes[own:] == tuple(gene for suspect in subject.suspects for gene in suspect.genes)
+    condition = subject.conditions()[0]
+    empty = subject.blank(condition)
+    with_all = extended.observe(np.array([[gene.nominal for gene in extended.genes]]), empty)
+    assert with_all.channels.tobytes() == subject.model.observe(nominal(subject), empty).channels.tobytes()
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str) -> None:
+    for suspect in subjects[rig].suspects:
+        names = [gene.name for gene in suspect.genes]
+        assert set(suspect.sizes) <= set(names) == set(suspect.typical)
+        assert set(suspect.places.values()) <= set(suspect.shapes)
+        assert all(gene.nominal == 0.0 for gene in suspect.genes if gene.name in suspect.sizes)
+        assert any(suspect.typical[name] != 0.0 for name in suspect.sizes)
+        for gene in suspect.genes:
+            gene.check(suspect.typical[gene.name])
+        assert suspect.source
+        assert suspect.signature
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_a_blank_is_simulated_under_every_condition_proposed(subjects: dict[str, Subject], rig: str) -> None:
+    subject = subjects[rig]
+    conditions = subject.conditions()
+    assert 5 < len(conditions) <= MOST_CONDITIONS
+    assert len(set(conditions)) == len(conditions)
+    for condition in conditions[::13]:
+        empty = subject.blank(condition)
+        assert empty.condition == condition
+        assert not empty.valid.any()
+        assert len(subject.places(empty)) == empty.values.shape[1] == len(empty.channels)
+        found = subject.model.observe(nominal(subject), empty)
+        assert found.reasons == (None,)
+        placed = replace(empty, values=found.channels[0])
+        np.testing.assert_allclose(subject.model.observe(nominal(subject), placed).channels, found.channels, atol=1e-9)
+        assert subject.origin(placed) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_wing_of_effects_has_them_in_its_nominal_model(wing: Dataset) -> None:
+    subject = subject_of(wing, replace(FEW, effects=("hinge_offset",)))
+    assert isinstance(subject, WingSubject)
+    assert "hinge_offset" in subject.model.effects
+    assert "hinge_offset" not in {suspect.name for suspect in subject.suspects}
+    assert "hinge_offset" in {suspect.name for suspect in subject_of(wing, FEW).suspects}
+    assert "Hinge offset" in subject.told
+
+
+def test_a_term_of_a_vehicle_is_no_suspect_and_one_left_out_is(vehicle: Dataset) -> None:
+    has = {s.name for s in subject_of(vehicle, CalibrationSpec()).suspects}
+    lacks = {s.name for s in subject_of(vehicle, CalibrationSpec(without=("clap_and_peel",))).suspects}
+    apart = replace(vehicle, rig=replace(vehicle.vehicle, claps=False))
+    assert lacks - has == {"clap_and_peel"}
+    assert {s.name for s in subject_of(apart, CalibrationSpec(without=("clap_and_peel",))).suspects} == has
+    assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).told
+
+
+def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:
+    subject, recording = subjects["wing"], wing.recordings[0]
+    places = subject.places(recording)
+    stations = wing.wing.stations
+    for place, channel in zip(places, recording.channels, strict=True):
+        assert channel == f"{place.name}_{place.axis}"
+        assert place.span is not None
+        assert place.chord is not None
+        assert place.y == pytest.approx(stations[0].y + place.span * wing.wing.span)
+        y, leading, chord = ([getattr(s, name) for s in stations] for name in ("y", "leading_edge", "chord"))
+        expected = np.interp(place.y or 0.0, y, leading) + place.chord * np.interp(place.y or 0.0, y, chord)
+        assert place.x == pytest.approx(expected, abs=1e-5)
+    x, y = np.array(subject.outline).T
+    assert subject.outline[0] == subject.outline[-1]
+    area = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
+    assert area == pytest.approx(np.trapezoid([s.chord for s in stations], [s.y for s in stations]))
+
+
+def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject], wing: Dataset) -> None:
+    seen, subject = [], subjects["wing"]
+    while isinstance(subject, WingSubject):
+        seen.append(subject.model.structure.division)
+        subject = subject.finer()  # type: ignore[assignment]
+    assert seen[0].total == 4
+    assert len(seen) > 2
+    for coarse, fine in pairwise(seen):
+        assert len(fine.bodies) > len(coarse.bodies)
+        assert max(fine.bodies) > max(coarse.bodies)
+        assert fine.total <= MOST_BODIES
+    eleven = subject_of(wing, CalibrationSpec(division="11")).finer()
+    assert isinstance(eleven, WingSubject)
+    assert eleven.model.structure.division.bodies == (4,) * 6, "that of 24 bodies"
+
+
+def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
+    """Of 4 bodies, against a wing finer than any that a diagnosis compares with."""
+    subject = subjects["wing"]
+    assert isinstance(subject, WingSubject)
+    empty = subject.blank(SMALL[5][0])
+    genome = nominal(subject)
+    finer = subject.finer()
+    assert finer is not None
+    best = FlexibleWing(subject.model.wing, "10x6")
+    coarse, fine, true = (model.observe(genome, empty).channels[0] for model in (subject.model, finer.model, best))
+    told, error = (np.sqrt(np.mean((coarse - other) ** 2)) for other in (fine, true))
+    assert told == pytest.approx(error, rel=0.5)
+    assert np.sqrt(np.mean((fine - true) ** 2)) < 0.7 * error
+
+
+def test_a_finer_vehicle_only_where_it_tells(vehicle: Dataset) -> None:
+    subject = subject_of(vehicle, CalibrationSpec())
+    assert isinstance(subject, VehicleSubject)
+    assert subject.finer() is None, "40 elements are enough"
+    coarse = replace(subject, model=replace(subject.model, elements=3, instants=80))
+    finer = coarse.finer()
+    assert finer is not None
+    assert finer.model.elements == 6
+
+
+def test_conditions_lie_within_what_was_run_and_are_new(subjects: dict[str, Subject], wing: Dataset) -> None:
+    recorded_ones = [r.condition for r in wing.recordings]
+    for condition in subjects["wing"].conditions():
+        assert condition not in recorded_ones
+        for name in ("flap_frequency", "phase_lag", "airspeed", "pressure"):
+            ran = [getattr(c, name) for c in recorded_ones]
+            assert min(ran) <= getattr(condition, name) <= max(ran), name
+        vacuum = [c.pressure for c in recorded_ones if c.airspeed == 0]
+        assert condition.airspeed > 0 or condition.pressure <= max(vacuum), "the chamber's pressures stay its own"
+
+
+def test_values_that_jitter_are_one_level(wing: Dataset) -> None:
+    """Frequencies measured anew in each recording are not each another setting."""
+    rng = np.random.default_rng(1)
+    shaken = tuple(
+        replace(r, condition=replace(r.condition, flap_frequency=r.condition.flap_frequency + rng.normal(0, 0.005)))
+        for r in wing.recordings
+    )
+    found = subject_of(replace(wing, recordings=shaken), FEW).conditions()
+    assert len({c.flap_frequency for c in found}) <= 2 * 5, "three and the middles between them, in either rig"
+
+
+def test_nothing_is_proposed_in_free_flight(vehicle: Dataset) -> None:
+    flown = tuple(replace(r, rig="free_flight") for r in vehicle.recordings)
+    assert subject_of(replace(vehicle, recordings=flown), CalibrationSpec()).conditions() == ()
+
+
+# -- the third rig ---------------------------------------------------------------------------------------------
+
+
+def angle(values: Mapping[str, float], frequency: float, torque: tuple[float, ...] = TORQUE) -> Array:
+    """Series of the angle: cosines, then sines."""
+    return Pendulum(torque=torque).angle(NOMINAL | dict(values), at(frequency))
+
+
+def sampled(series: Array, phase: Array) -> Array:
+    harmonics = len(series) // 2
+    turn = phase[:, None] * np.arange(harmonics + 1)
+    found: Array = np.cos(turn) @ series[: harmonics + 1] + np.sin(turn[:, 1:]) @ series[harmonics + 1 :]
+    return found
+
+
+@pytest.mark.parametrize("frequency", FREQUENCIES)
+def test_a_linear_pendulum_answers_by_its_transfer_function(frequency: float) -> None:
+    rate = 2 * np.pi * frequency
+    expected = TORQUE[0] / (NOMINAL["stiffness"] - NOMINAL["inertia"] * rate**2 + 1j * rate * NOMINAL["damping"])
+    series = angle({}, frequency)
+    assert series[1] == pytest.approx(expected.real, rel=1e-12)
+    assert series[1 + len(series) // 2] == pytest.approx(-expected.imag, rel=1e-12)
+
+
+def test_a_hard_spring_has_the_motion_that_its_torque_was_made_for() -> None:
+    """theta = a cos psi without damping asks for (k - I w^2) a + 3/4 k_3 a^3 and 1/4 k_3 a^3 (Hsu 1960)."""
+    a, k3, frequency = 0.3, 0.4, 1.5
+    rate = 2 * np.pi * frequency
+    first = (NOMINAL["stiffness"] - NOMINAL["inertia"] * rate**2) * a + 0.75 * k3 * a**3
+    series = angle({"cubic.k3": k3, "damping": 0.0}, frequency, (first, 0.0, 0.25 * k3 * a**3))
+    assert series[1] == pytest.approx(a, rel=1e-9)
+    np.testing.assert_allclose(np.delete(series, 1), 0.0, atol=1e-9)
+
+
+def test_dry_friction_leaves_the_amplitude_of_den_hartog() -> None:
+    """x_0 = (P / k) sqrt(V^2 - (F / P)^2 U^2), V = 1 / (1 - b^2), U = sin(pi / b) / (b (1 + cos(pi / b))) (1931)."""
+    friction, frequency = 1.5e-3, 1.7
+    b = 2 * np.pi * frequency / np.sqrt(NOMINAL["stiffness"] / NOMINAL["inertia"])
+    v, u = 1 / (1 - b**2), np.sin(np.pi / b) / (b * (1 + np.cos(np.pi / b)))
+    expected = TORQUE[0] / NOMINAL["stiffness"] * np.sqrt(v**2 - (friction / TORQUE[0] * u) ** 2)
+    series = angle({"friction.torque": friction, "damping": 0.0}, frequency)
+    found = np.abs(sampled(series, np.linspace(0, 2 * np.pi, 2000))).max()
+    assert found == pytest.approx(expected, rel=2e-3)
+    assert found < 0.999 * np.abs(angle({"damping": 0.0}, frequency)).max()
+
+
+def test_a_point_mass_sags_by_its_weight_over_the_stiffness() -> None:
+    """At rest m g r cos theta = -k theta."""
+    mass, station = 4e-3, 0.6
+    series = angle({"point_mass.mass": mass, "point_mass.station": station}, 1.2, (0.0,))
+    moment = mass * at(1.2).gravity * station * REACH
+    assert series[0] < 0
+    assert NOMINAL["stiffness"] * series[0] == pytest.approx(-moment * np.cos(series[0]), rel=1e-9)
+
+
+@pytest.mark.parametrize("frequency", [1.2, 2.0, 3.4])
+def test_all_at_once_agrees_with_an_integration_in_time(frequency: float) -> None:
+    values = NOMINAL | TYPICAL
+    mass, lever = values["point_mass.mass"], REACH * values["point_mass.station"]
+    inertia, rate = values["inertia"] + mass * lever**2, 2 * np.pi * frequency
+
+    def course(t: float, y: Array) -> list[float]:
+        pull = values["damping"] * y[1] + values["stiffness"] * y[0] + values["cubic.k3"] * y[0] ** 3
+        pull += values["friction.torque"] * np.tanh(y[1] / SLIDING) + mass * 9.80665 * lever * np.cos(y[0])
+        return [y[1], (TORQUE[0] * np.cos(rate * t) - pull) / inertia]
+
+    beats, phase = 25, np.arange(20) / 20
+    times = (beats + phase) / frequency
+    solved = solve_ivp(course, (0.0, times[-1]), [0.0, 0.0], t_eval=times, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(sampled(angle(values, frequency), 2 * np.pi * phase), solved.y[0], atol=1e-5)
+
+
+def test_faults_of_the_camera_move_markers_and_not_the_arm() -> None:
+    empty = blank(at(2.0))
+    part, delay = 0.03, 4e-3
+    rig = PendulumRig()
+    base = rig.model.observe(nominal(rig), empty).channels[0]
+    scaled = rig.extended(["gain"]).observe([[*nominal(rig)[0], part]], empty).channels[0]
+    np.testing.assert_allclose(scaled, base * (1 + part), atol=1e-15)
+    late = replace(empty, times=empty.times + delay)
+    delayed = rig.extended(["delay"]).observe([[*nominal(rig)[0], delay]], late).channels[0]
+    np.testing.assert_allclose(delayed, base, atol=1e-13)
+    reach = np.linalg.norm(base.reshape(len(base), -1, 3), axis=2)
+    np.testing.assert_allclose(reach, np.tile(list(MARKERS.values()), (len(base), 1)), rtol=1e-12)
+
+
+def test_recordings_of_the_pendulum_hold_its_motion_and_the_noise() -> None:
+    truth = {"cubic.k3": 0.3, "stiffness": 0.22}
+    noise, clean = (recorded(truth, noise=level) for level in (3e-4, 0.0))
+    left = np.concatenate([a.values - b.values for a, b in zip(noise, clean, strict=True)])
+    assert np.std(left) == pytest.approx(3e-4, rel=0.05)
+    memory = np.mean(left[1:] * left[:-1]) / np.mean(left**2)
+    assert memory == pytest.approx(0.5, abs=0.06)
+    model = PendulumRig().extended(["cubic"])
+    for recording in clean:
+        values = model.observe([[0.22, *nominal(PendulumRig())[0, 1:], 0.3]], recording).channels[0]
+        np.testing.assert_allclose(values, recording.values, atol=1e-13)
+
+
+def test_the_pendulum_is_fast_and_hardly_ever_fails() -> None:
+    model = PendulumRig().extended([suspect.name for suspect in SUSPECTS])
+    rng = np.random.default_rng(3)
+    batch = np.array([[TYPICAL.get(g.name, g.nominal) * rng.uniform(0.7, 1.3) for g in model.genes] for _ in range(60)])
+    batch[:, [g.name for g in model.genes].index("point_mass.station")] = rng.uniform(0, 1, 60)
+    begun = time.process_time()
+    reasons = [model.observe(batch, blank(at(f))).reasons for f in FREQUENCIES]
+    spent = (time.process_time() - begun) / (len(FREQUENCIES) * len(batch))
+    assert all(reason is None for each in reasons for reason in each)
+    assert spent < 5e-3, "a millisecond on a free core"
