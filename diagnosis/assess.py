@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from calibration.evaluator import Evaluator
 from diagnosis.decide import Weighed, tolerated, weighed
 from diagnosis.nominal import LIMIT, MATTERS, Nominal, first_fit, improves, settled
@@ -117,7 +119,8 @@ def _refits(
                 tried.add(names)
                 yield 0.76 + 0.03 * k, f"refit with {' and '.join(sorted(names))}"
                 _add(state, refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
-    for two in pairs(stack, fit, state.trials, 2):
+    least = min(float(np.sum((one.fit.coefficients / stack.scale) ** 2)) for one in state.refits)
+    for two in pairs(stack, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)

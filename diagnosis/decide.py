@@ -31,6 +31,7 @@ FORM = 0.1  # of the misfit of the nominal model: what a law right but for its f
 PIECES = 6.0  # independent pieces of such misfits, per recording
 MOST_PIECES = 48.0
 GENE = 2.0  # price of a gene in units of the logarithm of the evidence
+EFFECT = 3.0  # the same for a second effect at once, and each further one
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
 PREDICTED = 0.25  # of the weight, for recordings left out
@@ -58,7 +59,8 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float)
     tau = tolerated(stack, left[0] * unit, floor) / unit
     pieces = min(PIECES * len(stack.recordings), MOST_PIECES)
     genes = np.array([one.freedom for one in every], float)
-    log = -0.5 * pieces * np.log(tau + left) - GENE * genes
+    more = np.array([max(len(one.trials) - 1, 0) for one in every], float)
+    log = -0.5 * pieces * np.log(tau + left) - GENE * genes - EFFECT * more
     unknown = -0.5 * pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)

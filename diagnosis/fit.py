@@ -17,6 +17,7 @@ from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem
 from diagnosis.stack import Stack
+from diagnosis.subject import Subject
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -70,6 +71,7 @@ class Fit:
 
 
 def fitted(
+    subject: Subject,
     stack: Stack,
     problem: Problem,
     evaluator: Evaluator,
@@ -85,17 +87,18 @@ def fitted(
     ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first. A ``thorough`` fit
     measures the Jacobian anew at every step, and where it ends.
     """
-    first = _at(stack, problem, evaluator, start)
+    look = _Look(subject, stack, problem, evaluator)
+    first = _at(look, start)
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
     every = np.ones(len(start), bool)
-    now = replace(_measured(stack, evaluator, replace(first, jacobian=own), ~columns), fresh=not columns.any())
+    now = replace(_measured(look, replace(first, jacobian=own), ~columns), fresh=not columns.any())
     for _ in range(steps):
-        better, gain = _step(stack, evaluator, now, MANY if thorough else FEW)
+        better, gain = _step(look, now, MANY if thorough else FEW)
         if better is None:
             if now.fresh:
                 return replace(now, converged=True)
-            now = _measured(stack, evaluator, now, every)
+            now = _measured(look, now, every)
             continue
         settled = now.cost - better.cost <= max(SMALLEST, SETTLED * now.cost)
         now = better
@@ -103,8 +106,8 @@ def fitted(
             now = replace(now, converged=True)
             break
         if thorough or gain < GOOD:
-            now = _measured(stack, evaluator, now, every)
-    return _measured(stack, evaluator, now, every) if thorough and not now.fresh else now
+            now = _measured(look, now, every)
+    return _measured(look, now, every) if thorough and not now.fresh else now
 
 
 def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
@@ -120,23 +123,41 @@ def _cost(stack: Stack, coefficients: Array, unit: Array) -> Array:
     return np.asarray((white**2).sum(axis=-1) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
 
 
-def _at(stack: Stack, problem: Problem, evaluator: Evaluator, unit: Array) -> Fit:
-    found, reasons, residuals = stack.evaluate(problem, evaluator, values_at(free_genes(problem), unit[None]))
+@dataclass(frozen=True)
+class _Look:
+    """How a fit sees its problem."""
+
+    subject: Subject
+    stack: Stack
+    problem: Problem
+    evaluator: Evaluator
+
+    def at(self, units: Array, near: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
+        """As :meth:`diagnosis.stack.Stack.evaluate`, for individuals [B, F] near another [F]."""
+        problem, genes = self.problem, free_genes(self.problem)
+        genome = problem.genomes(values_at(genes, near[None]))[0]
+        model = self.subject.beside(problem.model, genome)
+        here = Problem(model, problem.recordings, problem.free, problem.base, problem.axes)
+        return self.stack.evaluate(here, self.evaluator, values_at(genes, units))
+
+
+def _at(look: _Look, unit: Array) -> Fit:
+    found, reasons, residuals = look.at(unit[None], unit)
     if reasons[0] is not None:
         raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
-    cost = float(_cost(stack, found[0], unit))
+    cost = float(_cost(look.stack, found[0], unit))
     empty = np.zeros((found.shape[1], 0))
-    return Fit(problem, unit, found[0], empty, tuple(r[0] for r in residuals), cost, evaluations=1)
+    return Fit(look.problem, unit, found[0], empty, tuple(r[0] for r in residuals), cost, evaluations=1)
 
 
-def _measured(stack: Stack, evaluator: Evaluator, fit: Fit, which: Flags) -> Fit:
+def _measured(look: _Look, fit: Fit, which: Flags) -> Fit:
     """``fit`` with the columns ``which`` of its Jacobian measured by central differences inside the box."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
     moves = STEP * np.eye(len(fit.unit))[columns]
     around = np.clip(np.vstack([fit.unit + moves, fit.unit - moves]), 0.0, 1.0)
-    found, reasons, _ = stack.evaluate(fit.problem, evaluator, values_at(free_genes(fit.problem), around))
+    found, reasons, _ = look.at(around, fit.unit)
     bad = np.array([reason is not None for reason in reasons])
     found[bad] = fit.coefficients
     around[bad] = fit.unit
@@ -152,9 +173,10 @@ def _measured(stack: Stack, evaluator: Evaluator, fit: Fit, which: Flags) -> Fit
     )
 
 
-def _step(stack: Stack, evaluator: Evaluator, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
+def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
     """The best of several damped steps, its Jacobian improved by what they show, and gain over promise."""
-    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    scale = look.stack.scale
+    white, slopes = fit.coefficients / scale, fit.jacobian / scale[:, None]
     prior = np.full(len(fit.unit), PRIOR)
     curvature = slopes.T @ slopes + np.diag(prior**-2)
     slope = slopes.T @ white + (fit.unit - 0.5) / prior**2
@@ -164,9 +186,9 @@ def _step(stack: Stack, evaluator: Evaluator, fit: Fit, relative: Array) -> tupl
     promised = -2.0 * (moves @ slope) - np.einsum("df,fg,dg->d", moves, curvature, moves)
     if promised.max() <= 1e-9 * fit.cost:
         return None, 0.0
-    found, reasons, residuals = stack.evaluate(fit.problem, evaluator, values_at(free_genes(fit.problem), units))
+    found, reasons, residuals = look.at(units, fit.unit)
     bad = np.array([reason is not None for reason in reasons])
-    cost = np.where(bad, np.inf, _cost(stack, np.where(bad[:, None], FAILED, found), units))
+    cost = np.where(bad, np.inf, _cost(look.stack, np.where(bad[:, None], FAILED, found), units))
     k = int(np.argmin(cost))
     evaluations = fit.evaluations + len(units)
     if not cost[k] < fit.cost:

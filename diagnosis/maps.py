@@ -88,7 +88,7 @@ def _mean_square(name: str, pieces: Sequence[Piece]) -> float:
         for c, place in enumerate(piece.places)
         if place.name == name
     ]
-    return float(np.sqrt(max(np.mean(squares), 0.0)))
+    return float(np.sqrt(max(sum(squares) / len(squares), 0.0)))
 
 
 def phase_map(before: Sequence[Piece], after: Sequence[Piece]) -> PhaseMap:

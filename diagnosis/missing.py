@@ -26,8 +26,7 @@ Array = npt.NDArray[np.float64]
 PHASES = 36  # instants of a beat that loads are told at
 GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
 LINEAR = 0.03  # of a response: what is not proportional to the load
-TOLD = 3.0  # natural logarithm of the evidence for a load over none: less is none
-SIGNIFICANT = 2.0  # standard errors
+TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is none
 _LENGTHS = (0.25, 0.5)  # of the span, over which smooth loads are alike
 _CENTRES = np.linspace(0.0, 1.0, 41)  # of loads of one place, parts of the span
 _WIDTHS = (0.07, 0.15, 0.3)  # their standard deviation
@@ -35,8 +34,10 @@ _DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviat
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
 _LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
 _MOST = 24  # kinds to average over
+_SMOOTH = 0.1  # probability a priori of smooth loads; that of loads of one place is the rest
 _DRAWS = 400
-_FINE = 41
+_SPAN = np.linspace(0.0, 1.0, 41)
+SPREAD = 0.3  # mean direction of the phase: less, and the load is spread over the beat
 
 
 @dataclass(frozen=True)
@@ -68,12 +69,13 @@ class Case:
         sensitivities: Array,
         crossing: float,
     ) -> Case:
-        """From ``residuals`` [T, C] (simulated minus recorded, NaN where missing), ``responses`` [T, C, P] and
-        ``sensitivities`` [T, C, F] of the samples, and the standard deviation of their noise [C] with its ``memory``.
+        """From samples whose noise has standard deviation ``noise`` [C] and correlation ``memory`` with the next.
+
+        ``residuals`` [T, C] are simulated minus recorded, NaN where missing, ``responses`` [T, C, P] and
+        ``sensitivities`` [T, C, F] their changes with unit loads and with the genes.
         """
         seen = np.isfinite(residuals)
-        both = np.concatenate([-residuals[..., None], responses, sensitivities], axis=2)
-        both[..., 1 : 1 + responses.shape[2]] = np.nan_to_num(both[..., 1 : 1 + responses.shape[2]])
+        both = np.concatenate([-residuals[..., None], np.nan_to_num(responses), sensitivities], axis=2)
         white = np.concatenate(
             [_decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) / s for c, s in enumerate(noise)]
         )
@@ -139,6 +141,21 @@ class Inferred:
         return np.reshape(values, shape), np.reshape(errors, shape)
 
 
+@dataclass(frozen=True)
+class LoadPlace:
+    """Where and when the missing load acts: centres with 90 % intervals, and the parts in which it mostly acts.
+
+    ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
+    the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
+    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start).
+    """
+
+    span: Interval
+    reach: tuple[float, float]
+    phase: Interval | None
+    lasts: tuple[float, float]
+
+
 class _Normal:
     """Normal equations of one recording, the noise raised to what no load and no gene explains."""
 
@@ -193,21 +210,24 @@ def infer(cases: Sequence[Case], probe: Probe) -> Inferred:
 
 
 def _roots(probe: Probe) -> Iterator[tuple[float, float | None, float | None, Array]]:
-    """Kinds of load: probability a priori, centre and width if it has a place, and a square root [P, Z] of its
-    covariance at strength one. Smooth loads and loads of one place are equally probable."""
+    """Kinds of load: probability a priori, centre and width if it has a place, root [P, Z] of its covariance.
+
+    That is at strength one.
+    """
     y, order = np.array(probe.stations), np.arange(1, probe.harmonics + 1)
     span = np.linspace(0.0, 1.0, 401)
     hats = probe.hats(span)
     spreads = [np.diag(np.concatenate([[1.0], np.tile(order**-decay, 2)])) for decay in _DECAYS]
     for length, spread in product(_LENGTHS, spreads):
         alike = np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))
-        yield 0.5 / (len(_LENGTHS) * len(_DECAYS)), None, None, np.kron(np.linalg.cholesky(alike), spread)
-    share = 0.5 / (len(_CENTRES) * len(_WIDTHS) * len(_DECAYS))
+        root = np.asarray(np.kron(np.linalg.cholesky(alike), spread), float)
+        yield _SMOOTH / (len(_LENGTHS) * len(_DECAYS)), None, None, root
+    share = (1.0 - _SMOOTH) / (len(_CENTRES) * len(_WIDTHS) * len(_DECAYS))
     for centre, width in product(_CENTRES, _WIDTHS):
         bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
         shape = np.linalg.lstsq(hats, bump, rcond=None)[0][:, None]  # of the same force and moment
         for spread in spreads:
-            yield share, float(centre), width, np.kron(shape, spread)
+            yield share, float(centre), width, np.asarray(np.kron(shape, spread), float)
 
 
 def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -258,3 +278,72 @@ def missing_force(
 
 def _table(values: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(row) for row in values.tolist())
+
+
+def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
+    """Where and when the load acts, over all recordings that show one; None where none does.
+
+    From draws of what the data leave possible. The centre in the beat is that of what is larger than half of the most.
+    """
+    shown = np.flatnonzero(inferred.evidence > TOLD)
+    if not len(shown):
+        return None
+    rng = np.random.default_rng(seed)
+    phase = np.arange(2 * PHASES) / (2 * PHASES)
+    draws = rng.multinomial(_DRAWS, [kind.probability for kind in inferred.kinds])
+    along, during = [], []
+    for kind, count in zip(inferred.kinds, draws, strict=True):
+        if count:
+            fields = _drawn(inferred, kind, shown, phase, int(count), rng)
+            if kind.centre is not None and kind.width is not None:
+                bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
+                along.append(np.tile(bump, (count, 1)))
+            else:
+                along.append(np.abs(fields).sum(axis=(0, 3)))
+            during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
+    return LoadPlace(*_along(np.concatenate(along)), *_during(phase, np.concatenate(during)))
+
+
+def _drawn(
+    inferred: Inferred,
+    kind: Kind,
+    shown: npt.NDArray[np.int64],
+    phase: Array,
+    count: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square."""
+    hats, found = inferred.probe.hats(_SPAN), []
+    for r in shown:
+        size, turn = np.linalg.eigh(kind.covariance[r])
+        off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
+        sizes = (kind.sizes[r] + off @ turn.T).reshape(count, len(inferred.probe.stations), -1)
+        series = inferred.probe.terms(phase + inferred.crossings[r])
+        field = np.einsum("sj,cjk,pk->csp", hats, sizes, series, optimize=True)
+        found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))
+    return np.array(found)
+
+
+def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
+    """Centre of loads of sizes [draws, span] with its interval, and the part of the span with 90 % of them."""
+    share = size / size.sum(axis=1, keepdims=True)
+    centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
+    total = np.cumsum(share.mean(axis=0))
+    first, last = np.interp([0.05, 0.95], total, _SPAN)
+    return Interval(*centre.tolist()), (float(first), float(last))
+
+
+def _during(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
+    """The same in the beat, for sizes [draws, phase]."""
+    peak = np.where(size > 0.5 * size.max(axis=1, keepdims=True), size, 0.0)
+    turns = peak @ np.exp(2j * np.pi * phase) / peak.sum(axis=1)
+    middle = turns.mean()
+    if np.abs(middle) < SPREAD:
+        return None, (0.0, 1.0)
+    centre = float(np.angle(middle) / (2 * np.pi)) % 1.0
+    off = np.quantile(np.angle(turns / middle) / (2 * np.pi), [0.05, 0.95])
+    apart = (phase - centre + 0.5) % 1.0 - 0.5
+    order = np.argsort(apart)
+    total = np.cumsum((peak / peak.sum(axis=1, keepdims=True)).mean(axis=0)[order])
+    first, last = np.interp([0.05, 0.95], total, apart[order])
+    return Interval(centre, centre + float(off[0]), centre + float(off[1])), (centre + float(first), centre + float(last))

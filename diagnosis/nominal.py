@@ -57,7 +57,7 @@ def first_fit(
     problem = Problem(subject.model, stack.recordings, free, base, stack.axes)
     genes = free_genes(problem)
     start = unit_at(genes, np.array([base[gene.name] for gene in genes]))
-    return fitted(stack, problem, evaluator, start, steps=STEPS, thorough=True)
+    return fitted(subject, stack, problem, evaluator, start, steps=STEPS, thorough=True)
 
 
 def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, refine: bool) -> Nominal:

@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 6  # of a refit
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
+HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
 HALVINGS = 3  # of a start that cannot be simulated
 
@@ -95,7 +96,7 @@ def refitted(
     for part in 0.5 ** np.arange(HALVINGS):
         start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
         try:
-            fit = fitted(stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+            fit = fitted(subject, stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
         except ValueError:
             continue
         return judged(stack, fit, trials)
@@ -109,7 +110,7 @@ def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) ->
     problem = Problem(model, stack.recordings, before.problem.free, before.problem.base, stack.axes)
     known = np.ones(len(before.unit), bool)
     try:
-        fit = fitted(stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
+        fit = fitted(subject, stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
     except ValueError:
         return None
     return judged(stack, fit, refit.trials)
@@ -133,21 +134,23 @@ def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int 
         k = int(np.argmax(gains))
         scored.append((gains[k], trials[k]))
     scored.sort(key=lambda pair: -pair[0])
-    return [trial for _, trial in scored[:most]]
+    worth = HELPS * (float(left @ left) - len(left))
+    return [trial for gain, trial in scored[:most] if gain > worth]
 
 
 def pairs(
-    stack: Stack, nominal: Fit, found: Sequence[list[Trial]], most: int = PARTNERS
+    stack: Stack, nominal: Fit, found: Sequence[list[Trial]], beyond: float, most: int = PARTNERS
 ) -> Iterator[tuple[Trial, Trial]]:
-    """Pairs of suspects that together would take most of what the nominal model leaves, best first."""
+    """Pairs of suspects that together would leave less than a chi-squared of ``beyond``, best first."""
     nuisance = Nuisance(nominal.jacobian, stack.scale)
     left = nuisance.rest(nominal.coefficients / stack.scale)
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
     own = [nuisance.rest(trial.fields / stack.scale) for trial in best]
     scored = [(_gain(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
     scored.sort(key=lambda triple: -triple[0])
-    for _, one, other in scored[:most]:
-        yield (one, other) if one.gain >= other.gain else (other, one)
+    for gain, one, other in scored[:most]:
+        if float(left @ left) - gain < beyond:
+            yield (one, other) if one.gain >= other.gain else (other, one)
 
 
 def _gain(own: Array, left: Array) -> float:

@@ -79,6 +79,11 @@ class WingSubject:
         """The nominal model with suspects put in, switched off."""
         return self.model.with_effects(*names)
 
+    def beside(self, model: Model, genome: Array) -> Model:
+        """The wing begins its search for the periodic motion at that of ``genome``, without its effects."""
+        own = len(self.model.genes) - sum(len(effect.parameters) for effect in self.model.chosen)
+        return replace(model, near=tuple(genome[:own].tolist())) if isinstance(model, FlexibleWing) else model
+
     def finer(self) -> WingSubject | None:
         """Two strips more, and along the chord the next even number of bodies; None beyond MOST_BODIES.
 
@@ -108,14 +113,7 @@ class WingSubject:
     def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
         """Tracks of all markers under ``condition``, at the phases of the recording made under the most similar one."""
         blank = _blank(self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers))
-        if not isinstance(model, FlexibleWing):
-            raise TypeError(f"a wing is shown by a flexible wing, not by {type(model).__name__}")
-        beat = model.beat(genome, blank)
-        if beat.reason is not None:
-            return None
-        place = np.round(len(beat.tracks) * condition.flap_frequency * blank.times).astype(int) % len(beat.tracks)
-        rough = replace(blank, values=beat.tracks[place].reshape(len(blank.times), -1))  # so that it can be aligned
-        seen = model.observe(genome[None], rough)
+        seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
     def conditions(self) -> tuple[Condition, ...]:
@@ -155,6 +153,10 @@ class VehicleSubject:
     def extended(self, names: Sequence[str]) -> BladeElementWing:
         """The nominal model with suspects put in, switched off."""
         return self.model.with_effects(*names)
+
+    def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002  # part of the protocol
+        """Prescribed motion needs no search."""
+        return model
 
     def finer(self) -> VehicleSubject | None:
         """Twice as many elements and instants; None where this changes no recorded force by CONVERGED, or too many."""

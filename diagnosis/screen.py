@@ -90,7 +90,8 @@ def screened(
     left = nuisance.rest(nominal.coefficients / stack.scale)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
-        model = subject.extended([suspect.name])
+        genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
+        model = subject.beside(subject.extended([suspect.name]), genome)
         free = tuple(gene.name for gene in suspect.genes)
         problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
         yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance, left)

@@ -94,6 +94,10 @@ class Subject(Protocol):
         """The nominal model with suspects put in; their genes follow its own, switched off."""
         ...
 
+    def beside(self, model: Model, genome: Array) -> Model:
+        """``model``, told that individuals will be near ``genome`` [G], so that it may begin its search there."""
+        ...
+
     def finer(self) -> Subject | None:
         """The same with the next finer division; None where there is none, or it would cost too much."""
         ...

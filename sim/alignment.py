@@ -20,8 +20,11 @@ _NEWTON_STEPS = 30
 
 
 def reference_columns(wing: Wing, recording: Recording) -> list[int]:
-    """Columns (markers of the recording) of the reference markers with enough samples to place the beat."""
-    needed = 2 * (2 * REFERENCE_HARMONICS + 1)
+    """Columns (markers of the recording) of the reference markers with enough samples to place the beat.
+
+    Of a recording without any data, all.
+    """
+    needed = 2 * (2 * REFERENCE_HARMONICS + 1) if recording.valid.any() else 0
     found = [
         recording.markers.index(name)
         for name in wing.reference_markers
@@ -37,7 +40,12 @@ def reference_columns(wing: Wing, recording: Recording) -> list[int]:
 
 
 def recorded_crossing(wing: Wing, recording: Recording) -> float:
-    """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke."""
+    """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke.
+
+    A recording without any data, made to see what it would show, begins there.
+    """
+    if not recording.valid.any():
+        return 0.0
     psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
     k = np.arange(1, REFERENCE_HARMONICS + 1)
     basis = np.hstack([np.ones((len(psi), 1)), np.cos(psi[:, None] * k), -np.sin(psi[:, None] * k)])

@@ -44,21 +44,30 @@ class RodDrive:
 
         One individual at a time, and those that are driven alike once: nobody's numbers depend on his neighbours.
         """
-        turn, found = np.exp(1j * np.arange(len(self.series)) * psi.ravel()[:, None]), {}
-        lanes = [np.ascontiguousarray(self.series[:, :, w]) for w in range(self.series.shape[2])]
-        for series in lanes:
-            if series.tobytes() not in found:
-                found[series.tobytes()] = _angles(turn, series).reshape(*psi.shape, 2, 5)
-        return np.stack([found[series.tobytes()] for series in lanes], axis=-1)
+        phases = np.asarray(psi, float).tobytes()
+        lanes = [self.series[:, :, w].tobytes() for w in range(self.series.shape[2])]
+        found = {series: _angles(phases, series).reshape(*psi.shape, 2, 5) for series in dict.fromkeys(lanes)}
+        return np.stack([found[series] for series in lanes], axis=-1)
 
 
-def _angles(turn: npt.NDArray[np.complex128], series: npt.NDArray[np.complex128]) -> Array:
-    """[T, 2, 5] from exp(i k psi) [T, K + 1] and the series [K + 1, 2] of both rods."""
+@lru_cache(maxsize=64)
+def _angles(phases: bytes, both: bytes) -> Array:
+    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Remembered: a batch asks for few, many times."""
+    series = np.frombuffer(both, np.complex128).reshape(-1, 2)
+    turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
     derived = (series[:, :, None] * order.T[:, None]).reshape(len(series), -1)
     # sums and not matrix products, whose threads would cost more than they do
     found = np.einsum("tk,kc->tc", turn.real, derived.real) - np.einsum("tk,kc->tc", turn.imag, derived.imag)
-    return np.asarray(found.reshape(len(turn), 2, 5))
+    angles = np.asarray(found.reshape(len(turn), 2, 5))
+    angles.setflags(write=False)
+    return angles
+
+
+@lru_cache(maxsize=4)
+def _turns(phases: bytes, terms: int) -> npt.NDArray[np.complex128]:
+    """exp(i k psi) [T, terms]."""
+    return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
 
 
 def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:

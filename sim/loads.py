@@ -49,7 +49,7 @@ def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording,
         raise AssertionError("a beat without its motion")
     genomes = np.asarray(genome, float)[None]
     scene = model.subject(model.switched_on(genomes[0]), recording.condition).scene(genomes)
-    found = from_motion(scene, beat.motion, _crossing(model, recording, beat.tracks))
+    found = from_motion(scene, beat.motion, crossing(model, recording, beat.tracks))
     return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
 
 
@@ -65,7 +65,7 @@ def _fine(model: FlexibleWing) -> FlexibleWing:
     return replace(model, numerics=replace(model.numerics, accuracy=accuracy))
 
 
-def _crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
+def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
     """Drive phase (beats) of the upstroke crossing of ``tracks`` [n, M, 3]; 0 where there is none.
 
     By the markers that place the recording, so that both phases agree; by all reference markers where nothing was

@@ -17,7 +17,7 @@ from records import Condition
 from sim.effects.wing import WingScene
 from sim.kernels import LANES
 from sim.kernels.air import strip_forces
-from sim.kernels.arrays import Lanes, Setting, State, Wiring, Work, new_work
+from sim.kernels.arrays import NOW, Lanes, Setting, State, Wiring, Work, new_work
 from sim.kernels.bodies import kinetic_and_height
 from sim.kernels.connectors import twists
 from sim.kernels.integrate import airflow, forces
@@ -286,6 +286,7 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
     for rows, state in groups:
         kept = len(rows)
         _put(work, state)
+        work.clock[NOW, :kept] = 2 * np.pi * rows / len(sums.kinetic)
         airflow(w, here, group, work)
         work.wrench[:] = 0.0
         for s in range(len(w.geometry)):

@@ -27,8 +27,9 @@ def drive_table(
     A drive that gives way asks for two more derivatives, and for that share by itself, in the last row.
     """
     omega = 2 * np.pi * frequency
-    beats = beat + (np.arange(n)[:, None] + NODES) / n
-    angle = rods.angles(2 * np.pi * (beats - beat)) * omega ** np.arange(5.0)[:, None]
+    phases = (np.arange(n)[:, None] + NODES) / n
+    beats = beat + phases
+    angle = rods.angles(2 * np.pi * phases) * omega ** np.arange(5.0)[:, None]
     if beat < numerics.ramp_beats:
         angle[..., :4, :] = _ramped(
             angle, beats[..., None, None] / numerics.ramp_beats, frequency / numerics.ramp_beats

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -114,6 +114,21 @@ class _Group:
             if course.distance <= numerics.settled:
                 course.growth = course.secants.growth
                 course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
+
+
+def beside(near: Course, genome: Array, states: int) -> Course:
+    """A course for ``genome`` that begins at the periodic motion of ``near`` and with what that knows of its map.
+
+    ``states`` of effects begin at rest where ``near`` has others; what it knows of the map is then of no use.
+    """
+    if near.state is None or near.secants is None:
+        raise ValueError("only a settled individual can be begun beside")
+    state = State(*(array.copy() for array in near.state))
+    if len(state.z) != states:
+        return Course(genome, state._replace(z=np.zeros(states)))
+    known = replace(near.secants, columns=list(near.secants.columns), target=None)
+    known.restart()
+    return Course(genome, state, known)
 
 
 def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: int, with_motion: bool) -> None:

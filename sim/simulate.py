@@ -11,7 +11,7 @@ from sim.kernels import LANES
 from sim.kernels.arrays import State, Trace
 from sim.numerics import LADDER, Numerics, estimated_error
 from sim.scene import new_trace
-from sim.settle import Course, Subject, measure_growth, settle
+from sim.settle import Course, Subject, beside, measure_growth, settle
 from sim.structure import Structure
 
 Array = npt.NDArray[np.float64]
@@ -51,13 +51,45 @@ class Beat:
 
 
 def periodic_beats(
-    subject: Subject, genomes: Array, numerics: Numerics, *, with_motion: bool = False
+    subject: Subject, genomes: Array, numerics: Numerics, *, with_motion: bool = False, near: Course | None = None
 ) -> tuple[Beat, ...]:
     """Simulate ``genomes`` [B, G] until each is periodic and accurate; groups of LANES at a time.
 
-    An individual's numbers do not depend on its neighbours: each has its own steps, beats and end.
+    An individual's numbers do not depend on its neighbours: each has its own steps, beats and end. Those that begin
+    ``near`` a settled individual take as many steps as that, and its error is taken for theirs.
     """
+    if near is not None and near.trace is not None:
+        return _beats_beside(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
     courses = [Course(genome) for genome in genomes]
+    return _settled(subject, courses, numerics, with_motion)
+
+
+def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
+    """One individual settled, for others to begin beside; None where it fails."""
+    course = Course(genome)
+    _settled(subject, [course], numerics, with_motion=False)
+    return course if course.trace is not None and course.reason is None else None
+
+
+def _beats_beside(
+    subject: Subject, genomes: Array, numerics: Numerics, near: Course, steps: int, with_motion: bool
+) -> tuple[Beat, ...]:
+    """Beats of individuals that begin beside another; those that fail so begin again from rest."""
+    states = len(subject.scene(genomes[:1]).frozen().laws.size)
+    courses = [beside(near, genome, states) for genome in genomes]
+    for group in _groups(courses):
+        settle(subject, group, numerics, steps, with_motion)
+    failed = [k for k, course in enumerate(courses) if course.reason is not None or course.growth > FLUTTER]
+    again = iter(_settled(subject, [Course(genomes[k]) for k in failed], numerics, with_motion))
+    for course in courses:
+        course.error = near.error + course.distance
+    return tuple(
+        next(again) if k in failed else _beat(subject.structure, course, with_motion)
+        for k, course in enumerate(courses)
+    )
+
+
+def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_motion: bool) -> tuple[Beat, ...]:
     ladder = numerics.ladder(subject.condition)
     for rung, steps in enumerate(ladder):
         under_way = [course for course in courses if not course.done]

@@ -38,6 +38,8 @@ DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
 # Derivatives that the step needs of each state of an effect (sim.kernels.laws).
 DECAY, DRIVE, PULL = range(3)
 FRAME = 17  # numbers in a law's frame: places, parameters and states per place, then addresses
+# Of the clock of a beat: the drive phase now, that at the start of the step, and the stage's share of a step's change.
+NOW, START, SHARE, CLOCK = range(4)  # rad
 # Geometry of a strip.
 AREA, MEAN_CHORD, WIDTH, STATION, GEOMETRY = range(5)  # m^2, m, m, part of the span from root to tip
 
@@ -179,6 +181,7 @@ class Work(NamedTuple):
     more_d0: Array
     push: Array
     rods: Array
+    clock: Array
     strip_frames: Index
     connector_frames: Index
     parameters: Array
@@ -255,6 +258,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
         more_d0=zeros(joints),
         push=zeros(joints),
         rods=zeros((2, 3, LANES)),
+        clock=zeros((CLOCK, LANES)),
         strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
         connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
         # whose addresses are in the frames, so that they live as long
@@ -268,7 +272,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
 
 def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
     """Tell every law where its arrays are."""
-    air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind)
+    air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind, work.clock)
     joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
     for k, row in enumerate(laws.strip):
         own = (laws.parameters[row[3] :], work.z[row[4] :], work.z_rate[row[4] :], work.z_tangent[DECAY, row[4] :])

@@ -14,7 +14,21 @@ import numpy.typing as npt
 
 from sim.kernels import LANES
 from sim.kernels.air import strip_flow, strip_forces
-from sim.kernels.arrays import AIR, DAMPERS, FRONT_MOTOR, STAGES, Lanes, Setting, State, Trace, Wiring, Work
+from sim.kernels.arrays import (
+    AIR,
+    DAMPERS,
+    FRONT_MOTOR,
+    NOW,
+    SHARE,
+    STAGES,
+    START,
+    Lanes,
+    Setting,
+    State,
+    Trace,
+    Wiring,
+    Work,
+)
 from sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from sim.kernels.connectors import connect, relative_pose, tangent, twists
 from sim.kernels.jit import allocating, kernel
@@ -248,6 +262,14 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
     move(state.R, state.p, work.xi, work.R, work.p)
 
 
+@kernel
+def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
+    """Tell the laws where in the beat a stage of step ``t`` is, a step being ``turn`` (rad)."""
+    clock[NOW] = turn * (t + NODES[stage])
+    clock[START] = turn * t
+    clock[SHARE] = turn * SLOPES[stage]
+
+
 @allocating
 def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
     """Take the step; a lane that turned too far or is no number any more is dead."""
@@ -295,6 +317,7 @@ def advance(
         for stage in range(STAGES):
             if stage > 0:
                 _to_stage(work, state, stage)
+            _set_clock(work.clock, 2.0 * np.pi / len(drive), t, stage)
             forces(wiring, setting, lanes, work)
             if len(lanes.laws.motor):
                 give_way(lanes.laws.motor, work)

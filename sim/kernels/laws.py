@@ -21,7 +21,7 @@ from numba import carray, types
 from numba.extending import intrinsic
 
 from sim.kernels import LANES
-from sim.kernels.arrays import FLOW, GEOMETRY, LOADS
+from sim.kernels.arrays import CLOCK, FLOW, GEOMETRY, LOADS
 from sim.kernels.jit import callback, inlined
 
 Array = npt.NDArray[np.float64]
@@ -34,7 +34,8 @@ SIGNATURE = types.void(types.CPointer(types.int64), types.int64)
 class StripPort(NamedTuple):
     """What a law of the air sees. S strips; parameters [P, S, W] and states [K, S, W] are its own.
 
-    Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s). Add to or
+    Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s),
+    ``clock`` [CLOCK, W] (rad): a load that time itself brings is f(NOW) + SHARE f'(START), f' by the phase. Add to or
     change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Give,
     AFTER: ``rate`` [K, S, W] of the states, and ``decay`` [K, S, W], minus its derivative by the state itself (1/s).
     """
@@ -50,6 +51,7 @@ class StripPort(NamedTuple):
     geometry: Array
     density: Array
     wind: Array
+    clock: Array
 
 
 class ConnectorPort(NamedTuple):
@@ -121,6 +123,7 @@ def strip_port(frame: Any) -> StripPort:
         carray(_doubles(frame[10]), (S, GEOMETRY)),
         carray(_doubles(frame[11]), (LANES,)),
         carray(_doubles(frame[12]), (3, LANES)),
+        carray(_doubles(frame[13]), (CLOCK, LANES)),
     )
 
 

@@ -250,6 +250,9 @@ class PendulumRig:
     def extended(self, names: Sequence[str]) -> Pendulum:
         return replace(self.model, effects=(*self.model.effects, *names))
 
+    def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
+        return model
+
     def finer(self) -> None:
         """None: a pendulum is one body."""
 

@@ -74,9 +74,11 @@ def test_suspects_put_in_and_switched_off_change_nothing(subjects: dict[str, Sub
     assert extended.genes[:own] == tuple(subject.model.genes)
     assert extended.genes[own:] == tuple(gene for suspect in subject.suspects for gene in suspect.genes)
     condition = subject.conditions()[0]
-    empty = subject.blank(condition)
-    with_all = extended.observe(np.array([[gene.nominal for gene in extended.genes]]), empty)
-    assert with_all.channels.tobytes() == subject.model.observe(nominal(subject), empty).channels.tobytes()
+    with_all = subject.shown(extended, np.array([gene.nominal for gene in extended.genes]), condition)
+    own_alone = subject.shown(subject.model, nominal(subject)[0], condition)
+    assert with_all is not None
+    assert own_alone is not None
+    assert with_all.values.tobytes() == own_alone.values.tobytes()
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -94,21 +96,27 @@ def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_a_blank_is_simulated_under_every_condition_proposed(subjects: dict[str, Subject], rig: str) -> None:
+def test_what_is_shown_is_what_would_be_recorded(subjects: dict[str, Subject], rig: str) -> None:
+    """All channels under every condition proposed, aligned: the model that showed it meets it, and it begins a beat."""
     subject = subjects[rig]
     conditions = subject.conditions()
     assert 5 < len(conditions) <= MOST_CONDITIONS
     assert len(set(conditions)) == len(conditions)
     for condition in conditions[::13]:
-        empty = subject.blank(condition)
-        assert empty.condition == condition
-        assert not empty.valid.any()
-        assert len(subject.places(empty)) == empty.values.shape[1] == len(empty.channels)
-        found = subject.model.observe(nominal(subject), empty)
-        assert found.reasons == (None,)
-        placed = replace(empty, values=found.channels[0])
-        np.testing.assert_allclose(subject.model.observe(nominal(subject), placed).channels, found.channels, atol=1e-9)
-        assert subject.origin(placed) == pytest.approx(0.0, abs=1e-6)
+        shown = subject.shown(subject.model, nominal(subject)[0], condition)
+        assert shown is not None
+        assert shown.condition == condition
+        assert shown.valid.all()
+        assert len(subject.places(shown)) == shown.values.shape[1] == len(shown.channels)
+        np.testing.assert_allclose(subject.model.observe(nominal(subject), shown).channels[0], shown.values, atol=1e-9)
+        assert subject.origin(shown) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_what_cannot_be_simulated_is_not_shown(subjects: dict[str, Subject]) -> None:
+    subject = subjects["wing"]
+    genome = nominal(subject)[0]
+    genome[[gene.name for gene in subject.model.genes].index("L_a")] = 1e6
+    assert subject.shown(subject.model, genome, subject.conditions()[0]) is None
 
 
 def test_a_wing_of_effects_has_them_in_its_nominal_model(wing: Dataset) -> None:
@@ -167,12 +175,11 @@ def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict
     """Of 4 bodies, against a wing finer than any that a diagnosis compares with."""
     subject = subjects["wing"]
     assert isinstance(subject, WingSubject)
-    empty = subject.blank(SMALL[5][0])
-    genome = nominal(subject)
     finer = subject.finer()
     assert finer is not None
     best = FlexibleWing(subject.model.wing, "10x6")
-    coarse, fine, true = (model.observe(genome, empty).channels[0] for model in (subject.model, finer.model, best))
+    found = [subject.shown(model, nominal(subject)[0], SMALL[5][0]) for model in (subject.model, finer.model, best)]
+    coarse, fine, true = (one.values for one in found if one is not None)
     told, error = (np.sqrt(np.mean((coarse - other) ** 2)) for other in (fine, true))
     assert told == pytest.approx(error, rel=0.5)
     assert np.sqrt(np.mean((fine - true) ** 2)) < 0.7 * error

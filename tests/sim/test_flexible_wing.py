@@ -5,12 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
 
 from records import FourierDrive, Recording
+from sim import flexible_wing, simulate
 from sim.alignment import recorded_crossing, upstroke_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.arrays import AREA
 from sim.numerics import Numerics
+from sim.periodic import _matrices, _vectors
 from sim.rig import Tracking, blank_recording, record, robird_wing, true_genome, tunnel, vacuum
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
 from tests.sim.marching import driven
@@ -182,3 +186,88 @@ def test_recording_without_reference_markers_says_so(model: FlexibleWing, record
     )
     with pytest.raises(ValueError, match="reference"):
         recorded_crossing(model.wing, cut)
+
+
+def of_effects(model: FlexibleWing, rows: list[dict[str, float]]) -> np.ndarray:
+    """Genomes: nominal but for what each row names."""
+    return np.array([[row.get(gene.name, gene.nominal) for gene in model.genes] for row in rows])
+
+
+def test_each_distinct_wing_is_simulated_once(
+    model: FlexibleWing, recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Faults of the cameras, and places of a mass that is not there, make no other wing; the mass itself does."""
+    loaded = model.with_effects("lumped_mass", "camera_shift", "strobe_rate")
+    rows = [
+        {},
+        {"camera_shift.x": 0.004},
+        {"lumped_mass.station": 0.3},
+        {"lumped_mass.mass": 0.004},
+        {"lumped_mass.mass": 0.004, "lumped_mass.station": 0.3},
+        {"strobe_rate.part": 1e-4, "lumped_mass.mass": 0.004},
+        {"E_f": model.genes[0].nominal * 1.1},
+        {"camera_shift.x": 0.004},
+    ]
+    genomes, simulated = of_effects(loaded, rows), []
+    original = simulate.periodic_beats
+
+    def counted(subject: object, batch: np.ndarray, *args: object, **options: object) -> object:
+        simulated.append(len(batch))
+        return original(subject, batch, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(flexible_wing, "periodic_beats", counted)
+    beats = loaded.beats(genomes, recording)
+    assert sum(simulated) == 4
+    groups = [next(i for i, other in enumerate(beats) if other is beat) for beat in beats]
+    assert groups == [0, 0, 0, 3, 4, 3, 6, 0]
+    together = loaded.observe(genomes, recording)
+    assert sum(simulated) == 2 * 4
+    for k, genome in enumerate(genomes):
+        alone = loaded.observe(genome[None], recording)
+        assert alone.channels[0].tobytes() == together.channels[k].tobytes()
+        assert alone.solutions[0] == together.solutions[k]
+    same = [together.channels[k].tobytes() for k in (0, 1, 2, 3, 5, 7)]
+    assert same[0] == same[2]
+    assert same[1] == same[5]
+    assert len(set(same)) == 4
+
+
+def test_the_common_phase_is_the_one_that_fits_best() -> None:
+    """Against a search by trial: the misfit over what was recorded, gaps left out, is least where the tracks are."""
+    rng = np.random.default_rng(4)
+    k = np.arange(31)
+    drawn = rng.standard_normal((31, 6)) + 1j * rng.standard_normal((31, 6))
+    series = np.asarray(drawn * (0.1 / (1 + k[:, None]) ** 3), np.complex128)
+    phases = np.sort(rng.uniform(0, 8 * np.pi, 90))
+
+    def wave(psi: np.ndarray) -> np.ndarray:
+        return np.asarray((np.exp(1j * k * psi[:, None]) @ series).real)
+
+    recorded = wave(phases + 0.02) + 1e-3 * rng.standard_normal((90, 6))
+    recorded[rng.uniform(size=recorded.shape) < 0.2] = np.nan
+    found = flexible_wing._laid_over(series[None], phases[None] - 0.7, np.array([0.7]), recorded)[0]
+    best = minimize_scalar(
+        lambda shift: np.nansum((wave(phases + shift) - recorded) ** 2), bounds=(-0.05, 0.05), options={"xatol": 1e-12}
+    )
+    np.testing.assert_allclose(found, wave(phases + best.x), atol=2e-7)
+    far = flexible_wing._laid_over(series[None], phases[None] - 0.5, np.array([0.0]), recorded)[0]
+    np.testing.assert_allclose(far, wave(phases - 0.5 + 2 * flexible_wing.LARGEST_SHIFT), atol=1e-12)
+
+
+def test_a_recording_without_data_begins_at_the_crossing(model: FlexibleWing) -> None:
+    empty = blank_recording(model.wing, CONDITION, frames=60)
+    tracks = model.observe(random_genomes(model, 2), empty).channels.reshape(2, 60, -1, 3)
+    columns = [empty.markers.index(name) for name in model.wing.reference_markers]
+    height = tracks[:, :, columns, 2].mean(axis=2)
+    series = np.fft.rfft(height, axis=1)[:, :5] / 60
+    series[:, 1:] *= 2
+    np.testing.assert_allclose(upstroke_crossing(series, model.wing.hinge.z), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("largest", [1e-9, 0.3, 1.9, 3.1, 3.1415926])
+def test_turns_between_beats_are_rotation_vectors(largest: float) -> None:
+    vectors = np.random.default_rng(2).uniform(-1, 1, (20, 3))
+    vectors *= np.linspace(0, largest, 20)[:, None] / np.linalg.norm(vectors, axis=1)[:, None]
+    expected = Rotation.from_rotvec(vectors).as_matrix()
+    np.testing.assert_allclose(_matrices(vectors), expected, atol=1e-15)
+    np.testing.assert_allclose(_vectors(expected), vectors, rtol=0, atol=1e-13)

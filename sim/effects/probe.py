@@ -1,0 +1,132 @@
+"""A known load on the wing along the flap normal, given by its span and its place in the beat: a probe, no suspect.
+
+What the tracks answer to it tells which load is missing where a model and a recording differ. It is not in the
+registry: a search for what is missing must not name it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.effects.contract import Effect, Parameter, Values
+from sim.effects.wing import WingScene
+from sim.kernels.arrays import AREA, NOW, PUSH_N, SHARE, START
+from sim.kernels.lanewise import cosine_and_sine
+from sim.kernels.laws import AFTER, strip_port
+from sim.kernels.vector import load, load0, load1, store
+from sim.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+LARGEST = 1000.0  # N/m, of a gene: far beyond what a wing bears
+_THINNEST = 1e-9  # kg/m^3: loads are told as parts of the air's, so that there must be some
+_CUTS = 400  # of the span, for the means of its hats
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A force per metre of span, N/m: hat functions over ``stations`` times a Fourier series of the drive phase.
+
+    ``stations`` in parts of the span, rising from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency. It acts
+    along the normal of the wing where it is, upward, and is spread over the chord. The genes of the effect
+    (:meth:`effect`) are numbered station by station: constant, cosines, sines (:meth:`terms`).
+    """
+
+    stations: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
+    harmonics: int = 8
+
+    def __post_init__(self) -> None:
+        y = np.array(self.stations)
+        if len(y) < 2 or y[0] != 0.0 or y[-1] != 1.0 or not np.all(np.diff(y) > 0):
+            raise ValueError(f"stations {self.stations} must rise from 0 (root) to 1 (tip); give at least these two")
+        if not 0 <= self.harmonics <= 12:
+            raise ValueError(f"{self.harmonics} harmonics of a load; there must be 0 to 12")
+
+    @property
+    def size(self) -> int:
+        """Number of its genes, P = stations times (1 + 2 harmonics)."""
+        return len(self.stations) * (1 + 2 * self.harmonics)
+
+    def terms(self, phase: npt.ArrayLike) -> Array:
+        """Constant, cosines and sines [..., 1 + 2 harmonics] at drive ``phase`` [...] in beats."""
+        turn = 2 * np.pi * np.asarray(phase, float)[..., None] * np.arange(1, self.harmonics + 1)
+        return np.concatenate([np.ones((*turn.shape[:-1], 1)), np.cos(turn), np.sin(turn)], axis=-1)
+
+    def hats(self, span: npt.ArrayLike) -> Array:
+        """Hat functions [..., stations] at parts of the ``span`` [...]."""
+        y = np.asarray(span, float)
+        return np.stack([np.interp(y, self.stations, row) for row in np.eye(len(self.stations))], axis=-1)
+
+    def on_strips(self, structure: Structure) -> Array:
+        """Force on each strip per size of each hat [S, stations], m.
+
+        A load between the middles of two strips goes to both by the lever rule, and beyond the last by the same rule,
+        so that force and moment about the root are those of the load whatever the division.
+        """
+        edges = structure.planform.strips(structure.division)
+        span = (np.arange(_CUTS) + 0.5) / _CUTS
+        middles = strip_middles(structure)
+        inner = np.clip(np.searchsorted(middles, span) - 1, 0, len(middles) - 2)
+        part = (span - middles[inner]) / (middles[inner + 1] - middles[inner])
+        shares = np.zeros((len(middles), _CUTS))
+        shares[inner, np.arange(_CUTS)] = 1.0 - part
+        shares[inner + 1, np.arange(_CUTS)] = part
+        return np.asarray(shares @ self.hats(span) * (edges[-1] - edges[0]) / _CUTS)
+
+    def effect(self) -> Effect:
+        """The load as an effect, for :class:`sim.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
+        names = ["0", *(f"{kind}{k}" for kind in "cs" for k in range(1, self.harmonics + 1))]
+        text = "N/m of span at {:g} of it, {}"
+        what = {"0": "constant", "c": "cosine", "s": "sine"}
+        return Effect(
+            name="probe",
+            title="Known load",
+            family="aerodynamics",
+            port="air",
+            size=tuple(
+                Parameter(f"{j}_{name}", "N/m", -LARGEST, LARGEST, 1.0, text.format(y, what[name[0]]))
+                for j, y in enumerate(self.stations)
+                for name in names
+            ),
+            source="sum of hats of the span times Fourier series of the drive phase: any load, as well as these can",
+            signature="whatever one wishes",
+            confused_with=(),
+            wing=partial(_wing, self),
+        )
+
+
+def strip_middles(structure: Structure) -> Array:
+    """Span parts [S] at which evenly spread loads of the strips act."""
+    edges, wiring = structure.planform.strips(structure.division), structure.wiring
+    y = np.array([body.centroid[1] for body in structure.bodies])
+    middle = np.add.reduceat(wiring.weight * y, wiring.strip_start[:-1])
+    return np.asarray((middle - edges[0]) / (edges[-1] - edges[0]))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """F = sum of a_k cos k psi + b_k sin k psi per strip, with what the step's method asks of its rate of change."""
+    if moment != AFTER:
+        return
+    port = strip_port(frame)
+    harmonics = len(port.parameters) // 2
+    share = load1(port.clock, SHARE)
+    for s in range(port.places):
+        force = load(port.parameters, 0, s)
+        for k in range(1, harmonics + 1):
+            a, b = load(port.parameters, k, s), load(port.parameters, harmonics + k, s)
+            c, n = cosine_and_sine(float(k) * load1(port.clock, NOW))
+            c0, n0 = cosine_and_sine(float(k) * load1(port.clock, START))
+            force += a * c + b * n + (float(k) * share) * (b * c0 - a * n0)
+        scale = load0(port.density) * (0.5 * port.geometry[s, AREA])
+        store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + force / scale)
+
+
+def _wing(probe: Probe, scene: WingScene, values: Values) -> None:
+    sizes = np.array(list(values.values())).reshape(len(probe.stations), 1 + 2 * probe.harmonics, -1)
+    scene.density = np.maximum(scene.density, _THINNEST)
+    scene.add_strip_law(_law, list(np.einsum("sj,jkw->ksw", probe.on_strips(scene.structure), sizes)))

@@ -1,0 +1,95 @@
+"""A wing under a load that its model does not know, filmed, and made into cases for finding that load."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.missing import Case
+from records import Condition, Recording
+from sim.effects.probe import Probe
+from sim.flexible_wing import FlexibleWing
+from sim.loads import crossing
+from sim.numerics import Numerics
+from sim.probing import Probed, probed
+from sim.rig import blank_recording, robird_wing, tunnel, vacuum
+
+Array = npt.NDArray[np.float64]
+
+NOISE, MEMORY, FRAMES = 5e-4, 0.6, 62
+CONDITIONS = (vacuum(10.0, 0.05, 3.0), tunnel(0.05, 3.0, 6.0), vacuum(1000.0, 0.12, 4.0), tunnel(0.0, 2.0, 3.5))
+_STEP = 0.01  # unit coordinates
+
+
+def model(division: str) -> FlexibleWing:
+    return FlexibleWing(robird_wing(), division, numerics=Numerics(steps=96, periodic=2e-6, max_beats=60))
+
+
+def nominal(wing: FlexibleWing) -> Array:
+    return np.array([gene.nominal for gene in wing.genes])
+
+
+def bump(span: Array, phase: Array, place: float, when: float, width: float = 0.06, lasting: float = 0.05) -> Array:
+    """[span, phase] a push of size one at a place and a phase."""
+    during = (phase - when + 0.5) % 1.0 - 0.5
+    return np.asarray(np.exp(-0.5 * ((span[:, None] - place) / width) ** 2 - 0.5 * (during / lasting) ** 2))
+
+
+def pushed(wing: FlexibleWing, condition: Condition, place: float, when: float, size: float) -> Array:
+    """Genome of ``wing``, which has a fine probe, under a push of ``size`` (N/m) ``when`` (beats) after its crossing."""
+    probe, blank, genome = wing.probe, blank_recording(wing.wing, condition), nominal(wing)
+    assert probe is not None
+    phase = np.arange(256) / 256
+    series = np.linalg.pinv(probe.terms(phase))
+    for _ in range(2):  # the push moves the crossing a little
+        start = crossing(wing, blank, wing.beat(genome, blank).tracks)
+        field = size * bump(np.array(probe.stations), phase, place, when + start)
+        genome[-probe.size :] = (field @ series.T).ravel()
+    return genome
+
+
+def noise(shape: tuple[int, int], rng: np.random.Generator) -> Array:
+    """[T, C] with NOISE and MEMORY."""
+    found = rng.standard_normal(shape)
+    for t in range(1, len(found)):
+        found[t] = MEMORY * found[t - 1] + np.sqrt(1 - MEMORY**2) * found[t]
+    return np.asarray(NOISE * found)
+
+
+def filmed(wing: FlexibleWing, genome: Array, condition: Condition, rng: np.random.Generator) -> Recording:
+    """Two apparent beats of 31 frames under a strobe, with noise and some gaps."""
+    blank = blank_recording(wing.wing, condition, name=f"{condition.airspeed:g} m/s", frames=FRAMES)
+    times = np.arange(FRAMES) * 30 / 31 / condition.flap_frequency
+    tracks = wing.beat(genome, blank).tracks
+    series = np.fft.rfft(tracks.reshape(len(tracks), -1), axis=0) / len(tracks)
+    series[1:] *= 2
+    turn = np.exp(2j * np.pi * condition.flap_frequency * times[:, None] * np.arange(len(series)))
+    values = (turn @ series).real + noise((FRAMES, series.shape[1]), rng)
+    values[rng.uniform(size=values.shape) < 0.02] = np.nan
+    return replace(blank, times=times, values=values)
+
+
+def sensitivities(wing: FlexibleWing, genome: Array, recording: Recording) -> tuple[Array, Array]:
+    """Residuals [T, C] and their changes with the genes [T, C, G], unit coordinates."""
+    unit = np.array([float(gene.to_unit(value)) for gene, value in zip(wing.genes, genome, strict=True)])
+    rows = [genome]
+    for k, gene in enumerate(wing.genes):
+        for sign in (1.0, -1.0):
+            rows.append(genome.copy())
+            rows[-1][k] = float(gene.from_unit(unit[k] + sign * _STEP))
+    seen = wing.observe(np.array(rows), recording).channels
+    return seen[0] - recording.values, np.stack((seen[1::2] - seen[2::2]) / (2 * _STEP), axis=-1)
+
+
+def case(wing: FlexibleWing, recording: Recording, probe: Probe) -> tuple[Case, Probed]:
+    """Of the nominal wing."""
+    genome = nominal(wing)
+    answers = probed(wing, genome, recording, probe)
+    residuals, slopes = sensitivities(wing, genome, recording)
+    sigma = np.full(residuals.shape[1], NOISE)
+    return (
+        Case.of_samples(recording.name, residuals, sigma, MEMORY, answers.responses, slopes, answers.crossing),
+        answers,
+    )

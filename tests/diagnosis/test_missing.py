@@ -1,0 +1,132 @@
+"""A load that the model does not know is found: where, when, how large, how surely; and none where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from diagnosis.missing import PHASES, Case, infer, missing_force, missing_loads, place
+from sim.effects.probe import Probe
+from sim.probing import Probed
+from tests.diagnosis.loaded import CONDITIONS, MEMORY, NOISE, case, filmed, model, noise, nominal, pushed
+
+Array = npt.NDArray[np.float64]
+
+PROBE = Probe()
+PLACE, WHEN, SIZE = 0.7, 0.3, 10.0
+
+
+@cache
+def cases() -> tuple[tuple[Case, Probed], ...]:
+    """A wing of six strips pushed at 70 % of its span, 0.3 beats after the crossing."""
+    plant = replace(model("6x1"), probe=Probe(tuple(np.linspace(0.0, 1.0, 21).tolist()), 12))
+    found = []
+    for k, condition in enumerate(CONDITIONS):
+        genome = pushed(plant, condition, PLACE, WHEN, SIZE)
+        recording = filmed(plant, genome, condition, np.random.default_rng(k))
+        found.append(case(model("6x1"), recording, PROBE))
+    return tuple(found)
+
+
+def quiet(one: Case, rng: np.random.Generator, size: Array | None = None) -> Case:
+    """The same with noise alone, and perhaps a load of a ``size`` [P]."""
+    lacking = rng.standard_normal(len(one.lacking))
+    return replace(one, lacking=lacking if size is None else lacking + one.responses @ size)
+
+
+def test_a_push_is_found_with_all_genes_free() -> None:
+    inferred = infer([one for one, _ in cases()], PROBE)
+    found = place(inferred)
+    assert found is not None
+    assert found.phase is not None
+    assert abs(found.phase.value - WHEN) < 10.0 / 360.0
+    assert abs(found.span.value - PLACE) < 0.05
+    assert found.span.low is not None
+    assert found.span.high is not None
+    assert found.span.high - found.span.low < 0.35
+    assert found.lasts[0] > WHEN - 0.12
+    assert found.lasts[1] < WHEN + 0.12
+    assert found.reach[0] > 0.2
+    for load in missing_loads(inferred):
+        values = np.array(load.values)
+        assert values.shape == (len(PROBE.stations), PHASES)
+        station, instant = np.unravel_index(np.argmax(values), values.shape)
+        assert load.stations[station] in (0.5, 0.75)
+        assert abs(load.phase[instant] - WHEN) < 10.0 / 360.0
+        assert values[station, instant] > 5 * np.array(load.errors)[:, (instant + PHASES // 2) % PHASES].min()
+
+
+def test_noise_alone_is_no_load() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        assert place(infer([quiet(one, rng) for one, _ in cases()], PROBE)) is None
+
+
+def test_errors_are_what_estimates_are_off_by() -> None:
+    """Loads of one place and free shape drawn at random, found with their errors: z-scores of about one."""
+    rng = np.random.default_rng(6)
+    span, scores = np.linspace(0.1, 0.9, 5), []
+    hats = PROBE.hats(np.linspace(0.0, 1.0, 401))
+    for _ in range(12):
+        centre = rng.uniform(0.2, 0.9)
+        shape = np.linalg.lstsq(hats, np.exp(-0.5 * ((np.linspace(0, 1, 401) - centre) / 0.15) ** 2), rcond=None)[0]
+        fall = np.concatenate([[1.0], np.tile(1.0 / np.arange(1, PROBE.harmonics + 1), 2)])
+        sizes = [np.outer(shape, fall * rng.standard_normal(len(fall))).ravel() for _ in cases()]
+        drawn = [quiet(one, rng, 2.0 * size) for (one, _), size in zip(cases(), sizes, strict=True)]
+        phase = np.arange(12) / 12
+        values, errors = infer(drawn, PROBE).fields(span, phase)
+        for r, size in enumerate(sizes):
+            truth = np.kron(PROBE.hats(span), PROBE.terms(phase + drawn[r].crossing)) @ (2.0 * size)
+            scores.append((values[r].ravel() - truth) / errors[r].ravel())
+    spread = float(np.sqrt(np.mean(np.square(scores))))
+    assert 0.6 < spread < 1.4
+    assert np.mean(np.abs(scores) < 1.645) > 0.8
+
+
+def test_what_no_load_explains_makes_errors_larger() -> None:
+    one = cases()[0][0]
+    rough = replace(one, lacking=one.lacking + 3.0 * np.random.default_rng(1).standard_normal(len(one.lacking)))
+    plain, worse = (infer([c], PROBE).floor[0] for c in (one, rough))
+    assert worse == pytest.approx(np.hypot(plain, 3.0), rel=0.05)
+
+
+def test_coloured_noise_is_made_white() -> None:
+    rng = np.random.default_rng(2)
+    residuals = noise((400, 6), rng)
+    residuals[rng.uniform(size=residuals.shape) < 0.2] = np.nan
+    nothing = np.zeros((400, 6, 1))
+    white = Case.of_samples("", residuals, np.full(6, NOISE), MEMORY, nothing, nothing, 0.0).lacking
+    assert len(white) == np.isfinite(residuals).sum()
+    assert abs(np.std(white) - 1.0) < 0.05
+    assert abs(np.mean(white[1:] * white[:-1])) < 0.06
+
+
+def test_forces_show_what_they_lack() -> None:
+    rng, phase = np.random.default_rng(3), np.arange(300) * 0.0337 % 1.0
+    lacking = 0.2 * np.cos(2 * np.pi * (phase - 0.25)) + 0.05
+    off = [missing_force("run", -lacking + 0.02 * rng.standard_normal(300), phase, 0.02, 0.0) for _ in range(20)]
+    at = np.array(off[0].phase)
+    scores = [
+        (np.array(one.values[0]) - 0.2 * np.cos(2 * np.pi * (at - 0.25)) - 0.05) / np.array(one.errors[0])
+        for one in off
+    ]
+    assert 0.8 < float(np.sqrt(np.mean(np.square(scores)))) < 1.2
+    assert off[0].unit == "N"
+
+
+def test_nothing_to_invert() -> None:
+    with pytest.raises(ValueError, match="at least one"):
+        infer([], PROBE)
+
+
+def test_genes_take_what_is_theirs() -> None:
+    """A wrong gene, seen under all conditions, is not made a load."""
+    rng = np.random.default_rng(4)
+    genes = len(nominal(model("6x1")))
+    wrong = 0.2 * np.eye(genes)[0]
+    off = [replace(one, lacking=quiet(one, rng).lacking + one.sensitivities @ wrong) for one, _ in cases()]
+    assert place(infer(off, PROBE)) is None
