@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
+from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, tolerated, weighed
 from diagnosis.nominal import LIMIT, MATTERS, Nominal, first_fit, improves, settled
 from diagnosis.refit import Refit, again, pairs, partners, refitted, worth_a_refit
@@ -46,9 +48,9 @@ class Counted:
     inner: Evaluator
     of: Assessment
 
-    def evaluate(self, problem, values, *, residuals: bool = False):  # type: ignore[no-untyped-def]
+    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """As the inner one."""
-        self.of.evaluations += len(values)
+        self.of.evaluations += len(np.atleast_2d(values))
         return self.inner.evaluate(problem, values, residuals=residuals)
 
     def close(self) -> None:
@@ -75,7 +77,8 @@ def assess(
     if spec.refine:
         _refined(state, nominal, evaluator)
     floor = 0.0 if spec.refine else nominal.division or 0.0
-    state.weighed = weighed(stack, state.nominal.refit, state.refits, floor)
+    first = state.nominal or nominal
+    state.weighed = weighed(stack, first.refit, state.refits, floor)
 
 
 def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:

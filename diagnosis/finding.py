@@ -246,7 +246,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Proof:
-    """Misfit over all held-out recordings in parts of the ``floor`` (m or N): nominal refitted, and with what was found."""
+    """Misfit over all held-out recordings in parts of ``floor`` (m or N): nominal refitted, and with what was found."""
 
     before: Interval
     after: Interval

@@ -346,4 +346,7 @@ def _during(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, fl
     order = np.argsort(apart)
     total = np.cumsum((peak / peak.sum(axis=1, keepdims=True)).mean(axis=0)[order])
     first, last = np.interp([0.05, 0.95], total, apart[order])
-    return Interval(centre, centre + float(off[0]), centre + float(off[1])), (centre + float(first), centre + float(last))
+    return Interval(centre, centre + float(off[0]), centre + float(off[1])), (
+        centre + float(first),
+        centre + float(last),
+    )

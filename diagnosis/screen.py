@@ -56,7 +56,7 @@ class Trial:
         size = size_columns(self.suspect)
         start = self.unit[0].copy()
         start[size] = off[size] + self.amounts @ (self.unit[:, size] - off[size])
-        return np.clip(start, 0.0, 1.0)
+        return np.asarray(np.clip(start, 0.0, 1.0), float)
 
 
 class Nuisance:
@@ -68,8 +68,7 @@ class Nuisance:
 
     def rest(self, white: Array) -> Array:
         """``white`` without what they can do."""
-        rest: Array = white - (white @ self.basis) @ self.basis.T
-        return rest
+        return np.asarray(white - (white @ self.basis) @ self.basis.T)
 
 
 def off_units(suspect: Suspect) -> Array:
