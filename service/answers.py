@@ -27,6 +27,7 @@ class Health(TypedDict):
     evaluator: str
     workers: int | None
     runs_active: int
+    diagnoses_active: int
 
 
 class RecordingInfo(TypedDict):

@@ -18,20 +18,30 @@ from starlette.staticfiles import StaticFiles
 
 from service import problems
 from service.database import Database
+from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.guard import Guard
-from service.routes import datasets, effects, forces, outcomes, runs, system
+from service.routes import datasets, diagnoses, effects, forces, outcomes, runs, system
 from service.schemas import ProblemOut
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"
-ROUTERS = (system.router, datasets.router, runs.router, outcomes.router, forces.router, effects.router)
+ROUTERS = (
+    system.router,
+    datasets.router,
+    runs.router,
+    outcomes.router,
+    forces.router,
+    diagnoses.router,
+    effects.router,
+)
 METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
 DESCRIPTION = (
     "Calibrates flapping-wing simulations on recordings of tracked markers or of forces. Upload a dataset, submit a "
-    "run, watch its events, fetch its result. Errors are problem details (RFC 9457)."
+    "run, watch its events, fetch its result; submit a diagnosis to find the physics that the model left out. Errors "
+    "are problem details (RFC 9457)."
 )
 
 
@@ -41,13 +51,14 @@ def create_app(
     database: Database | None = None,
     engine: Engine | None = None,
     make_evaluator: MakeEvaluator | None = None,
+    diagnoser: Diagnoser | None = None,
 ) -> FastAPI:
     """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         opened = Database(settings.data) if database is None else database
-        service = Service(settings, opened, engine, make_evaluator)
+        service = Service(settings, opened, engine, make_evaluator, diagnoser)
         app.state.service = service
         await run_in_threadpool(service.start)
         yield

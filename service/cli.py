@@ -11,7 +11,7 @@ import sys
 import typer
 
 from service.client import WingfitError
-from service.commands import datasets, effects, force_runs, freeflight, kinematics, rig, runs, serve, simulate
+from service.commands import datasets, diagnose, effects, force_runs, freeflight, kinematics, rig, runs, serve, simulate
 from service.commands.output import note
 
 ERROR = 1
@@ -20,7 +20,7 @@ app = typer.Typer(
     name="wingfit",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Calibrate flapping-wing simulations on recordings of tracked markers or of forces.",
+    help="Calibrate flapping-wing simulations on recordings of markers or of forces, and find what they left out.",
     epilog="Example: wingfit serve, then wingfit datasets upload examples/robird",
 )
 app.command()(serve.serve)
@@ -30,6 +30,8 @@ app.command()(kinematics.kinematics)
 app.command()(freeflight.forces)
 app.add_typer(datasets.app, name="datasets")
 app.add_typer(runs.app, name="runs")
+app.command()(diagnose.diagnose)
+app.add_typer(diagnose.app, name="diagnoses")
 app.command()(simulate.simulate)
 app.command()(force_runs.models)
 app.command()(effects.effects)

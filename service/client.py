@@ -12,28 +12,26 @@ Answers are plain dicts, typed in :mod:`service.answers`. Every failure is a :cl
 from __future__ import annotations
 
 import io
-import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, cast
-from urllib.parse import quote
 
 import httpx
 
 from service import answers as a
 from service import force_answers as f
+from service.diagnosis_client import DiagnosisCalls
 from service.effect_answers import Effect
 from service.transport import (
     DEFAULT_URL,
     CountedFile,
     OnBytes,
     ServerAwayError,
-    Transport,
     WingfitError,
     given,
-    is_passing,
+    part,
     zip_folder,
 )
 
@@ -42,7 +40,7 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(Transport):
+class Client(DiagnosisCalls):
     """Talks to one server; usable as a context manager."""
 
     def health(self) -> a.Health:
@@ -82,7 +80,7 @@ class Client(Transport):
 
     def dataset(self, dataset_id: str) -> a.Dataset:
         """Fetch one dataset with its recordings."""
-        return cast(a.Dataset, self._json("GET", f"/v1/datasets/{_part(dataset_id)}"))
+        return cast(a.Dataset, self._json("GET", f"/v1/datasets/{part(dataset_id)}"))
 
     def download(self, dataset_id: str, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
         """Write the bytes that were uploaded to ``path``; into a folder under the server's name for them.
@@ -90,26 +88,25 @@ class Client(Transport):
         ``on_bytes(received, total)`` is called as they come in; total is 0 where the server does not say.
         """
         target = Path(path)
-        part: Path | None = None
-        with self._stream("GET", f"/v1/datasets/{_part(dataset_id)}/archive") as response:
+        with self._stream("GET", f"/v1/datasets/{part(dataset_id)}/archive") as response:
             if target.is_dir():
                 target = target / _attachment_name(response, f"{dataset_id}.zip")
-            part = target.with_name(target.name + ".part")
+            partial = target.with_name(target.name + ".part")
             try:
-                with part.open("wb") as stream:
+                with partial.open("wb") as stream:
                     for block in response.iter_bytes():
                         stream.write(block)
                         if on_bytes:
                             on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
             except httpx.TransportError as error:
-                part.unlink(missing_ok=True)
+                partial.unlink(missing_ok=True)
                 raise ServerAwayError(self.base_url, error) from error
-        part.replace(target)
+        partial.replace(target)
         return target
 
     def delete_dataset(self, dataset_id: str) -> None:
         """Delete a dataset; the server refuses while runs refer to it."""
-        self._call("DELETE", f"/v1/datasets/{_part(dataset_id)}")
+        self._call("DELETE", f"/v1/datasets/{part(dataset_id)}")
 
     # -- runs ----------------------------------------------------------------
 
@@ -198,7 +195,7 @@ class Client(Transport):
 
     def effect(self, name: str) -> Effect:
         """Fetch one effect."""
-        return cast(Effect, self._json("GET", f"/v1/effects/{_part(name)}"))
+        return cast(Effect, self._json("GET", f"/v1/effects/{part(name)}"))
 
     def comparison(
         self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
@@ -229,38 +226,11 @@ class Client(Transport):
         A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
         without a server.
         """
-        away_since: float | None = None
-        while True:
-            try:
-                for event in self._events_once(f"{_run(run_id)}/events", last_event_id):
-                    away_since = None
-                    last_event_id = event["id"] or last_event_id
-                    yield event
-                    if _is_final(event):
-                        return
-                run = self.run(run_id)  # the stream ended early, or resumed after the final state
-                if run["state"] in a.FINAL:
-                    yield {"id": None, "event": "state", "data": dict(run)}
-                    return
-            except (httpx.TransportError, WingfitError) as error:
-                if isinstance(error, WingfitError) and not is_passing(error):
-                    raise
-                away_since = away_since or time.monotonic()
-                if time.monotonic() - away_since > patience_s:
-                    raise ServerAwayError(self.base_url, error) from error
-            time.sleep(self.retry_wait_s)
+        return self._events(_run(run_id), lambda: self.run(run_id), last_event_id, patience_s)
 
     def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
         """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
-        run = self.run(run_id)
-        report = on_progress or (lambda _: None)
-        report(run)
-        if run["state"] in a.FINAL:
-            return run
-        for event in self.events(run_id, patience_s=patience_s):
-            run = merge(run, event)
-            report(run)
-        return run
+        return self._wait(_run(run_id), lambda: self.run(run_id), on_progress, patience_s)
 
     def simulate(
         self,
@@ -345,32 +315,8 @@ class Client(Transport):
         return cast(a.Loads, self._simulated("/v1/loads", body))
 
 
-def merge(run: a.Run, event: a.Event) -> a.Run:
-    """Return the run as it stands after ``event``."""
-    data = event["data"]
-    if event["event"] == "state":
-        return cast(a.Run, dict(run) | data)
-    # After a reconnection the server repeats what the run already counts.
-    if event["event"] != "generation" or data["sequence"] <= run["generations"]:
-        return run
-    kept = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
-    known = {key: data[key] for key in kept if key in data}
-    return cast(a.Run, dict(run) | known | {"generations": data["sequence"]})
-
-
-def _is_final(event: a.Event) -> bool:
-    return event["event"] == "state" and event["data"].get("state") in a.FINAL
-
-
-def _part(identifier: str) -> str:
-    """Quote an id as one segment of a path, whatever characters were typed."""
-    if not identifier:
-        raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
-    return quote(identifier, safe="").replace(".", "%2E")
-
-
 def _run(run_id: str) -> str:
-    return f"/v1/runs/{_part(run_id)}"
+    return f"/v1/runs/{part(run_id)}"
 
 
 def _attachment_name(response: httpx.Response, fallback: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -73,11 +73,16 @@ def sent(answer: store.Answer) -> Response:
 
 def tagged(model: BaseModel, known: str | None) -> Response:
     """``model`` with an ETag, or 304 when the caller has it."""
-    body = model.model_dump_json().encode()
+    return marked(model.model_dump_json().encode(), "application/json", known)
+
+
+def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:
+    """``body`` with an ETag and further ``headers``, or 304 when the caller has it."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     if matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag})
-    return Response(body, media_type="application/json", headers={"ETag": tag, "Cache-Control": "no-cache"})
+    whole = {"ETag": tag, "Cache-Control": "no-cache", **(headers or {})}
+    return Response(body, media_type=media_type, headers=whole)
 
 
 def matches(known: str | None, tag: str) -> bool:

@@ -1,7 +1,8 @@
-"""Runs calibrations: a few at a time, one thread each, every generation stored before the next begins.
+"""Computes jobs (calibrations, diagnoses): a few at a time, one thread each, every step stored before the next begins.
 
-What a run may do next is decided by :mod:`workers.jobs`; here its instructions are carried out. A run is
-RUNNING only while its thread lives, so after any end of the process the database says what is left to do.
+What a job may do next is decided by :mod:`workers.jobs`; here its instructions are carried out. How a kind of job is
+computed is its :class:`service.work.Work`. A job is RUNNING only while its thread lives, so after any end of the
+process the database says what is left to do.
 """
 
 from __future__ import annotations
@@ -11,20 +12,19 @@ import os
 import threading
 import time
 from collections import deque
-from typing import Any
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from sqlalchemy.orm import Session
 
 from calibration.evaluator import Evaluator
-from calibration.force_result import ForceResult
-from calibration.search import Generation
-from service import force_views, store, views
+from service import store
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError
-from service.datasets import Datasets
-from service.engine import Engine
 from service.problems import conflict
 from service.remedies import with_remedy
-from service.tables import CheckpointRow, GenerationRow, RunRow
-from service.units import finite
+from service.tables import JobRow
+from service.work import InterruptedStepError, Points, Step, Work
 from workers import jobs
 from workers.jobs import Instruction
 
@@ -34,14 +34,23 @@ LONGEST_ERROR = 1000
 NICENESS = 10
 
 
-class Runner:
-    """Owns the threads that compute runs."""
+class Known(NamedTuple):
+    """A job and its kind."""
 
-    def __init__(self, database: Database, engine: Engine, datasets: Datasets, changes: Changes, max_runs: int) -> None:
-        self._database, self._engine, self._datasets, self._changes = database, engine, datasets, changes
-        self._max_runs = max_runs
+    work: Work
+    id: str
+
+    def __str__(self) -> str:
+        return f"{self.work.what} {self.id}"
+
+
+class Runner:
+    """Owns the threads that compute jobs."""
+
+    def __init__(self, database: Database, changes: Changes, kinds: Sequence[Work], at_once: int) -> None:
+        self._database, self._changes, self._kinds, self._at_once = database, changes, kinds, at_once
         self._lock = threading.RLock()
-        self._waiting: deque[str] = deque()
+        self._waiting: deque[Known] = deque()
         self._threads: dict[str, threading.Thread] = {}
         self._evaluator: Evaluator | None = None
         self._stopping = False
@@ -49,14 +58,17 @@ class Runner:
     # -- from outside ----------------------------------------------------------------------------------------
 
     def recover(self) -> None:
-        """Take up what an earlier process left: runs under way first, then those that waited."""
+        """Take up what an earlier process left: jobs under way first, then those that waited."""
         with self._lock:
             with self._database.write() as session:
-                running = store.runs_in(session, jobs.State.RUNNING)
-                waiting = store.runs_in(session, jobs.State.QUEUED)
-                todo = [(row.id, _step(row, jobs.Restart())) for row in (*running, *waiting)]
-            for run_id, instructions in todo:
-                self._obey(run_id, instructions)
+                left = [
+                    (row, Known(work, row.id))
+                    for state in (jobs.State.RUNNING, jobs.State.QUEUED)
+                    for row, work in self._unfinished(session, state)
+                ]
+                todo = [(job, _step(row, jobs.Restart())) for row, job in left]
+            for job, instructions in todo:
+                self._obey(job, instructions)
 
     def attach(self, evaluator: Evaluator) -> None:
         """Begin to compute with ``evaluator``."""
@@ -64,28 +76,29 @@ class Runner:
             self._evaluator = evaluator
         self._dispatch()
 
-    def enqueue(self, run_id: str) -> None:
-        """A new run was stored as QUEUED."""
-        self._obey(run_id, (Instruction.ENQUEUE, Instruction.PUBLISH))
+    def enqueue(self, work: Work, job_id: str) -> None:
+        """A new job was stored as QUEUED."""
+        self._obey(Known(work, job_id), (Instruction.ENQUEUE, Instruction.PUBLISH))
 
-    def control(self, run_id: str, event: jobs.Event) -> RunRow:
-        """Apply a user's event; a 409 with the state when the run does not admit it."""
+    def control(self, work: Work, job_id: str, event: jobs.Event) -> JobRow:
+        """Apply a user's event; a 409 with the state when the job does not admit it."""
+        job = Known(work, job_id)
         with self._lock:
             with self._database.write() as session:
-                row = store.run(session, run_id)
+                row = work.row(session, job_id)
                 try:
                     instructions = _step(row, event)
                 except jobs.IllegalTransition as error:
-                    raise conflict(f"run {run_id}: {error}", state=row.state) from None
-            self._obey(run_id, (*instructions, Instruction.PUBLISH))
+                    raise conflict(f"{job}: {error}", state=row.state) from None
+            self._obey(job, (*instructions, Instruction.PUBLISH))
         return row
 
     def begin_stop(self) -> None:
-        """Start nothing more, and let no failure from now on count as the run's. Safe in a signal handler."""
+        """Start nothing more, and let no failure from now on count as the job's. Safe in a signal handler."""
         self._stopping = True
 
     def stop(self, timeout: float) -> bool:
-        """Wait for the generations under way, at most ``timeout`` s; whether all threads ended."""
+        """Wait for the steps under way, at most ``timeout`` s; whether all threads ended."""
         self.begin_stop()
         deadline = time.monotonic() + timeout
         with self._lock:
@@ -96,106 +109,94 @@ class Runner:
 
     # -- the waiting line ------------------------------------------------------------------------------------
 
-    def _obey(self, run_id: str, instructions: tuple[Instruction, ...]) -> None:
+    def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, Work]]:
+        found = [(row, work) for work in self._kinds for row in store.jobs_in(session, work.table, state)]
+        return sorted(found, key=lambda one: one[0].created_at)
+
+    def _obey(self, job: Known, instructions: tuple[Instruction, ...]) -> None:
         with self._lock:
-            if Instruction.ENQUEUE in instructions and run_id not in self._waiting:
-                self._waiting.append(run_id)
-            if Instruction.DEQUEUE in instructions and run_id in self._waiting:
-                self._waiting.remove(run_id)
+            if Instruction.ENQUEUE in instructions and job not in self._waiting:
+                self._waiting.append(job)
+            if Instruction.DEQUEUE in instructions and job in self._waiting:
+                self._waiting.remove(job)
         if Instruction.PUBLISH in instructions:
-            self._changes.publish(run_id)
+            self._changes.publish(job.id)
         self._dispatch()
 
     def _dispatch(self) -> None:
         with self._lock:
-            while self._evaluator and not self._stopping and len(self._threads) < self._max_runs:
-                # A run that was paused and resumed waits until its earlier thread has ended.
-                run_id = next((waiting for waiting in self._waiting if waiting not in self._threads), None)
-                if run_id is None:
+            while self._evaluator and not self._stopping and len(self._threads) < self._at_once:
+                # A job that was paused and resumed waits until its earlier thread has ended.
+                job = next((waiting for waiting in self._waiting if waiting.id not in self._threads), None)
+                if job is None:
                     return
-                self._waiting.remove(run_id)
-                thread = threading.Thread(
-                    target=self._work, args=(run_id, self._evaluator), name=f"run-{run_id}", daemon=True
-                )
-                self._threads[run_id] = thread
+                self._waiting.remove(job)
+                thread = threading.Thread(target=self._work, args=(job, self._evaluator), name=job.id, daemon=True)
+                self._threads[job.id] = thread
                 thread.start()
 
-    # -- in the run's thread ---------------------------------------------------------------------------------
+    # -- in the job's thread ---------------------------------------------------------------------------------
 
-    def _work(self, run_id: str, evaluator: Evaluator) -> None:
+    def _work(self, job: Known, evaluator: Evaluator) -> None:
         lower_priority()
         try:
-            self._calibrate(run_id, evaluator)
+            self._compute(job, evaluator)
         except (DatabaseClosedError, jobs.IllegalTransition) as error:
-            LOG.info("run %s: left as stored (%s)", run_id, error)
+            LOG.info("%s: left as stored (%s)", job, error)
+        except InterruptedStepError:
+            self._end(job, jobs.Fail("interrupted"))  # the wish to cancel decides
         except Exception as error:
-            self._fail(run_id, error)
+            self._fail(job, error)
         finally:
             with self._lock:
-                self._threads.pop(run_id, None)
+                self._threads.pop(job.id, None)
             self._dispatch()
 
-    def _calibrate(self, run_id: str, evaluator: Evaluator) -> None:
-        row = self._advance(run_id, jobs.Start())
-        spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
-        with self._database.read() as session:
-            checkpoint = store.checkpoint(session, run_id)
-            points = [(g.elapsed_seconds, g.progress) for g in store.history(session, run_id, 0)]
+    def _compute(self, job: Known, evaluator: Evaluator) -> None:
+        row, points = self._start(job)
         earlier, began = row.elapsed_seconds, time.monotonic()
-        LOG.info("run %s: starts after generation %d", run_id, row.generations)
-        for generation in self._engine.calibrate(spec, dataset, evaluator, checkpoint):
-            checkpoint = generation.checkpoint
-            points.append((earlier + time.monotonic() - began, generation.progress))
-            goes_on = self._store(run_id, generation, points)
+        LOG.info("%s: starts after step %d", job, row.generations)
+        for step in job.work.steps(row, evaluator):
+            points.append((earlier + time.monotonic() - began, step.progress))
+            goes_on = self._store(job, step, points)
             if self._stopping or not goes_on:
                 return
-        if checkpoint is None:
-            raise ValueError("the search ended without a generation")
-        judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
-        if isinstance(judged, ForceResult):
-            outcome = force_views.result(judged, spec, dataset).model_dump(mode="json")
-        else:
-            outcome = views.result(judged).model_dump(mode="json")
-        self._advance(run_id, jobs.Finish(), result=outcome)
 
-    def _store(self, run_id: str, generation: Generation, points: list[tuple[float, float]]) -> bool:
-        """One generation with its checkpoint and genome, in one transaction; whether the run goes on."""
+    def _start(self, job: Known) -> tuple[JobRow, Points]:
+        with self._database.write() as session:
+            row = job.work.row(session, job.id)
+            instructions = _step(row, jobs.Start())
+            points = job.work.begin(session, row)
+        self._obey(job, instructions)
+        return row, points
+
+    def _store(self, job: Known, step: Step, points: Points) -> bool:
+        """One step with all that it found, in one transaction; whether the job goes on."""
         eta = jobs.eta_seconds(points)
         with self._database.write() as session:
-            row = store.run(session, run_id)
-            instructions = _step(row, jobs.Generation(generation.progress))
-            row.stage, row.genome = generation.stage, generation.genome
-            misfit = views.misfit(row.kind, generation.distance)
-            row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
-            row.evaluations = generation.evaluations
+            row = job.work.row(session, job.id)
+            instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress))
             row.elapsed_seconds = points[-1][0]
-            row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
-            session.add(_generation_row(row, generation, eta))
-            session.merge(CheckpointRow(run_id=run_id, body=generation.checkpoint))
-        self._obey(run_id, (*instructions, Instruction.PUBLISH))
+            if not step.last or row.state == jobs.State.SUCCEEDED:
+                step.keep(session, row, eta)
+        self._obey(job, (*instructions, Instruction.PUBLISH))
         return Instruction.STOP not in instructions
 
-    def _advance(self, run_id: str, event: jobs.Event, result: dict[str, Any] | None = None) -> RunRow:
-        with self._database.write() as session:
-            row = store.run(session, run_id)
-            instructions = _step(row, event)
-            if row.state == jobs.State.SUCCEEDED and result is not None:
-                row.result = result
-                # while it runs, the best of the present stage; in the end, over all that was fitted
-                row.best_mm, row.best_mn = result.get("after_mm"), result.get("after_mn")
-        self._obey(run_id, instructions)
-        return row
-
-    def _fail(self, run_id: str, error: Exception) -> None:
+    def _fail(self, job: Known, error: Exception) -> None:
         if self._stopping:
-            LOG.info("run %s: interrupted by the stop of the service (%s)", run_id, error)
+            LOG.info("%s: interrupted by the stop of the service (%s)", job, error)
             return
-        LOG.error("run %s failed", run_id, exc_info=error)
+        LOG.error("%s failed", job, exc_info=error)
+        self._end(job, jobs.Fail(_failure(job, error)))
+
+    def _end(self, job: Known, event: jobs.Fail) -> None:
         try:
-            self._advance(run_id, jobs.Fail(_failure(error)))
+            with self._database.write() as session:
+                instructions = _step(job.work.row(session, job.id), event)
+            self._obey(job, instructions)
         except Exception as late:
-            # A full disk, say: the run stays as stored and goes on at the next start of the service.
-            LOG.error("run %s: failure not stored (%s)", run_id, late)
+            # A full disk, say: the job stays as stored and goes on at the next start of the service.
+            LOG.error("%s: end not stored (%s)", job, late)
 
 
 def message(error: Exception) -> str:
@@ -209,11 +210,11 @@ def _told(error: Exception) -> bool:
     return isinstance(error, ValueError) and bool(str(error))
 
 
-def _failure(error: Exception) -> str:
-    """Why a run failed; a surprise is the server's fault, and said to be."""
+def _failure(job: Known, error: Exception) -> str:
+    """Why a job failed; a surprise is the server's fault, and said to be."""
     if _told(error):
         return message(error)
-    return f"the server made a mistake ({message(error)}); the run's data are kept; please report it"
+    return f"the server made a mistake ({message(error)}); the {job.work.what}'s data are kept; please report it"
 
 
 def lower_priority() -> None:
@@ -221,29 +222,10 @@ def lower_priority() -> None:
     try:
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
     except OSError:
-        LOG.debug("cannot lower the priority of a run")
+        LOG.debug("cannot lower the priority of a job")
 
 
-def _step(row: RunRow, event: jobs.Event) -> tuple[Instruction, ...]:
+def _step(row: JobRow, event: jobs.Event) -> tuple[Instruction, ...]:
     job, instructions = jobs.step(store.job(row), event)
     store.put_job(row, job)
     return instructions
-
-
-def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> GenerationRow:
-    return GenerationRow(
-        run_id=row.id,
-        sequence=row.generations,
-        stage=generation.stage,
-        generation=generation.index,
-        best=finite(generation.best),
-        mean=finite(generation.mean),
-        diversity=finite(generation.diversity),
-        **views.misfit(row.kind, generation.distance),
-        evaluations=generation.evaluations,
-        failed=generation.failed,
-        reasons=list(generation.reasons),
-        elapsed_seconds=row.elapsed_seconds,
-        progress=row.progress,
-        eta_seconds=eta,
-    )

@@ -111,6 +111,7 @@ class HealthOut(BaseModel):
     evaluator: str
     workers: int | None
     runs_active: int
+    diagnoses_active: int
     detail: str | None = None
 
 

@@ -15,6 +15,7 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.database import Database, DataFolderError
+from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.settings import Settings, SettingsError, is_loopback
 from service.state import MakeEvaluator
@@ -49,7 +50,13 @@ class _Server(uvicorn.Server):
         self.should_exit = True
 
 
-def serve(settings: Settings, *, engine: Engine | None = None, make_evaluator: MakeEvaluator | None = None) -> None:
+def serve(
+    settings: Settings,
+    *,
+    engine: Engine | None = None,
+    make_evaluator: MakeEvaluator | None = None,
+    diagnoser: Diagnoser | None = None,
+) -> None:
     """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
@@ -62,7 +69,7 @@ def serve(settings: Settings, *, engine: Engine | None = None, make_evaluator: M
     settings = replace(settings, port=listening.getsockname()[1])
     if not is_loopback(settings.host):
         LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
-    app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator)
+    app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator, diagnoser=diagnoser)
     config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE_SECONDS, server_header=False)
     LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
     try:

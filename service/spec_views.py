@@ -136,16 +136,22 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
     """A name for a run that was given none: what tells it from the other runs on its dataset."""
+    unusual = spec.method not in (None, USUAL[dataset.kind])
+    method = METHODS.get(spec.method or "", spec.method) if unusual else None
+    if spec.finish:
+        method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
+    parts = (dataset.name, model_name(dataset, spec), spec.mode, method)
+    return ", ".join(part for part in parts if part)[:LONGEST_NAME]
+
+
+def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+    """The model in words that tell it from others."""
     model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
     if spec.effects:
         model += f" with {', '.join(spec.effects)}"
-    unusual = spec.method not in (None, USUAL[dataset.kind])
-    method = METHODS.get(spec.method or "", spec.method) if unusual else None
-    if spec.finish:
-        method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
-    return ", ".join(part for part in (dataset.name, model, spec.mode, method) if part)[:LONGEST_NAME]
+    return model
 
 
 def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:

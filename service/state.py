@@ -12,14 +12,18 @@ from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
 from service import store
+from service.calibrating import Calibrating
 from service.changes import Changes
 from service.database import Database
 from service.datasets import Datasets
+from service.diagnoser import Diagnoser, ModelDiagnoser
+from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
 from service.pool import Pool
 from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
+from service.tables import DiagnosisRow, RunRow
 
 LOG = logging.getLogger("wingfit")
 STOP_SECONDS = 3.0
@@ -36,12 +40,16 @@ class Service:
         database: Database,
         engine: Engine | None = None,
         make_evaluator: MakeEvaluator | None = None,
+        diagnoser: Diagnoser | None = None,
     ) -> None:
         self.settings, self.database = settings, database
         self.engine: Engine = engine or ModelEngine()
+        self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
         self.changes = Changes()
         self.datasets = Datasets(database, self.engine)
-        self.runner = Runner(database, self.engine, self.datasets, self.changes, settings.max_runs)
+        self.calibrating = Calibrating(database, self.engine, self.datasets)
+        self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
+        self.runner = Runner(database, self.changes, (self.calibrating, self.diagnosing), settings.max_runs)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
 
     def start(self) -> None:
@@ -57,7 +65,7 @@ class Service:
         self.changes.close()
 
     def stop(self) -> bool:
-        """Stop within seconds, leaving runs as stored; whether all threads ended."""
+        """Stop within seconds, leaving jobs as stored; whether all threads ended."""
         self.begin_stop()
         ended = self.runner.stop(STOP_SECONDS)
         closed = self._pool.close()
@@ -67,7 +75,7 @@ class Service:
     def health(self) -> HealthOut:
         """Standing of the service."""
         with self.database.read() as session:
-            active = store.active_runs(session)
+            active, diagnoses = store.active(session, RunRow), store.active(session, DiagnosisRow)
         return HealthOut(
             status=self._pool.status,
             version=wingfit_version(),
@@ -75,6 +83,7 @@ class Service:
             evaluator=self.settings.evaluator,
             workers=self._pool.workers,
             runs_active=active,
+            diagnoses_active=diagnoses,
             detail=self._pool.error,
         )
 

@@ -16,7 +16,18 @@ from sqlalchemy.orm import Session
 
 from calibration.search import CalibrationSpec
 from service.problems import conflict, error_item, invalid, not_found
-from service.tables import AnswerRow, ArchiveRow, CheckpointRow, DatasetRow, GenerationRow, RunRow
+from service.tables import (
+    AnswerRow,
+    ArchiveRow,
+    CheckpointRow,
+    DatasetRow,
+    DiagnosisRow,
+    FindingRow,
+    GenerationRow,
+    JobRow,
+    RunRow,
+    StepRow,
+)
 from workers.jobs import Job, State, Wish
 
 ANSWERS_KEPT = timedelta(days=7)
@@ -24,7 +35,7 @@ ANSWERS_KEPT = timedelta(days=7)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
-Row = TypeVar("Row", DatasetRow, RunRow)
+Row = TypeVar("Row", DatasetRow, RunRow, DiagnosisRow)
 
 
 def now() -> str:
@@ -92,11 +103,12 @@ def archive(session: Session, dataset_id: str) -> bytes:
 
 
 def delete_dataset(session: Session, dataset_id: str) -> None:
-    """Delete a dataset that no run refers to."""
+    """Delete a dataset that no run or diagnosis refers to."""
     row = dataset(session, dataset_id)
-    runs = session.scalar(select(func.count()).where(RunRow.dataset_id == dataset_id)) or 0
-    if runs:
-        raise conflict(f"{runs} run(s) refer to dataset {dataset_id}; delete them first")
+    for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
+        count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
+        if count:
+            raise conflict(f"{count} {what} refer to dataset {dataset_id}; delete them first")
     session.delete(row)
 
 
@@ -113,21 +125,7 @@ def run(session: Session, run_id: str) -> RunRow:
 
 def delete_run(session: Session, run_id: str) -> None:
     """Delete a run that has ended, with its history."""
-    row = run(session, run_id)
-    if row.state in ACTIVE:
-        raise conflict(f"run {run_id} is {row.state}; cancel it first", state=row.state)
-    session.delete(row)
-
-
-def active_runs(session: Session) -> int:
-    """Number of runs that have not ended."""
-    return session.scalar(select(func.count()).select_from(RunRow).where(RunRow.state.in_(ACTIVE))) or 0
-
-
-def runs_in(session: Session, *states: State) -> Sequence[RunRow]:
-    """Runs in any of ``states``, oldest first."""
-    wanted = [state.value for state in states]
-    return session.scalars(select(RunRow).where(RunRow.state.in_(wanted)).order_by(RunRow.number)).all()
+    _delete_ended(session, run(session, run_id), "run")
 
 
 def history(session: Session, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
@@ -141,12 +139,58 @@ def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
     return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
 
 
-def job(row: RunRow) -> Job:
+# -- diagnoses ---------------------------------------------------------------------------------------------
+
+
+def diagnosis(session: Session, diagnosis_id: str) -> DiagnosisRow:
+    """The diagnosis's row, or a 404."""
+    row = session.scalar(select(DiagnosisRow).where(DiagnosisRow.id == diagnosis_id))
+    if row is None:
+        raise not_found("diagnosis", diagnosis_id)
+    return row
+
+
+def delete_diagnosis(session: Session, diagnosis_id: str) -> None:
+    """Delete a diagnosis that has ended, with its finding."""
+    _delete_ended(session, diagnosis(session, diagnosis_id), "diagnosis")
+
+
+def finding(session: Session, diagnosis_id: str) -> dict[str, Any] | None:
+    """What a diagnosis found, as JSON; None before it has succeeded."""
+    return session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
+
+
+def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | None = None) -> list[StepRow]:
+    """Steps of a diagnosis after sequence ``after``, ascending."""
+    query = select(StepRow).where(StepRow.diagnosis_id == diagnosis_id, StepRow.sequence > after)
+    return list(session.scalars(query.order_by(StepRow.sequence).limit(limit)))
+
+
+# -- jobs of any kind ------------------------------------------------------------------------------------
+
+
+def active(session: Session, table: type[JobRow]) -> int:
+    """Number of jobs that have not ended."""
+    return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE))) or 0
+
+
+def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:
+    """Jobs in ``state``, oldest first."""
+    return session.scalars(select(table).where(table.state == state.value).order_by(table.number)).all()
+
+
+def _delete_ended(session: Session, row: JobRow, what: str) -> None:
+    if row.state in ACTIVE:
+        raise conflict(f"{what} {row.id} is {row.state}; cancel it first", state=row.state)
+    session.delete(row)
+
+
+def job(row: JobRow) -> Job:
     """The row's job."""
     return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error)
 
 
-def put_job(row: RunRow, after: Job) -> None:
+def put_job(row: JobRow, after: Job) -> None:
     """Store a job in its row; the times follow from the states."""
     row.state, row.wish = after.state.value, after.wish.value
     row.generations, row.progress, row.error = after.generations, after.progress, after.error

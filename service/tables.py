@@ -50,11 +50,8 @@ class ArchiveRow(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
-class RunRow(Table):
-    """A calibration run; state, wish, generations, progress and error are the job of :mod:`workers.jobs`."""
-
-    __tablename__ = "run"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+class JobRow:
+    """What every job has; state, wish, generations, progress and error are the job of :mod:`workers.jobs`."""
 
     number: Mapped[int] = mapped_column(primary_key=True)
     id: Mapped[str] = mapped_column(unique=True)
@@ -73,11 +70,53 @@ class RunRow(Table):
     generations: Mapped[int] = mapped_column(default=0)
     evaluations: Mapped[int] = mapped_column(default=0)
     elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
+    error: Mapped[str | None]
+
+
+class RunRow(JobRow, Table):
+    """A calibration run."""
+
+    __tablename__ = "run"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
     best_mm: Mapped[float | None]
     best_mn: Mapped[float | None]
-    error: Mapped[str | None]
     genome: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+
+
+class DiagnosisRow(JobRow, Table):
+    """A diagnosis; its ``generations`` are steps. ``run_id`` is the run that it started from, while that exists."""
+
+    __tablename__ = "diagnosis"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    run_id: Mapped[str | None] = mapped_column(ForeignKey("run.id", ondelete="SET NULL"), index=True)
+    verdict: Mapped[str | None]
+    summary: Mapped[str | None]
+
+
+class FindingRow(Table):
+    """The Finding of a diagnosis that has succeeded; apart, because lists need no maps and overlays."""
+
+    __tablename__ = "finding"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
+class StepRow(Table):
+    """How far a diagnosis was at some time; ``sequence`` counts from 1, also over starts."""
+
+    __tablename__ = "step"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    sequence: Mapped[int] = mapped_column(primary_key=True)
+    stage: Mapped[str]
+    progress: Mapped[float]
+    evaluations: Mapped[int]
+    elapsed_seconds: Mapped[float]
+    eta_seconds: Mapped[float | None]
 
 
 class CheckpointRow(Table):

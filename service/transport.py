@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import quote
 
 import httpx
 
@@ -261,3 +262,10 @@ def _described(error: dict[str, Any]) -> str:
 def given(**values: Any) -> dict[str, Any]:
     """Keep the values that are not None."""
     return {key: value for key, value in values.items() if value is not None}
+
+
+def part(identifier: str) -> str:
+    """Quote an id as one segment of a path, whatever characters were typed."""
+    if not identifier:
+        raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
+    return quote(identifier, safe="").replace(".", "%2E")

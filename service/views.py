@@ -12,7 +12,7 @@ from calibration.result import Comparison, GeneResult, Result
 from records import Dataset, Recording
 from service import schemas, store
 from service.spec_views import spec_out
-from service.tables import DatasetRow, GenerationRow, RunRow
+from service.tables import DatasetRow, GenerationRow, RunRow, Table
 from service.units import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, finite, mm, mn, tidy_mm
 from workers.jobs import Wish
 
@@ -24,9 +24,9 @@ TRACK_DECIMALS = 6
 
 def dataset(row: DatasetRow) -> schemas.DatasetOut:
     """A dataset as lists show it."""
-    columns = _columns(row)
-    columns["recordings"] = [BEFORE_FORCES | record for record in columns["recordings"]]
-    return schemas.DatasetOut.model_validate(columns)
+    whole = columns(row)
+    whole["recordings"] = [BEFORE_FORCES | record for record in whole["recordings"]]
+    return schemas.DatasetOut.model_validate(whole)
 
 
 def recording(record: Recording, held_out: bool) -> schemas.RecordingOut:
@@ -58,19 +58,18 @@ def recordings(loaded: Dataset) -> list[dict[str, Any]]:
 
 def run(row: RunRow) -> schemas.RunOut:
     """A run."""
-    columns = _columns(row)
     wish = None if row.wish == Wish.NONE else row.wish
-    return schemas.RunOut.model_validate(columns | {"wish": wish, "spec": spec_out(store.spec(row))})
+    return schemas.RunOut.model_validate(columns(row) | {"wish": wish, "spec": spec_out(store.spec(row))})
 
 
 def history_item(row: GenerationRow) -> schemas.HistoryItem:
     """A generation of the history."""
-    return schemas.HistoryItem.model_validate(_columns(row))
+    return schemas.HistoryItem.model_validate(columns(row))
 
 
 def generation_event(row: GenerationRow) -> schemas.GenerationEvent:
     """A generation as an event."""
-    return schemas.GenerationEvent.model_validate(_columns(row))
+    return schemas.GenerationEvent.model_validate(columns(row))
 
 
 def gene(result: GeneResult) -> schemas.GeneOut:
@@ -154,5 +153,6 @@ def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]
     return nested
 
 
-def _columns(row: DatasetRow | RunRow | GenerationRow) -> dict[str, Any]:
+def columns(row: Table) -> dict[str, Any]:
+    """A row as a dict."""
     return {column.key: getattr(row, column.key) for column in row.__table__.columns}

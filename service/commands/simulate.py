@@ -170,35 +170,35 @@ def read_condition(words: list[str]) -> dict[str, float]:
     return values
 
 
-def read_genome(words: list[str]) -> dict[str, float]:
+def read_genome(words: list[str], option: str = "--genome") -> dict[str, float]:
     """Gene values from ``name=value`` words and JSON files, later ones overriding earlier ones."""
     values: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
-        values |= {name: value} if equals else _read_file(Path(word))
+        values |= {name: value} if equals else _read_file(Path(word), option)
     try:
         return {name: float(value) for name, value in values.items()}
     except (TypeError, ValueError):
         bad = next(f"{name}={value}" for name, value in values.items() if not _is_number(value))
-        raise typer.BadParameter(f"{bad}: the value must be a number in SI units", param_hint="--genome") from None
+        raise typer.BadParameter(f"{bad}: the value must be a number in SI units", param_hint=option) from None
 
 
-def _read_file(path: Path) -> dict[str, Any]:
+def _read_file(path: Path, option: str) -> dict[str, Any]:
     """Read {name: value}, or an answer of /genome as 'runs genome --json' prints it."""
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise typer.BadParameter(
-            f"{path}: {error.strerror}; give name=value or a JSON file", param_hint="--genome"
+            f"{path}: {error.strerror}; give name=value or a JSON file", param_hint=option
         ) from error
     except ValueError as error:
-        raise typer.BadParameter(f"{path} is not JSON: {error}", param_hint="--genome") from error
+        raise typer.BadParameter(f"{path} is not JSON: {error}", param_hint=option) from error
     if isinstance(content, dict) and isinstance(content.get("genes"), list):
         return {gene["name"]: gene["best"] for gene in content["genes"]}
     if isinstance(content, dict) and isinstance(content.get("genome"), dict):
         return dict(content["genome"])  # the truth that the virtual rig writes beside its dataset
     if not isinstance(content, dict):
-        raise typer.BadParameter(f"{path} must hold {{name: value}}", param_hint="--genome")
+        raise typer.BadParameter(f"{path} must hold {{name: value}}", param_hint=option)
     return content
 
 

@@ -5,19 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, Query
+from fastapi import APIRouter, Query
 from pydantic import Field
+from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service import force_views, http, load_views, spec_views, store, views
-from service.events import stream
+from service.checks import gene_names
+from service.events import LastEventId, Told, Watched, answer
 from service.force_schemas import ForceResultOut, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.remedies import with_remedy
-from service.routes.runs import gene_names, load
+from service.routes.runs import load
 from service.schemas import (
     ComparisonOut,
     GenomeOut,
@@ -137,22 +139,15 @@ def loads(
     },
     summary="Watch a run",
 )
-def events(
-    service: ServiceDep,
-    run_id: str,
-    last_event_id: Annotated[
-        str | None, Header(alias="Last-Event-ID", description="id of the last event that the caller has")
-    ] = None,
-) -> StreamingResponse:
+def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
     """Send generations and states as they happen; ends after the final state."""
     run_row(service, run_id)
-    text = (last_event_id or "0").strip()
-    if not (text.isascii() and text.isdecimal() and len(text) <= 15):
-        item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
-        raise invalid("the Last-Event-ID is not one of this stream", [item])
-    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    body = stream(service.database, service.changes, run_id, int(text))
-    return StreamingResponse(body, headers=headers, media_type="text/event-stream")
+
+    def look(session: Session, after: int, limit: int) -> Told:
+        generations = store.history(session, run_id, after, limit)
+        return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
+
+    return answer(service.database, service.changes, Watched(run_id, "generation", look), last_event_id)
 
 
 @router.post(
@@ -218,7 +213,7 @@ def _forces(
 
 def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
     """Full genome of a simulation; a 422 where it cannot be."""
-    known = gene_names(service, spec, dataset)
+    known = gene_names(service.engine, spec, dataset)
     faults = spec_views.unknown_genes((("body.genome", name) for name in body.genome), known)
     if faults:
         raise invalid("the genome names genes that the model does not have", faults)

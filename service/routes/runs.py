@@ -9,8 +9,9 @@ from sqlalchemy.orm import Session
 from starlette.responses import Response
 
 from calibration.search import CalibrationSpec
-from records import Dataset, EstimateError
+from records import Dataset
 from service import http, spec_views, store, views
+from service.checks import gene_names, unknown_recordings
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import Page, RunOut
 from service.spec_schemas import RunIn
@@ -55,7 +56,7 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
 
     answer, new = http.created(service.database, again, create)
     if new:
-        service.runner.enqueue(answer.body["id"])
+        service.runner.enqueue(service.calibrating, answer.body["id"])
     return http.sent(answer)
 
 
@@ -92,19 +93,25 @@ def delete(service: ServiceDep, run_id: str) -> None:
 @router.post("/{run_id}/cancel", status_code=202, responses=http.errors(404, 409), summary="Cancel a run")
 def cancel(service: ServiceDep, run_id: str) -> RunOut:
     """Cancel a run; one under way ends with its present generation."""
-    return views.run(service.runner.control(run_id, jobs.Cancel()))
+    return _steered(service, run_id, jobs.Cancel())
 
 
 @router.post("/{run_id}/pause", status_code=202, responses=http.errors(404, 409), summary="Pause a run")
 def pause(service: ServiceDep, run_id: str) -> RunOut:
     """Pause a run; one under way pauses after its present generation."""
-    return views.run(service.runner.control(run_id, jobs.Pause()))
+    return _steered(service, run_id, jobs.Pause())
 
 
 @router.post("/{run_id}/resume", status_code=202, responses=http.errors(404, 409), summary="Resume a run")
 def resume(service: ServiceDep, run_id: str) -> RunOut:
     """Go on after the last finished generation."""
-    return views.run(service.runner.control(run_id, jobs.Resume()))
+    return _steered(service, run_id, jobs.Resume())
+
+
+def _steered(service: Service, run_id: str, event: jobs.Event) -> RunOut:
+    row = service.runner.control(service.calibrating, run_id, event)
+    assert isinstance(row, RunRow)  # noqa: S101  # for the type checker: the rows of calibrations
+    return views.run(row)
 
 
 def load(service: Service, dataset_id: str) -> Dataset:
@@ -118,36 +125,15 @@ def load(service: Service, dataset_id: str) -> Dataset:
         raise invalid(problem.detail, [error_item("body.dataset_id", dataset_id, message)]) from None
 
 
-def gene_names(service: Service, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-    """Genes of the model that a body asks for, or a 422."""
-    try:
-        return service.engine.gene_names(spec, dataset)
-    except EstimateError as error:
-        place = f"dataset.{'wing' if dataset.kind == 'tracks' else 'vehicle'}.estimates"
-        raise invalid("the dataset's estimates do not fit", [error_item(place, None, str(error))]) from None
-    except ValueError as error:
-        tracks = dataset.kind == "tracks"
-        where, value = ("body.division", spec.division) if tracks else ("body.without", ", ".join(spec.without))
-        raise invalid("there is no such model", [error_item(where, value, str(error))]) from None
-
-
 def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
     """The specification with everything decided, or a 422."""
-    known_genes = gene_names(service, spec, dataset)
+    known_genes = gene_names(service.engine, spec, dataset)
     known_recordings = tuple(recording.name for recording in dataset.recordings)
     genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
-    faults = [*_unknown(spec.recordings, known_recordings), *spec_views.unknown_genes(genes, known_genes)]
+    faults = [*unknown_recordings(spec.recordings, known_recordings), *spec_views.unknown_genes(genes, known_genes)]
     if faults:
         raise invalid("the request names what does not exist", faults)
     try:
         return service.engine.check(spec, dataset)
     except ValueError as error:
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
-
-
-def _unknown(names: tuple[str, ...], known: tuple[str, ...]) -> list[dict[str, object]]:
-    return [
-        error_item(f"body.recordings.{place}", name, f"unknown; known are {', '.join(known)}")
-        for place, name in enumerate(names)
-        if name not in known
-    ]

@@ -1,4 +1,4 @@
-"""Health, the schema of datasets, and a page that shows the API."""
+"""Health, the schemas of datasets and findings, and a page that shows the API."""
 
 from __future__ import annotations
 
@@ -25,6 +25,14 @@ def health(service: ServiceDep) -> HealthOut:
 def dataset_schema() -> dict[str, Any]:
     """Return the JSON Schema of ``dataset.yaml``."""
     from records.schema import dataset_schema as schema
+
+    return schema()
+
+
+@router.get("/v1/schemas/finding", responses=http.errors(), summary="Schema of a finding")
+def finding_schema() -> dict[str, Any]:
+    """Return the JSON Schema of what a diagnosis finds."""
+    from report.schema import finding_schema as schema
 
     return schema()
 

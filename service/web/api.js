@@ -15,7 +15,7 @@ export class ApiError extends Error {
   }
 }
 
-export const isFinal = (run) => FINAL.has(run.state);
+export const isFinal = (job) => FINAL.has(job.state);
 
 export async function call(method, path, { body, headers = {} } = {}) {
   let response;
@@ -50,18 +50,18 @@ export async function history(id) {
   }
 }
 
-// Follow the events of a run. The browser reconnects by itself and says where it was; where it gives up we start again.
-export function follow(id, { onGeneration, onState, onAway }) {
+// Follow the events of the job at `path`, whose steps are called `step`. The browser reconnects by itself and says where it was; where it gives up we start again.
+export function follow(path, step, { onStep, onState, onAway }) {
   let source = null;
   let timer = null;
   let closed = false;
   const open = () => {
-    source = new EventSource(`v1/runs/${part(id)}/events`);
-    source.addEventListener("generation", (event) => onGeneration(JSON.parse(event.data)));
+    source = new EventSource(`v1/${path}/events`);
+    source.addEventListener(step, (event) => onStep(JSON.parse(event.data)));
     source.addEventListener("state", (event) => {
-      const run = JSON.parse(event.data);
-      if (isFinal(run)) close();
-      onState(run);
+      const job = JSON.parse(event.data);
+      if (isFinal(job)) close();
+      onState(job);
     });
     source.onopen = () => onAway(false);
     source.onerror = () => {

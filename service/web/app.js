@@ -1,24 +1,30 @@
-// The page: lists, the selected run (#run=ID), the state of the server.
+// The page: lists, the selected run (#run=ID) or diagnosis (#diagnosis=ID), the state of the server.
 
 import { get } from "./api.js";
+import { diagnose, selectDiagnosis, setUpDiagnosis } from "./diagnosis.js";
 import { $, plural, toast } from "./format.js";
-import { drawDatasets, drawRuns } from "./lists.js";
+import { drawDatasets, drawDiagnoses, drawRuns } from "./lists.js";
 import { redraw, selectRun, setUpRun } from "./run.js";
 import { openSubmit, remove, setUpSubmit } from "./submit.js";
 
 const POLL_MS = 2500;
-const RUNS_SHOWN = 50;
+const SHOWN = 50;
 
 let runs = [];
+let diagnoses = [];
 let datasets = [];
 let polling = null;
 
-const currentId = () => new URLSearchParams(location.hash.slice(1)).get("run");
+const current = (kind) => new URLSearchParams(location.hash.slice(1)).get(kind);
+const currentId = () => current("run");
+const currentDiagnosis = () => current("diagnosis");
 
 function drawLists() {
   drawRuns(runs, currentId());
+  drawDiagnoses(diagnoses, currentDiagnosis());
   drawDatasets(datasets, {
     onRun: (dataset) => openSubmit(datasets, dataset.id),
+    onDiagnose: (dataset) => startDiagnosis({ dataset_id: dataset.id }),
     onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll(),
   });
 }
@@ -30,7 +36,8 @@ function setAway(away) {
 
 function showHealth(health) {
   const state = { starting: "evaluator starting", degraded: `degraded: ${health.detail ?? "evaluator not available"}` }[health.status];
-  const active = health.runs_active ? `${plural(health.runs_active, "run")} active` : "idle";
+  const count = health.runs_active + health.diagnoses_active;
+  const active = count ? `${plural(count, "job")} active` : "idle";
   $("health").textContent = [state ?? active, health.workers ? plural(health.workers, "worker") : null, `version ${health.version}`]
     .filter(Boolean).join(" · ");
 }
@@ -38,9 +45,9 @@ function showHealth(health) {
 async function poll() {
   clearTimeout(polling);
   try {
-    const [health, runPage, datasetPage] = await Promise.all(
-      [get("health"), get(`runs?limit=${RUNS_SHOWN}`), get(`datasets?limit=${RUNS_SHOWN}`)]);
-    [runs, datasets] = [runPage.items, datasetPage.items];
+    const [health, ...pages] = await Promise.all(
+      [get("health"), ...["runs", "diagnoses", "datasets"].map((kind) => get(`${kind}?limit=${SHOWN}`))]);
+    [runs, diagnoses, datasets] = pages.map((page) => page.items);
     setAway(false);
     showHealth(health);
     drawLists();
@@ -54,12 +61,24 @@ async function poll() {
 
 async function route() {
   drawLists();
-  if (!currentId()) document.title = "wingfit";
-  await selectRun(currentId());
+  if (!currentId() && !currentDiagnosis()) document.title = "wingfit";
+  await Promise.all([selectRun(currentId()), selectDiagnosis(currentDiagnosis())]);
 }
 
-function go(id) {
-  location.hash = id ? `run=${encodeURIComponent(id)}` : "";
+function go(id, kind = "run") {
+  location.hash = id ? `${kind}=${encodeURIComponent(id)}` : "";
+}
+
+async function startDiagnosis(body) {
+  const diagnosis = await diagnose(body);
+  if (!diagnosis) return;
+  go(diagnosis.id, "diagnosis");
+  poll();
+}
+
+function onDeleted() {
+  go(null);
+  poll();
 }
 
 setUpRun({
@@ -69,10 +88,17 @@ setUpRun({
     runs = runs.map((other) => (other.id === run.id ? run : other));
     drawLists();
   },
-  onDeleted() {
-    go(null);
-    poll();
+  onDiagnose: (run) => startDiagnosis({ run_id: run.id }),
+  onDeleted,
+});
+setUpDiagnosis({
+  currentId: currentDiagnosis,
+  onAway: setAway,
+  onChange(diagnosis) {
+    diagnoses = diagnoses.map((other) => (other.id === diagnosis.id ? diagnosis : other));
+    drawLists();
   },
+  onDeleted,
 });
 setUpSubmit({
   onSubmitted(run) {

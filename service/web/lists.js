@@ -1,4 +1,4 @@
-// The lists of runs and datasets at the side.
+// The lists of runs, diagnoses and datasets at the side.
 
 import { isFinal } from "./api.js";
 import { $, DASH, duration, el, plural, size, when } from "./format.js";
@@ -57,7 +57,21 @@ export function drawRuns(runs, currentId) {
   replace($("runs"), items.length ? items : [el("li", { className: "none" }, "No runs yet.")]);
 }
 
-export function drawDatasets(datasets, { onRun, onDelete }) {
+export function drawDiagnoses(diagnoses, currentId) {
+  const items = diagnoses.map((diagnosis) => {
+    const bar = el("div", { className: "bar" }, el("span"));
+    setBar(bar, diagnosis);
+    const card = el("a", { className: "card", href: `#diagnosis=${encodeURIComponent(diagnosis.id)}` },
+      el("span", { className: "line" }, el("strong", {}, diagnosis.name), badge(diagnosis)), bar,
+      el("span", { className: "line" }, el("span", {}, timeLeft(diagnosis) || when(diagnosis.created_at)),
+        el("span", {}, diagnosis.verdict ?? "")));
+    if (diagnosis.id === currentId) card.setAttribute("aria-current", "true");
+    return el("li", { className: diagnosis.id === currentId ? "current" : "" }, keyed(card, diagnosis.id));
+  });
+  replace($("diagnoses"), items.length ? items : [el("li", { className: "none" }, "No diagnoses yet.")]);
+}
+
+export function drawDatasets(datasets, { onRun, onDiagnose, onDelete }) {
   const items = datasets.map((dataset) => {
     const held = dataset.recordings.filter((recording) => recording.held_out).length;
     const about = `${plural(dataset.recordings.length, "recording")} of ${isForces(dataset) ? "forces" : "markers"}${held ? `, ${held} held out` : ""}`;
@@ -65,7 +79,7 @@ export function drawDatasets(datasets, { onRun, onDelete }) {
     return el("li", {}, el("div", { className: "card" },
       el("strong", { title: dataset.description }, dataset.name),
       el("span", { className: "line" }, el("span", {}, about), el("span", {}, size(dataset.size_bytes))),
-      el("div", { className: "buttons" }, button("New run", onRun, "run"),
+      el("div", { className: "buttons" }, button("New run", onRun, "run"), button("Diagnose", onDiagnose, "diagnose"),
         keyed(el("a", { className: "link-button", href: `v1/datasets/${encodeURIComponent(dataset.id)}/archive`, download: "" }, "Download"), `get-${dataset.id}`),
         button("Delete", onDelete, "delete"))));
   });

@@ -34,6 +34,7 @@ export function setUpRun(given) {
     const action = event.target.dataset?.action;
     if (action) act(action);
   });
+  $("diagnose-run").addEventListener("click", () => hooks.onDiagnose(run));
   $("copy-curl").addEventListener("click", () => {
     const name = run.name ? { name: run.name } : {};
     copy(curl("runs", { dataset_id: run.dataset_id, ...request(run), ...name }));
@@ -93,8 +94,8 @@ function suit() {
 function listen() {
   stopFollowing();
   const id = run.id;
-  stopFollowing = follow(id, {
-    onGeneration(item) {
+  stopFollowing = follow(`runs/${part(id)}`, "generation", {
+    onStep(item) {
       items.set(item.sequence, item);
       if (item.sequence > run.generations) {
         run = {
@@ -156,6 +157,7 @@ function drawHead() {
   const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && (isForces(run) ? run.stage : `${run.stage} stage`) : null,
     plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
   $("run-progress").textContent = parts.filter(Boolean).join(" · ");
+  $("diagnose-run").hidden = run.generations === 0;
   for (const button of $("actions").querySelectorAll("[data-action]")) {
     button.hidden = !ALLOWED[button.dataset.action].includes(run.state);
     button.disabled = Boolean(run.wish);

@@ -58,7 +58,7 @@ export function openSubmit(known, datasetId) {
 }
 
 // crypto.randomUUID exists only in secure contexts, and a page on a private network is none.
-const randomKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
+export const randomKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 function values(form) {
   const body = { dataset_id: form.dataset_id.value, method: form.method.value, mode: form.mode.value };

@@ -53,7 +53,7 @@ export function setup(run) {
 }
 
 // Runs stored before there were effects name none.
-const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
+export const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
 
 function forceSetup(spec) {
   const cut = spec.low_pass_hz;

@@ -16,7 +16,7 @@ from fastapi import FastAPI
 
 from service.app import create_app
 from service.settings import Settings
-from tests.service import toy
+from tests.service import toy, toy_diagnosis
 
 FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
 
@@ -66,11 +66,30 @@ class Api:
         return dict(answer.json())
 
     def until(self, run_id: str, condition: Callable[[Json], bool], seconds: float = 20.0) -> Json:
+        return self._until(lambda: self.run(run_id), condition, seconds)
+
+    @staticmethod
+    def _until(fetch: Callable[[], Json], condition: Callable[[Json], bool], seconds: float) -> Json:
         deadline = time.monotonic() + seconds
-        while not condition(run := self.run(run_id)):
-            assert time.monotonic() < deadline, f"the run stays as {run}"
+        while not condition(job := fetch()):
+            assert time.monotonic() < deadline, f"the job stays as {job}"
             time.sleep(0.01)
-        return run
+        return job
+
+    def diagnose(self, dataset_id: str | None, **body: Any) -> Json:
+        named = {"dataset_id": dataset_id} if dataset_id else {}
+        answer = self.client.post("/v1/diagnoses", json=named | body)
+        assert answer.status_code == 202, answer.text
+        return dict(answer.json())
+
+    def diagnosis(self, diagnosis_id: str) -> Json:
+        return self.get(f"/v1/diagnoses/{diagnosis_id}")
+
+    def until_diagnosis(self, diagnosis_id: str, condition: Callable[[Json], bool], seconds: float = 20.0) -> Json:
+        return self._until(lambda: self.diagnosis(diagnosis_id), condition, seconds)
+
+    def diagnosed(self, diagnosis_id: str, seconds: float = 20.0) -> Json:
+        return self.until_diagnosis(diagnosis_id, lambda diagnosis: diagnosis["state"] in FINAL, seconds)
 
     def finish(self, run_id: str, seconds: float = 20.0) -> Json:
         return self.until(run_id, lambda run: run["state"] in FINAL, seconds)
@@ -119,8 +138,15 @@ def engine(request: pytest.FixtureRequest) -> toy.ToyEngine:
 
 
 @pytest.fixture
-def client(settings: Settings, engine: toy.ToyEngine) -> Iterator[httpx.Client]:
-    with serving(create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator)) as client:
+def diagnoser(request: pytest.FixtureRequest) -> toy_diagnosis.ToyDiagnoser:
+    held = "gate" in request.fixturenames
+    return toy_diagnosis.ToyDiagnoser(gate=request.getfixturevalue("gate") if held else None)
+
+
+@pytest.fixture
+def client(settings: Settings, engine: toy.ToyEngine, diagnoser: toy_diagnosis.ToyDiagnoser) -> Iterator[httpx.Client]:
+    app = create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator, diagnoser=diagnoser)
+    with serving(app) as client:
         yield client
 
 

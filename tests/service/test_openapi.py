@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from calibration.spec import CalibrationSpec, resolved
 from records import Dataset
-from service import force_schemas, schemas, spec_schemas
+from service import diagnosis_schemas, force_schemas, schemas, spec_schemas
 from sim.balance import delfly
 from sim.rig import robird_wing
 
@@ -80,6 +80,8 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
         schemas.LoadsIn,
         schemas.ProblemOut,
         force_schemas.PredictionIn,
+        diagnosis_schemas.DiagnosisIn,
+        diagnosis_schemas.DiagnosisOut,
     ],
 )
 def test_examples_are_valid(model: type[BaseModel]) -> None:

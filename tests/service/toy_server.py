@@ -7,9 +7,12 @@ import sys
 from service.server import ServeError, serve
 from service.settings import Settings, SettingsError
 from tests.service.toy import NoEvaluator, ToyEngine
+from tests.service.toy_diagnosis import ToyDiagnoser
 
 if __name__ == "__main__":
     try:
-        serve(Settings.from_env(), engine=ToyEngine(float(sys.argv[1])), make_evaluator=NoEvaluator)
+        seconds = float(sys.argv[1])
+        engine, diagnoser = ToyEngine(seconds), ToyDiagnoser(seconds)
+        serve(Settings.from_env(), engine=engine, make_evaluator=NoEvaluator, diagnoser=diagnoser)
     except (ServeError, SettingsError) as error:
         sys.exit(f"wingfit: {error}")

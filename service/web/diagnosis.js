@@ -1,0 +1,106 @@
+// The selected diagnosis: progress, verdict, the report in a frame that may do nothing.
+
+import { call, follow, get, isFinal, part, postJson } from "./api.js";
+import { $, plural, toast, when } from "./format.js";
+import { badge, setBar, timeLeft } from "./lists.js";
+import { randomKey, remove } from "./submit.js";
+import { modelOf, withEffects } from "./words.js";
+
+let diagnosis = null;
+let stopFollowing = () => {};
+let hooks = {};
+
+export function setUpDiagnosis(given) {
+  hooks = given;
+  $("diagnosis-actions").addEventListener("click", (event) => {
+    const action = event.target.dataset?.action;
+    if (action) act(action);
+  });
+}
+
+// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, and said, where it is refused.
+export async function diagnose(body) {
+  try {
+    return await postJson("diagnoses", body, { "Idempotency-Key": randomKey() });
+  } catch (error) {
+    toast([error.message, ...error.errors.map((item) => item.message)].join(". "));
+    return null;
+  }
+}
+
+export async function selectDiagnosis(id) {
+  stopFollowing();
+  stopFollowing = () => {};
+  diagnosis = null;
+  $("diagnosis").hidden = true;
+  $("report").removeAttribute("src");
+  if (!id) return;
+  $("empty").hidden = true;
+  try {
+    const found = await get(`diagnoses/${part(id)}`);
+    if (hooks.currentId() !== id) return;
+    diagnosis = found;
+  } catch (error) {
+    if (hooks.currentId() !== id) return;
+    $("empty").hidden = false;
+    toast(error.message);
+    if (error.away) setTimeout(() => hooks.currentId() === id && !diagnosis && selectDiagnosis(id), 3000);
+    return;
+  }
+  $("diagnosis").hidden = false;
+  update();
+  if (!isFinal(diagnosis)) listen();
+}
+
+function listen() {
+  stopFollowing = follow(`diagnoses/${part(diagnosis.id)}`, "step", {
+    onStep(step) {
+      if (step.sequence <= diagnosis.steps) return;
+      const { stage, progress, evaluations, eta_seconds } = step;
+      diagnosis = { ...diagnosis, stage, progress, evaluations, eta_seconds, steps: step.sequence };
+      update();
+    },
+    onState(state) {
+      diagnosis = state;
+      hooks.onChange(diagnosis);
+      update();
+    },
+    onAway: hooks.onAway,
+  });
+}
+
+function update() {
+  const path = `v1/diagnoses/${part(diagnosis.id)}`;
+  const done = diagnosis.state === "SUCCEEDED";
+  document.title = `${diagnosis.name} · wingfit`;
+  $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
+  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec),
+    diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
+  $("diagnosis-error").hidden = !diagnosis.error;
+  $("diagnosis-error").textContent = diagnosis.error ?? "";
+  setBar($("diagnosis-bar"), diagnosis);
+  $("diagnosis-bar").hidden = done;
+  $("diagnosis-progress").textContent = [done ? null : `${Math.round(100 * diagnosis.progress)} %`, timeLeft(diagnosis),
+    diagnosis.state === "RUNNING" ? diagnosis.stage : null,
+    plural(diagnosis.evaluations, "evaluation")].filter(Boolean).join(" · ");
+  $("verdict-part").hidden = !done;
+  $("verdict").textContent = diagnosis.verdict ?? "";
+  $("diagnosis-summary").textContent = diagnosis.summary ?? "";
+  for (const id of ["report-link", "finding-link", "report"]) $(id).hidden = !done;
+  $("report-link").href = `${path}/report`;
+  $("finding-link").href = `${path}/finding`;
+  $("finding-link").download = `${diagnosis.id}.json`;
+  if (done && !$("report").hasAttribute("src")) $("report").src = `${path}/report`;
+  for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
+    button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");
+    button.disabled = Boolean(diagnosis.wish);
+  }
+}
+
+async function act(action) {
+  if (action === "delete") {
+    if (await remove("diagnoses", diagnosis.id, diagnosis.name)) hooks.onDeleted();
+    return;
+  }
+  await call("POST", `diagnoses/${part(diagnosis.id)}/${action}`).catch((error) => toast(error.message));
+}

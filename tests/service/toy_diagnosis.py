@@ -1,0 +1,111 @@
+"""A small deterministic diagnosis in place of the real one, so that the service's own part is tested in milliseconds.
+
+It evaluates nothing; its finding is drawn from the seed and says where it started. ``gate`` holds it before each step.
+"""
+
+# ruff: noqa: ARG002  it takes what the real one takes and needs little of it
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from calibration.evaluator import Evaluator
+from diagnosis.finding import Exponent, Finding, Floors, GeneValue, Hypothesis, Interval, Proof, RecordingMisfit, Where
+from diagnosis.spec import DiagnosisSpec, Progress
+from records import Dataset
+from tests.service.toy import UNLUCKY
+
+KNOWN = ("hinge_offset", "camera_shift", "added_mass")
+STAGES = (
+    "fitting the nominal model",
+    "testing every effect",
+    "refitting the strongest",
+    "predicting what was held out",
+)
+STEPS = 3  # of each stage
+
+
+class ToyDiagnoser:
+    """Meets the service's Diagnoser."""
+
+    def __init__(self, seconds: float = 0.0, gate: Callable[[int], None] | None = None) -> None:
+        self.seconds, self.gate = seconds, gate
+        self.starts = 0
+
+    def check(self, spec: DiagnosisSpec, dataset: Dataset) -> None:
+        for name in spec.suspects:
+            if name not in KNOWN:
+                raise ValueError(f"unknown suspect {name!r}; there are {', '.join(KNOWN)}")
+
+    def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
+        self.starts += 1
+        total = STEPS * len(STAGES)
+        for done in range(total):
+            if self.gate:
+                self.gate(done)
+            time.sleep(self.seconds)
+            if spec.calibration.seed == UNLUCKY and done == 2:
+                raise ArithmeticError("the thirteenth seed breaks")
+            yield Progress((done + 1) / (total + 1), f"{STAGES[done // STEPS]}, part {done % STEPS + 1}", 10 * done)
+        if self.gate:
+            self.gate(total)
+        yield Progress(1.0, "done", 10 * total, finding(spec, dataset))
+
+    def stored(self, finding: Finding) -> dict[str, Any]:
+        return dict(json.loads(json.dumps(asdict(finding))))
+
+    def html(self, stored: dict[str, Any]) -> str:
+        return (
+            f"<!doctype html><title>{stored['dataset']}</title><style>p {{ color: teal }}</style><p>{stored['summary']}"
+        )
+
+
+def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:
+    """Made up, and complete enough to be printed."""
+    random = np.random.default_rng(spec.calibration.seed)
+    share = float(random.uniform(0.8, 0.95))
+    hypotheses = (
+        _hypothesis("hinge_offset", "Hinge off its place", 0.9, 41.0, share),
+        _hypothesis("camera_shift", "Camera shifted", 0.07, 12.0, 0.2),
+        Hypothesis((), "Nominal model", "", "", "", 0.03, 0.0, 0.0, 0, 0.0, None, 2e-3, True),
+    )
+    before, after = Interval(2e-3, 1.8e-3, 2.2e-3), Interval(0.5e-3, 0.45e-3, 0.55e-3)
+    return Finding(
+        dataset=dataset.name,
+        kind="tracks",
+        unit="m",
+        model=f"flexible wing, division {spec.calibration.division}",
+        verdict="named",
+        summary=f"The hinge is off its place. Started from {len(spec.start)} genes, considered {list(spec.suspects)}.",
+        probabilities={"adequate": 0.03, "named": 0.9, "ambiguous": 0.04, "unnamed": 0.02, "measurement fault": 0.01},
+        named=("hinge_offset",),
+        strength=3.1,
+        floors=Floors(0.5e-3, 0.3, None, "", 1e-5, 0.5e-3),
+        hypotheses=hypotheses,
+        alike=(("hinge_offset", "camera_shift"),),
+        where=Where(
+            "outer 30 % of the span, along z", Interval(0.85, 0.7, 1.0), None, None, "z", (0.1, 0.9),
+            (Exponent("flap frequency", Interval(2.0, 1.8, 2.2), 2.0, 4.0, "Hz"),),
+        ),
+        markers=(),
+        phase_map=None,
+        missing=(),
+        recordings=(RecordingMisfit("slow", False, 3.0, 45.0, 100.0, 0.0, before, after, 0.5e-3),),
+        proof=Proof(before, after, 0.5e-3, True, "held-out misfit falls to the floor"),
+        overlays=(),
+        genes=(GeneValue("hinge_offset.z", "m", "height of the hinge", Interval(4e-3, 3.8e-3, 4.2e-3), 0.0),),
+        law=None,
+        advice=(),
+    )  # fmt: skip
+
+
+def _hypothesis(name: str, title: str, probability: float, evidence: float, explained: float) -> Hypothesis:
+    return Hypothesis(
+        (name,), title, "actuation", "made up", "all markers move", probability, evidence, 2.0 * evidence, 1,
+        explained, 0.9 * explained, 0.5e-3, True,
+    )  # fmt: skip
