@@ -24,6 +24,8 @@ COPY --chown=wingfit:wingfit records records
 COPY --chown=wingfit:wingfit tracking tracking
 COPY --chown=wingfit:wingfit sim sim
 COPY --chown=wingfit:wingfit calibration calibration
+COPY --chown=wingfit:wingfit diagnosis diagnosis
+COPY --chown=wingfit:wingfit report report
 COPY --chown=wingfit:wingfit workers workers
 COPY --chown=wingfit:wingfit service service
 RUN pip install --no-deps --no-build-isolation --editable .

@@ -64,7 +64,9 @@ def assess(
     evaluator = Counted(evaluator, state)
     stack = state.stack
     yield 0.0, "fitting the nominal model"
-    fit = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
+    steps = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
+    for k, fit in enumerate(steps):  # noqa: B007  # the last one counts
+        yield 0.15 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.15, "comparing with a finer division"
     nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
     state.nominal, state.subject = nominal, nominal.subject

@@ -7,6 +7,7 @@ it; only the columns of what was added are measured. Every step then improves it
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,12 +81,10 @@ def fitted(
     *,
     known: Flags | None = None,
     steps: int = 8,
-    thorough: bool = False,
 ) -> Fit:
     """Fit the free genes from ``start`` [F]; ValueError where that cannot be simulated.
 
-    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first. A ``thorough`` fit
-    measures the Jacobian anew at every step, and where it ends.
+    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first.
     """
     look = _Look(subject, stack, problem, evaluator)
     first = _at(look, start)
@@ -94,20 +93,42 @@ def fitted(
     every = np.ones(len(start), bool)
     now = replace(_measured(look, replace(first, jacobian=own), ~columns), fresh=not columns.any())
     for _ in range(steps):
-        better, gain = _step(look, now, MANY if thorough else FEW)
+        better, gain = _step(look, now, FEW)
         if better is None:
             if now.fresh:
                 return replace(now, converged=True)
             now = _measured(look, now, every)
             continue
-        settled = now.cost - better.cost <= max(SMALLEST, SETTLED * now.cost)
-        now = better
-        if settled and gain > GOOD / 2:
-            now = replace(now, converged=True)
-            break
-        if thorough or gain < GOOD:
+        ends, now = _settles(now, better, gain), better
+        if ends:
+            return replace(now, converged=True)
+        if gain < GOOD:
             now = _measured(look, now, every)
-    return _measured(look, now, every) if thorough and not now.fresh else now
+    return now
+
+
+def thoroughly(
+    subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, steps: int
+) -> Iterator[Fit]:
+    """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last."""
+    look, every = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool)
+    now = _measured(look, _at(look, start), every)
+    for _ in range(steps):
+        yield now
+        better, gain = _step(look, now, MANY)
+        if better is None:
+            yield replace(now, converged=True)
+            return
+        ends, now = _settles(now, better, gain), _measured(look, better, every)
+        if ends:
+            yield replace(now, converged=True)
+            return
+    yield now
+
+
+def _settles(before: Fit, after: Fit, gain: float) -> bool:
+    """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
+    return before.cost - after.cost <= max(SMALLEST, SETTLED * before.cost) and gain > GOOD / 2
 
 
 def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
@@ -146,8 +167,8 @@ def _at(look: _Look, unit: Array) -> Fit:
     if reasons[0] is not None:
         raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
     cost = float(_cost(look.stack, found[0], unit))
-    empty = np.zeros((found.shape[1], 0))
-    return Fit(look.problem, unit, found[0], empty, tuple(r[0] for r in residuals), cost, evaluations=1)
+    none = np.zeros((found.shape[1], len(unit)))
+    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, evaluations=1)
 
 
 def _measured(look: _Look, fit: Fit, which: Flags) -> Fit:

@@ -4,14 +4,14 @@ The missing load of every recording is a sum of few terms, each a coefficient, t
 product of the local motion, the air and the wing (:mod:`diagnosis.features`). Terms are taken one by one (forward
 selection), each time the one with which recordings left out one by one are predicted best; the law is fitted to the
 tracks themselves, through their responses to loads, and not to an inferred load, which a prior has smoothed. What is
-reported as explained is predicted by laws that were selected without the recording in question.
+reported as explained is predicted by laws that were selected without the recording in question; the nominal genes, as
+refitted to all recordings, are projected out first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from diagnosis.missing import GENES, Case
 from sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
 
 MOST = 3  # terms
 GAIN = 0.02  # of the excess misfit, that a term must take away of recordings left out
@@ -33,10 +34,10 @@ _NINETY = 1.6449  # standard errors to either side
 
 @dataclass(frozen=True)
 class _Sums:
-    """Normal equations of R recordings in M coefficients of unit size and F genes.
+    """Normal equations of R recordings in M coefficients, the nominal genes refitted to all of them projected out.
 
-    ``curvature`` [R, M + F, M + F], ``slope`` [R, M + F], ``power`` [R]: sum of squares of what is lacking, ``count``
-    [R] of samples. ``size`` [M] by which coefficients were multiplied to be comparable.
+    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R]: sum of squares of what is lacking, ``count`` [R] of
+    samples. ``size`` [M] by which coefficients were multiplied to be comparable.
     """
 
     curvature: Array
@@ -50,41 +51,30 @@ class _Sums:
         kept = np.arange(len(self.power)) != left
         return _Sums(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
-    @property
-    def genes(self) -> npt.NDArray[np.int64]:
-        """Places of the genes."""
-        return np.arange(len(self.size), self.slope.shape[1])
+    def fit(self, terms: Index, which: npt.NDArray[np.bool_]) -> Array:
+        """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
+        matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
+        ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
+        slope = self.slope[which].sum(axis=0)[terms]
+        return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
-    def fit(self, terms: npt.NDArray[np.int64], which: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Coefficients and genes [B, Q] for ``terms`` [B, N] from the recordings ``which`` [R], and their columns."""
-        columns = np.concatenate([terms, np.tile(self.genes, (len(terms), 1))], axis=1)
-        prior = np.diag(np.concatenate([np.full(terms.shape[1], 1e-9), np.full(len(self.genes), GENES**-2)]))
-        curvature, slope = self.curvature[which].sum(axis=0), self.slope[which].sum(axis=0)
-        matrix = curvature[columns[:, :, None], columns[:, None, :]] + prior
-        return np.linalg.solve(matrix, slope[columns][..., None])[..., 0], columns
+    def left(self, recording: int, terms: Index, found: Array) -> Array:
+        """Sum of squares [B] that coefficients ``found`` [B, N] of ``terms`` [B, N] leave of a recording."""
+        matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
+        along = (found * self.slope[recording][terms]).sum(axis=1)
+        return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
-    def left(self, recording: int, found: Array, columns: Array) -> Array:
-        """Sum of squares [B] that ``found`` [B, Q] leave of a recording."""
-        matrix = self.curvature[recording][columns[:, :, None], columns[:, None, :]]
-        change = np.einsum("bq,bqr,br->b", found, matrix, found) - 2 * (found * self.slope[recording][columns]).sum(1)
-        return np.asarray(self.power[recording] + change)
-
-    def predicted(self, terms: npt.NDArray[np.int64]) -> Array:
-        """Sum of squares beyond the noise [B] that ``terms`` [B, N] leave of recordings left out one by one."""
+    def explained(self, terms: Index) -> Array:
+        """Part [B] of the excess misfit that ``terms`` [B, N] take away of recordings left out one by one."""
         after = np.zeros(len(terms))
         for r in range(len(self.power)):
-            which = np.arange(len(self.power)) != r
-            after += self.left(r, *self.fit(terms, which)) - self.count[r]
-        return after
+            after += self.left(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]
+        return np.asarray(1.0 - after / self.excess)
 
-    def explained(self, terms: npt.NDArray[np.int64]) -> Array:
-        """Part [B] of the excess misfit that ``terms`` [B, N] take away of recordings left out one by one."""
-        return np.asarray(1.0 - self.predicted(terms) / self.excess)
-
-    @cached_property
+    @property
     def excess(self) -> float:
-        """Sum of squares beyond the noise that the genes alone leave of recordings left out one by one."""
-        return max(float(self.predicted(np.zeros((1, 0), np.int64))[0]), 1e-9)
+        """Sum of squares beyond the noise."""
+        return max(float((self.power - self.count).sum()), 1e-9)
 
 
 def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> FreeLaw | None:
@@ -108,16 +98,31 @@ def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> 
 
 
 def _sums(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]) -> _Sums:
+    M, F = len(dictionary), cases[0].sensitivities.shape[1]
     loads = [_loads(probe, case.crossing, motion, dictionary) for case, motion in zip(cases, motions, strict=True)]
-    size = np.sqrt(sum(np.square(case.responses @ U).sum(axis=0) for case, U in zip(cases, loads, strict=True)))
-    size = np.where(size > 0, size, 1.0) / np.sqrt(sum(len(case.lacking) for case in cases))
-    curvature, slope = [], []
-    for case, U in zip(cases, loads, strict=True):
-        both = np.concatenate([case.responses @ (U / size), case.sensitivities], axis=1)
-        curvature.append(both.T @ both)
-        slope.append(both.T @ case.lacking)
-    power = np.array([float(case.lacking @ case.lacking) for case in cases])
-    return _Sums(np.array(curvature), np.array(slope), power, np.array([float(len(c.lacking)) for c in cases]), size)
+    every = np.array([_products(case, U) for case, U in zip(cases, loads, strict=True)])
+    size = np.sqrt(np.einsum("rmm->m", every[:, :M, :M]) / sum(len(case.lacking) for case in cases))
+    size = np.where(size > 0, size, 1.0)
+    genes = slice(M, M + F)
+    total = every.sum(axis=0)
+    taken = np.linalg.solve(total[genes, genes] + np.eye(F) / GENES**2, total[genes])  # by a refit of the genes
+    project = np.eye(M + F + 1)
+    project[genes] -= taken
+    project = np.delete(project, np.arange(M, M + F), axis=1)
+    project[:, :M] /= size
+    left = np.einsum("ap,rab,bq->rpq", project, every, project, optimize=True)
+    count = np.array([float(len(case.lacking)) for case in cases])
+    return _Sums(left[:, :M, :M], left[:, :M, M], left[:, M, M], count, size)
+
+
+def _products(case: Case, loads: Array) -> Array:
+    """All products [M + F + 1, M + F + 1] of what a recording shows of the dictionary, of the genes, and lacks."""
+    both = np.concatenate([case.responses, case.sensitivities, case.lacking[:, None]], axis=1)
+    others = both.shape[1] - len(loads)
+    shown = np.zeros((both.shape[1], loads.shape[1] + others))
+    shown[: len(loads), : loads.shape[1]] = loads
+    shown[len(loads) :, loads.shape[1] :] = np.eye(others)
+    return np.asarray(shown.T @ (both.T @ both) @ shown)
 
 
 def _loads(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
@@ -128,7 +133,7 @@ def _loads(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[C
     return np.asarray(np.einsum("sj,mjn,kn->skm", hats, fields, series, optimize=True).reshape(probe.size, -1))
 
 
-def _selected(sums: _Sums) -> npt.NDArray[np.int64]:
+def _selected(sums: _Sums) -> Index:
     """Terms, each earning its place by what recordings left out are predicted better; plain ones come first."""
     terms, before = np.zeros(0, np.int64), 0.0
     told = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
@@ -147,15 +152,15 @@ def _predicted(sums: _Sums) -> float:
     after = 0.0
     for r in range(len(sums.power)):
         terms = _selected(sums.without(r))[None]
-        which = np.arange(len(sums.power)) != r
-        after += float(sums.left(r, *sums.fit(terms, which))[0] - sums.count[r])
+        found = sums.fit(terms, np.arange(len(sums.power)) != r)
+        after += float(sums.left(r, terms, found)[0] - sums.count[r])
     return 1.0 - after / sums.excess
 
 
-def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: npt.NDArray[np.int64], explained: float) -> FreeLaw:
+def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: Index, explained: float) -> FreeLaw:
     every = np.ones(len(sums.power), bool)
     size = sums.size[terms]
-    value = sums.fit(terms[None], every)[0][0, : len(terms)] / size
+    value = sums.fit(terms[None], every)[0] / size
     error = _jackknife(sums, terms) / size
     found = tuple(
         Term(
@@ -170,8 +175,8 @@ def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: npt.NDArray[np.in
     return FreeLaw(f"{said}: it predicts {share}", found, explained)
 
 
-def _jackknife(sums: _Sums, terms: npt.NDArray[np.int64]) -> Array:
+def _jackknife(sums: _Sums, terms: Index) -> Array:
     """Standard errors [N] from what each recording changes (Efron, The Jackknife, 1982, Eq. 3.1)."""
     count = len(sums.power)
-    each = np.array([sums.fit(terms[None], np.arange(count) != r)[0][0, : len(terms)] for r in range(count)])
+    each = np.array([sums.fit(terms[None], np.arange(count) != r)[0] for r in range(count)])
     return np.asarray(np.sqrt((count - 1) / count * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
-from diagnosis.fit import Fit, fitted
+from diagnosis.fit import Fit, thoroughly
 from diagnosis.refit import Refit, again, judged
 from diagnosis.screen import Nuisance
 from diagnosis.stack import Stack
@@ -51,13 +51,13 @@ def first_fit(
     free: tuple[str, ...],
     values: Mapping[str, float],
     fixed: Mapping[str, float],
-) -> Fit:
-    """Fit the ``free`` genes from ``values``; ValueError where the model cannot be simulated there."""
+) -> Iterator[Fit]:
+    """Fit the ``free`` genes from ``values``, step by step; ValueError where the model cannot be simulated there."""
     base = base_genome(subject.model, {**values, **fixed})
     problem = Problem(subject.model, stack.recordings, free, base, stack.axes)
     genes = free_genes(problem)
     start = unit_at(genes, np.array([base[gene.name] for gene in genes]))
-    return fitted(subject, stack, problem, evaluator, start, steps=STEPS, thorough=True)
+    return thoroughly(subject, stack, problem, evaluator, start, STEPS)
 
 
 def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, refine: bool) -> Nominal:

@@ -7,6 +7,7 @@ times what depends on the motion alone; so a search over coefficients computes t
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -104,29 +105,31 @@ class BladeElementWing:
     def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
         """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
         batch = genome_batch(self.genes, genomes)
-        weights, out = self._weights(batch), np.empty((len(batch), 2, self.instants))
+        out = np.empty((len(batch), 2, self.instants))
         for effects, members in self._alike(batch):
             for start in range(0, len(members), LANES):  # blocks that stay in the cache
                 block = members[start : start + LANES]
                 if effects:
-                    rows, added = self._changed(effects, batch[block], recording)
-                    out[block] = [_sum(w, row) + more for w, row, more in zip(weights[block], rows, added, strict=True)]
+                    weights, rows, added = self._changed(effects, batch[block], recording)
+                    out[block] = [_sum(w, row) + more for w, row, more in zip(weights, rows, added, strict=True)]
                 else:
+                    weights = self._weights(self._coefficients(batch[block]), len(block))
                     found = self._remembered(batch[block], recording)
-                    out[block] = [_sum(w, row) for w, row in zip(weights[block], found, strict=True)]
+                    out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
         return out.transpose(0, 2, 1)
 
     def term_forces(self, genome: npt.ArrayLike, recording: Recording) -> dict[str, Array]:
         """Forces [n, 2] of each term (N), and of the effects beside them; together they are :meth:`beat`."""
         batch = genome_batch(self.genes, np.asarray(genome, float)[None])
         ((effects, _),) = self._alike(batch)
-        weights, parts = self._weights(batch)[0], dict[str, Array]()
+        parts = dict[str, Array]()
         if effects:
-            rows, added = self._changed(effects, batch, recording)
+            weights, rows, added = self._changed(effects, batch, recording)
             parts["effects"] = added[0].T
         else:
+            weights = self._weights(self._coefficients(batch), len(batch))
             rows = self._rows(batch, recording)
-        for name, weight, row in zip(self._active, weights, rows[0], strict=True):
+        for name, weight, row in zip(self._active, weights[0], rows[0], strict=True):
             parts[_ROWS[name]] = parts.get(_ROWS[name], 0.0) + weight * row.T
         return parts
 
@@ -162,17 +165,15 @@ class BladeElementWing:
             groups.setdefault(tuple(e for e, each in zip(acting, on, strict=True) if each[k]), []).append(k)
         return [(effects, np.array(members)) for effects, members in groups.items()]
 
-    def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array]:
-        """Forces of each active row [B, rows, 2, n], and those beside them [B, 2, n], with ``effects`` on."""
+    def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array, Array]:
+        """With ``effects`` on: weights [B, rows], forces [B, rows, 2, n] of active rows, those beside them [B, 2, n]."""
         moving = {} if recording.motion else self._moving(batch)
-        names = [gene.name for gene in self.genes]
-        coefficients = {name: batch[:, names.index(name)] for name in _COEFFICIENTS if name in names}
-        scene = self._scene(moving | coefficients, len(batch), recording)
+        scene = self._scene(moving | self._coefficients(batch), len(batch), recording)
         for effect in effects:
             if effect.vehicle:
                 effect.vehicle(scene, effect.values(self.genes, batch))
         scene.settle()
-        return self._wings(scene), scene.finish()
+        return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
 
     def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Places, Sampling]:
         """Individuals for whom an effect on the observation is on, and what the balance makes of their ``beat``."""
@@ -186,14 +187,17 @@ class BladeElementWing:
 
     # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
 
-    def _weights(self, batch: Array) -> Array:
-        """[B, rows]: what each row is multiplied by."""
-        column = {gene.name: k for k, gene in enumerate(self.genes)}
+    def _coefficients(self, batch: Array) -> dict[str, Array]:
+        """Those of the terms that are on, [B]."""
+        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in _COEFFICIENTS}
+
+    def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
+        """[B, rows]: what each row of ``count`` individuals is multiplied by."""
+        zero, one = np.zeros(count), np.ones(count)
 
         def value(name: str) -> Array:
-            return batch[:, column[name]] if name in column else np.zeros(len(batch))
+            return coefficients.get(name, zero)
 
-        one = np.ones(len(batch))
         lever = ROTATION_POINT - self.vehicle.pitch_axis
         scale = {
             "inertial": one,

@@ -79,5 +79,5 @@ def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
     height = tracks[:, [names.index(name) for name in references], 2].mean(axis=1)
     spectrum = np.fft.rfft(height)[: REFERENCE_HARMONICS + 1] / len(height)
     spectrum[1:] *= 2
-    crossing = upstroke_crossing(spectrum[None], model.wing.hinge.z)[0] / (2 * np.pi)
-    return float(crossing % 1.0) if np.isfinite(crossing) else 0.0
+    found = upstroke_crossing(spectrum[None], model.wing.hinge.z)[0] / (2 * np.pi)
+    return float(found % 1.0) if np.isfinite(found) else 0.0

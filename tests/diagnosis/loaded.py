@@ -38,7 +38,7 @@ def bump(span: Array, phase: Array, place: float, when: float, width: float = 0.
 
 
 def pushed(wing: FlexibleWing, condition: Condition, place: float, when: float, size: float) -> Array:
-    """Genome of ``wing``, which has a fine probe, under a push of ``size`` (N/m) ``when`` (beats) after its crossing."""
+    """Genome of ``wing``, which has a fine probe, pushed with ``size`` (N/m), ``when`` (beats) after its crossing."""
     probe, blank, genome = wing.probe, blank_recording(wing.wing, condition), nominal(wing)
     assert probe is not None
     phase = np.arange(256) / 256
@@ -80,7 +80,7 @@ def sensitivities(wing: FlexibleWing, genome: Array, recording: Recording) -> tu
             rows.append(genome.copy())
             rows[-1][k] = float(gene.from_unit(unit[k] + sign * _STEP))
     seen = wing.observe(np.array(rows), recording).channels
-    return seen[0] - recording.values, np.stack((seen[1::2] - seen[2::2]) / (2 * _STEP), axis=-1)
+    return seen[0] - recording.values, np.moveaxis((seen[1::2] - seen[2::2]) / (2 * _STEP), 0, -1)
 
 
 def case(wing: FlexibleWing, recording: Recording, probe: Probe) -> tuple[Case, Probed]:

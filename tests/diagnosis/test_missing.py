@@ -106,9 +106,9 @@ def test_coloured_noise_is_made_white() -> None:
 
 
 def test_forces_show_what_they_lack() -> None:
-    rng, phase = np.random.default_rng(3), np.arange(300) * 0.0337 % 1.0
-    lacking = 0.2 * np.cos(2 * np.pi * (phase - 0.25)) + 0.05
-    off = [missing_force("run", -lacking + 0.02 * rng.standard_normal(300), phase, 0.02, 0.0) for _ in range(20)]
+    rng, phase = np.random.default_rng(3), np.asarray(np.arange(300) * 0.0337 % 1.0, float)
+    lacking = np.asarray(0.2 * np.cos(2 * np.pi * (phase - 0.25)) + 0.05, float)
+    off = [missing_force("run", 0.02 * rng.normal(size=300) - lacking, phase, 0.02, 0.0) for _ in range(20)]
     at = np.array(off[0].phase)
     scores = [
         (np.array(one.values[0]) - 0.2 * np.cos(2 * np.pi * (at - 0.25)) - 0.05) / np.array(one.errors[0])

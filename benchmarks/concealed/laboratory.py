@@ -1,0 +1,232 @@
+"""Where plants are recorded: datasets for the tool, answers for the seal.
+
+What is drawn: parameters of the rig, conditions, quality of the recordings, shape of what is hidden. Its strength is
+searched, so that the scorer's refit leaves the misfit that is aimed at. The same trial gives the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.answer import Answer, Secret
+from benchmarks.concealed.bench import Bench, Made, bench_of
+from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.seal import read, seal
+from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
+from benchmarks.concealed.trials import Trial, conditions, name_of
+from records import Condition, Dataset, Recording, load_dataset, save_dataset
+
+Array = npt.NDArray[np.float64]
+
+ATTEMPTS = 4  # draws of a trial, where the plant cannot run one
+ROUNDS = 2  # of the final refit
+LITTLE = 0.85  # of the d that is aimed at: what stays below is recorded with less noise, where cameras get as good
+
+
+@dataclass(frozen=True)
+class Order:
+    """A trial to be made: where its dataset goes, and in which folder its answer is sealed."""
+
+    trial: Trial
+    dataset: Path
+    sealed: Path
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One more recording of a trial's rig under ``condition``: its dataset, and where the longer one goes."""
+
+    trial: Trial
+    condition: Condition
+    dataset: Path
+    longer: Path
+    sealed: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """A rig on the bench: everything that its recordings are made of.
+
+    ``level`` multiplies the noise of the quality that was drawn. An ``ideal`` one is recorded without noise, and with
+    nothing missing; all else is the same.
+    """
+
+    bench: Bench[Any, Any]
+    seed: int
+    attempt: int
+    genome: Mapping[str, float]
+    hidden: Concealed
+    level: float = 1.0
+    ideal: bool = False
+
+    @cached_property
+    def quality(self) -> Any:
+        """How well it is recorded."""
+        drawn = self.bench.quality(np.random.default_rng([self.seed, self.attempt, 2]))
+        return self.bench.ideal(drawn) if self.ideal else self.bench.quieter(drawn, self.level)
+
+    @property
+    def least_level(self) -> float:
+        """How far its noise can be lowered."""
+        return self.bench.least(replace(self, level=1.0, ideal=False).quality)
+
+    def made(self, number: int, condition: Condition) -> Made:
+        """Its recording ``number``, under ``condition``."""
+        rng = np.random.default_rng([self.seed, self.attempt, 3, number])
+        found = self.bench.recording(condition, self.genome, self.hidden, self.quality, rng)
+        return found._replace(recording=replace(found.recording, name=name_of(condition)))
+
+    def fitted(self, conditions: Sequence[Condition]) -> tuple[Recording, ...]:
+        """The first recordings, as they are fitted."""
+        made = (self.made(number, condition).recording for number, condition in enumerate(conditions))
+        return tuple(self.bench.fitted(one) for one in made)
+
+    def secret(self, name: str, condition: Condition) -> Secret:
+        """What is told of one thing that is hidden; when it acts is read from the beat under ``condition``."""
+        law, parameters = self.bench.laws[name], self.hidden[name]
+        beat = self.bench.beat(condition, self.genome, self.hidden)
+        return Secret(
+            law.name,
+            law.listed,
+            law.side,
+            parameters["strength"],
+            dict(parameters),
+            parameters.get("span"),
+            parameters.get("chord"),
+            self.bench.phase(beat, name, parameters),
+            dict(law.values(parameters)),
+        )
+
+    def noise(self, conditions: Sequence[Condition]) -> float:
+        """Root mean square of the noise in the first recordings, m or N."""
+        return rms(np.array([self.made(number, condition).noise for number, condition in enumerate(conditions)]))
+
+
+def make(order: Order) -> str:
+    """Record a trial and seal its answer; returns the answer's hash."""
+    reasons = []
+    for attempt in range(ATTEMPTS):
+        try:
+            dataset, answer = _made(order.trial, attempt)
+        except (RuntimeError, ArithmeticError, ValueError) as error:
+            reasons.append(f"{type(error).__name__}: {error}")
+            continue
+        save_dataset(dataset, order.dataset)
+        return seal(answer, order.sealed)
+    raise RuntimeError(f"{order.trial} cannot be recorded: {'; '.join(reasons)}")
+
+
+def add(order: Addition) -> None:
+    """Record one more condition of a trial's rig; the dataset is longer by it."""
+    dataset, answer = load_dataset(order.dataset), read(order.sealed / f"{order.trial.name}.json")
+    hidden = {secret.name: dict(secret.parameters) for secret in answer.secrets}
+    bench = bench_of(order.trial.build)
+    specimen = Specimen(bench, answer.seed, answer.attempt, answer.genome, hidden, answer.level)
+    more = specimen.made(len(dataset.recordings), order.condition).recording
+    taken = {one.name for one in dataset.recordings}
+    name = more.name if more.name not in taken else f"{more.name}-again"
+    save_dataset(replace(dataset, recordings=(*dataset.recordings, replace(more, name=name))), order.longer)
+
+
+def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
+    rng = np.random.default_rng([trial.seed, attempt, 1])
+    bench = bench_of(trial.build)
+    planned = conditions(trial, rng)
+    fitted = [condition for condition, held_out in planned if not held_out]
+    bare = Specimen(bench, trial.seed, attempt, bench.genome(rng), {})
+    drawn = {name: bench.laws[name].draw(rng) for name in trial.hidden}
+    strength = Strength.of(bare, fitted)
+    specimen = strength.set(bare, drawn, trial.target)
+    every = [specimen.made(number, condition) for number, (condition, _) in enumerate(planned)]
+    held_out = tuple(one.recording.name for one, (_, held) in zip(every, planned, strict=True) if held)
+    noise = {
+        held: rms(np.array([one.noise for one, (_, other) in zip(every, planned, strict=True) if other is held]))
+        for held in (False, True)
+    }
+    answer = Answer(
+        trial=trial.name,
+        group=trial.group,
+        rig=trial.build.rig,
+        division=trial.build.division,
+        plant=trial.build.plant,
+        secrets=tuple(specimen.secret(name, fitted[0]) for name in specimen.hidden),
+        genome=specimen.genome,
+        target=trial.target,
+        strength=strength.final(specimen) / noise[False],
+        strength_of_division=strength.division() / noise[False],
+        noise=noise[False],
+        noise_held_out=noise[True],
+        conditions={one.recording.name: one.recording.condition for one in every},
+        seed=trial.seed,
+        attempt=attempt,
+        level=specimen.level,
+    )
+    return Dataset(trial.name, bench.rig, tuple(one.recording for one in every), held_out), answer
+
+
+@dataclass(frozen=True, eq=False)
+class Strength:
+    """What is left of changes when the nominal model is refitted: of a bare specimen under the fitted conditions.
+
+    A search for a strength changes the plant at the model's own division, which is cheaper and means the same.
+    """
+
+    bare: Specimen
+    conditions: tuple[Condition, ...]
+    refit: Refit
+    coarse: Specimen
+    plain: Array
+
+    @classmethod
+    def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
+        """The nominal model about the specimen's own genome."""
+        ideal = replace(bare, ideal=True)
+        coarse = replace(ideal, bench=bare.bench.coarse())
+        recordings = ideal.fitted(fitted)
+        plain = stacked(recordings) if coarse.bench is ideal.bench else stacked(coarse.fitted(fitted))
+        refit = Refit(bare.bench.model, bare.genome, recordings)
+        return cls(ideal, tuple(fitted), refit, coarse, plain)
+
+    def change(self, hidden: Concealed) -> Array:
+        """[D] that hiding ``hidden`` changes."""
+        return stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
+
+    def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
+        """The specimen with each of ``drawn`` as strong as ``target`` asks; with less noise where it must."""
+        hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
+        for name, parameters in drawn.items():
+            hidden[name], found = self._sized(name, parameters, target, noise)
+            if found < LITTLE * target:
+                level = min(level, max(found / target, bare.least_level))
+        return replace(bare, hidden=hidden, level=level)
+
+    def _sized(
+        self, name: str, parameters: Mapping[str, float], target: float, noise: float
+    ) -> tuple[dict[str, float], float]:
+        """Parameters with the strength that leaves ``target`` times the noise, and what they leave."""
+
+        def sized(size: float) -> dict[str, float]:
+            return {**parameters, "strength": size * parameters["strength"]}
+
+        size, found = strength_for(
+            target,
+            lambda size: self.refit.full(self.change({name: sized(size)})) / noise,
+            1.0,
+            self.bare.bench.limits(name),
+        )
+        return sized(size), found
+
+    def final(self, specimen: Specimen) -> float:
+        """Root mean square that a full refit leaves of what is hidden, m or N."""
+        return self.refit.full(self.change(specimen.hidden), rounds=ROUNDS) if specimen.hidden else 0.0
+
+    def division(self) -> float:
+        """The same of the plant with nothing hidden: by the model's division, and by what two simulations differ."""
+        return rms(self.refit.refitted(stacked(self.refit.recordings), ROUNDS)[1])

@@ -1,0 +1,13 @@
+"""All kinds of effect that the plant can hide in a wing, in the order in which they act."""
+
+from __future__ import annotations
+
+from benchmarks.concealed.plant.hidden import Kind
+from benchmarks.concealed.plant.listed_air import LISTED_AIR
+from benchmarks.concealed.plant.listed_drive import LISTED_DRIVE
+from benchmarks.concealed.plant.listed_structure import LISTED_STRUCTURE
+from benchmarks.concealed.plant.unlisted import UNLISTED
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (*LISTED_STRUCTURE, *LISTED_DRIVE, *LISTED_AIR, *UNLISTED)}
+LISTED = tuple(kind.name for kind in KINDS.values() if kind.listed)
+UNKNOWN = tuple(kind.name for kind in KINDS.values() if not kind.listed)

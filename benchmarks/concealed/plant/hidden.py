@@ -1,0 +1,151 @@
+"""What is hidden in a simulated wing: any number of effects, each with a strength that goes down to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from benchmarks.concealed.plant.build import Draft
+from records import Wing
+
+Family = Literal["structure", "inertia", "actuation", "aerodynamics"]
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of effect.
+
+    Attributes:
+        name: as in the tool's library if ``listed``, else the plant's own.
+        family: what sort of thing it is.
+        listed: whether the library has it.
+        unit: of its strength; ``typical``: a strength that is easily seen beside noise of half a millimetre.
+        largest: strength beyond which it makes no sense, or no periodic motion is sure to be found.
+        shape: other parameters by name, with typical value and range: (value, lower, upper).
+        source: where the law is from, and in which form.
+        put: changes a draft for a strength and the parameters; called once the wing is cut unless ``before`` is set.
+        genes: true values of the library's genes, of those that mean the same.
+        at_top: whether it acts where the place is at the top of its way.
+    """
+
+    name: str
+    family: Family
+    listed: bool
+    unit: str
+    typical: float
+    largest: float
+    source: str
+    put: Callable[[Draft, float, Values], None]
+    shape: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    genes: Callable[[Wing, float, Values], dict[str, float]] | None = None
+    before: bool = False
+    at_top: bool = False
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of a kind with its ``strength`` (in the kind's unit) and those parameters that are not typical."""
+
+    name: str
+    strength: float
+    at: Values = field(default_factory=dict)
+
+    @property
+    def kind(self) -> Kind:
+        """Of it; ValueError where there is none of that name."""
+        kinds = _kinds()
+        if self.name not in kinds:
+            raise ValueError(f"the plant cannot hide {self.name!r}; it can hide {', '.join(kinds)}")
+        return kinds[self.name]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """All parameters by name; ValueError for one that the kind does not have."""
+        shape = self.kind.shape
+        for name in self.at:
+            if name not in shape:
+                raise ValueError(f"{self.name} has no parameter {name!r}; it has {', '.join(shape) or 'none'}")
+        return {name: float(self.at.get(name, row[0])) for name, row in shape.items()}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The answer to be found.
+
+    Attributes:
+        name, family, listed, strength: of the effect.
+        parameters: all of its parameters.
+        span, chord: place on the wing in parts; None where it has none.
+        turn: drive phase (rad) about which it acts; None where it acts all the time.
+        genes: true values of the library's genes, of those that mean the same.
+    """
+
+    name: str
+    family: Family
+    listed: bool
+    strength: float
+    parameters: Values
+    span: float | None
+    chord: float | None
+    turn: float | None
+    genes: Values
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Effects that are hidden in a wing; none by default."""
+
+    effects: tuple[Effect, ...] = ()
+
+    @classmethod
+    def one(cls, name: str, strength: float, **at: float) -> Hidden:
+        """A single effect."""
+        return cls((Effect(name, strength, at),))
+
+    def put_into(self, draft: Draft) -> None:
+        """Cut the wing up and change it, kind after kind in the order of the catalogue."""
+        order = list(_kinds())
+        present = [e for e in sorted(self.effects, key=lambda e: order.index(e.kind.name)) if e.strength != 0.0]
+        for effect in present:
+            if effect.kind.before:
+                effect.kind.put(draft, effect.strength, effect.values)
+        draft.cut_up()
+        for effect in present:
+            if not effect.kind.before:
+                effect.kind.put(draft, effect.strength, effect.values)
+
+    def truths(self, wing: Wing, turns: Mapping[str, float]) -> tuple[Truth, ...]:
+        """The answers; ``turns``: drive phases at which effects act that only the motion tells."""
+        return tuple(_truth(effect, wing, turns.get(effect.name)) for effect in self.effects)
+
+
+def _truth(effect: Effect, wing: Wing, turn: float | None) -> Truth:
+    kind, values = effect.kind, effect.values
+    return Truth(
+        effect.name,
+        kind.family,
+        kind.listed,
+        effect.strength,
+        values,
+        values.get("span"),
+        values.get("chord"),
+        values.get("turn", turn),
+        kind.genes(wing, effect.strength, values) if kind.genes else {},
+    )
+
+
+def drawn(name: str, strength: float, rng: np.random.Generator) -> Effect:
+    """An effect of a kind with all its other parameters drawn evenly from their ranges."""
+    shape = Effect(name, strength).kind.shape
+    return Effect(name, strength, {key: float(rng.uniform(low, high)) for key, (_, low, high) in shape.items()})
+
+
+def _kinds() -> dict[str, Kind]:
+    """The catalogue; it needs this module."""
+    from benchmarks.concealed.plant.catalogue import KINDS
+
+    return KINDS

@@ -1,0 +1,108 @@
+"""One periodic beat of a wing that may have something to hide: what ideal cameras would see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import resample
+
+from benchmarks.concealed.plant.build import Draft, rig_of, rod_table
+from benchmarks.concealed.plant.hidden import Effect, Hidden, Truth
+from benchmarks.concealed.plant.march import State
+from benchmarks.concealed.plant.rig import Rig, states_of
+from benchmarks.concealed.plant.settle import Accuracy, settle
+from records import Condition, Wing
+
+Array = npt.NDArray[np.float64]
+
+SAMPLES = 192  # instants of a beat that are given, at least
+
+
+@dataclass(frozen=True, eq=False)
+class Beat:
+    """One beat in the periodic motion.
+
+    Attributes:
+        tracks: [n, M, 3] of all markers in the order of the wing's, at n equal steps of the drive phase from 0, m.
+        hidden: what is hidden in it; ``turns``: drive phases (rad) of those effects that act at the top of their way.
+        error: estimated distance from the periodic motion, m.
+        beats: beats that were marched through on the way.
+        crossing: drive phase (rad) at which the reference markers rise through the height of the hinge: the start of
+            the beat as a dataset has it.
+    """
+
+    wing: Wing
+    tracks: Array
+    hidden: Hidden
+    turns: Mapping[str, float]
+    error: float
+    beats: int
+
+    @property
+    def truths(self) -> tuple[Truth, ...]:
+        """The answers; their ``turn`` in beats is what :meth:`phase` makes of it."""
+        return self.hidden.truths(self.wing, self.turns)
+
+    @cached_property
+    def crossing(self) -> float:
+        """As above; ValueError where they never do."""
+        names = [marker.name for marker in self.wing.markers]
+        columns = [names.index(name) for name in self.wing.reference_markers]
+        height = self.tracks[:, columns, 2].mean(axis=1) - self.wing.hinge.z
+        rising = np.flatnonzero((height <= 0) & (np.roll(height, -1) > 0))
+        if len(rising) == 0:
+            raise ValueError("the reference markers never rise through the height of the hinge: name others")
+        slope = np.roll(height, -1) - height
+        k = int(rising[np.argmax(slope[rising])])
+        return float(2 * np.pi * (k - height[k] / slope[k]) / len(height))
+
+    def phase(self, psi: float) -> float:
+        """Drive phase (rad) in beats from the start of the beat, 0 to 1."""
+        return float((psi - self.crossing) / (2 * np.pi) % 1.0)
+
+
+def simulate(
+    wing: Wing,
+    division: str,
+    genome: Mapping[str, float],
+    condition: Condition,
+    hidden: Hidden | None = None,
+    accuracy: Accuracy | None = None,
+) -> Beat:
+    """Simulate ``wing`` cut by ``division`` (:func:`.geometry.counts_of`) with a genome (thesis Eqs. 18-19, SI units).
+
+    ArithmeticError where no periodic motion is found.
+    """
+    draft = Draft(wing, division, genome, condition)
+    concealed = hidden or Hidden()
+    concealed.put_into(draft)
+    rig = rig_of(draft)
+    cut = draft.cut
+    places = np.array([marker.position for marker in wing.markers])
+    carrier = cut.under(places[:, 0], places[:, 1])
+    arms = places - cut.bodies[1][carrier]
+    R, p, error, beats = settle(rig, lambda steps: rod_table(draft, steps), at_rest(rig), accuracy or Accuracy())
+    tracks = p[:, carrier] + np.einsum("tmij,mj->tmi", R[:, carrier], arms)
+    if len(tracks) < SAMPLES:
+        tracks = np.asarray(resample(tracks, SAMPLES, axis=0))
+    turns = {e.name: _top(draft, e, R, p) for e in concealed.effects if e.kind.at_top}
+    return Beat(wing, tracks, concealed, turns, error, beats)
+
+
+def _top(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
+    """Drive phase (rad) at which an effect's place is highest."""
+    body, arm, _ = draft.at(effect.values["span"], effect.values.get("chord", 0.5))
+    height = p[:, body, 2] + R[:, body, 2] @ arm
+    return float(2 * np.pi * np.argmax(height) / len(height))
+
+
+def at_rest(rig: Rig) -> State:
+    """The undeformed wing, not moving."""
+    n = len(rig.mass)
+    return State(
+        np.tile(np.eye(3), (n, 1, 1)), rig.rest.copy(), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(states_of(rig))
+    )

@@ -1,0 +1,59 @@
+"""Answers under seal: each in a file of its own, its hash in a manifest that is closed before the first diagnosis.
+
+The hash covers a random number as well, so that nobody can find the answer by hashing guesses.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.concealed.answer import Answer
+
+MANIFEST = "manifest.json"
+
+
+class BrokenSealError(ValueError):
+    """An answer is not the one that was sealed."""
+
+
+def seal(answer: Answer, folder: Path) -> str:
+    """Write ``answer`` into ``folder`` and return its sha256."""
+    salt = np.random.default_rng([answer.seed, 7]).bytes(16).hex()
+    text = json.dumps({"salt": salt, "answer": answer.as_json()}, sort_keys=True, indent=1)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{answer.trial}.json").write_text(text, encoding="utf-8")
+    return digest(text)
+
+
+def digest(text: str) -> str:
+    """sha256 of a sealed answer."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def close(hashes: Mapping[str, str], folder: Path) -> str:
+    """Write the manifest of all hashes; its own hash is returned, to be told before the diagnosis."""
+    text = json.dumps(dict(sorted(hashes.items())), indent=1)
+    (folder / MANIFEST).write_text(text, encoding="utf-8")
+    return digest(text)
+
+
+def open_seal(trial: str, folder: Path, manifest: str) -> Answer:
+    """The answer of ``trial``; BrokenSealError where it, or the manifest, is not what ``manifest`` (a hash) closed."""
+    listed = (folder / MANIFEST).read_text(encoding="utf-8")
+    if digest(listed) != manifest:
+        raise BrokenSealError(f"the manifest has sha256 {digest(listed)}, closed was {manifest}; run the trials again")
+    expected = json.loads(listed).get(trial)
+    text = (folder / f"{trial}.json").read_text(encoding="utf-8")
+    if digest(text) != expected:
+        raise BrokenSealError(f"the answer of {trial} has sha256 {digest(text)}, sealed was {expected}; run it again")
+    return Answer.from_json(json.loads(text)["answer"])
+
+
+def read(path: Path) -> Answer:
+    """A sealed answer for the plant's own use: to record its rig once more."""
+    return Answer.from_json(json.loads(path.read_text(encoding="utf-8"))["answer"])

@@ -1,0 +1,191 @@
+"""Strength of what is hidden: d, the misfit after the best refit of the nominal model over the noise.
+
+The scorer's own refit, of data without noise; nothing of it is the diagnosis's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+from records import Gene, Recording
+from sim.model import Model
+
+Array = npt.NDArray[np.float64]
+
+STEP = 0.01  # of a gene's box, of finite differences
+DAMPINGS = (0.0, 1e-3, 1e-2, 1e-1, 1.0)  # of Gauss-Newton, tried at once
+STEPS = 8
+SETTLED = 5e-3  # relative gain in root mean square below which a refit ends
+CLOSE = 0.12  # relative error of d that a search for a strength is content with
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """The nominal model about the true values ``start`` of its genes, for refits to recordings.
+
+    Genes that the model does not search keep their true values.
+    """
+
+    model: Model
+    start: Mapping[str, float]
+    recordings: tuple[Recording, ...]
+
+    @cached_property
+    def genes(self) -> tuple[Gene, ...]:
+        """Those that are refitted."""
+        return tuple(gene for gene in self.model.genes if gene.name in self.model.searched)
+
+    @cached_property
+    def unit(self) -> Array:
+        """[F] where they are at first, in parts of their boxes."""
+        return np.array([float(gene.to_unit(self.start[gene.name])) for gene in self.genes])
+
+    def observed(self, units: Array, recordings: Sequence[Recording]) -> Array:
+        """What [B, F] is recorded as, [B, D]; RuntimeError where that cannot be simulated."""
+        base = np.array([self.start.get(gene.name, gene.nominal) for gene in self.model.genes])
+        genomes = np.tile(base, (len(units), 1))
+        names = [gene.name for gene in self.model.genes]
+        for k, gene in enumerate(self.genes):
+            genomes[:, names.index(gene.name)] = gene.from_unit(np.clip(units[:, k], 0.0, 1.0))
+        parts = []
+        for recording in recordings:
+            found = self.model.observe(genomes, recording)
+            if any(found.reasons):
+                raise RuntimeError(f"{recording.name}: {next(reason for reason in found.reasons if reason)}")
+            parts.append(found.channels.reshape(len(units), -1))
+        return np.concatenate(parts, axis=1)
+
+    @cached_property
+    def nominal(self) -> Array:
+        """[D] of the true values."""
+        return np.asarray(self.observed(self.unit[None], self.recordings)[0])
+
+    @cached_property
+    def tangent(self) -> Array:
+        """[D, F] about the true values."""
+        return self.tangent_at(self.unit, self.recordings)
+
+    def tangent_at(self, unit: Array, recordings: Sequence[Recording]) -> Array:
+        """[D, F] about ``unit`` [F], by central differences per part of the box."""
+        moves = STEP * np.eye(len(self.genes))
+        around = np.clip(np.vstack([unit + moves, unit - moves]), 0.0, 1.0)
+        seen = self.observed(around, recordings)
+        n = len(self.genes)
+        width = np.diag(around[:n] - around[n:])
+        return np.asarray(((seen[:n] - seen[n:]) / width[:, None]).T)
+
+    def linear(self, change: Array) -> float:
+        """Root mean square that is left of a change [D] of the recordings, the genes' tangent projected out."""
+        told = np.isfinite(change)
+        fitted, *_ = np.linalg.lstsq(self.tangent[told], change[told], rcond=1e-8)
+        left = change[told] - self.tangent[told] @ fitted
+        return rms(left)
+
+    def full(self, change: Array, *, rounds: int = 1) -> float:
+        """The same by a refit inside the genes' boxes.
+
+        The refitted data are what the nominal model shows, with ``change`` added; so a coarser division of the model
+        counts for nothing here.
+        """
+        return rms(self.refitted(self.nominal + change, rounds)[1])
+
+    def refitted(self, target: Array, rounds: int = 1) -> tuple[Array, Array]:
+        """Genes [F] in parts of their boxes and the residual [D] of a refit to ``target`` [D].
+
+        Damped Gauss-Newton steps, of several dampings the best; the slopes learn from every step (Broyden 1965), and
+        are measured anew before each of the ``rounds`` but the first.
+        """
+        recordings = with_values(self.recordings, target)
+        told = np.isfinite(target)
+        unit, residual = self.unit, self.observed(self.unit[None], recordings)[0] - target
+        for turn in range(rounds):
+            slopes = (self.tangent_at(unit, recordings) if turn else self.tangent)[told]
+            unit, residual = self._descended(recordings, target, unit, residual, slopes)
+        return unit, residual
+
+    def _descended(
+        self, recordings: Sequence[Recording], target: Array, unit: Array, residual: Array, slopes: Array
+    ) -> tuple[Array, Array]:
+        told = np.isfinite(target)
+        for _ in range(STEPS):
+            moves = np.array([_bounded(slopes, residual[told], unit, damping) for damping in DAMPINGS])
+            found = self.observed(unit + moves, recordings) - target
+            left = [rms(one) for one in found]
+            for k in np.argsort(left)[::-1]:  # the best last: what it shows holds exactly
+                slopes = _learned(slopes, moves[k], (found[k] - residual)[told])
+            best, before = int(np.argmin(left)), rms(residual)
+            if left[best] >= before:
+                break
+            unit, residual = unit + moves[best], found[best]
+            if left[best] > (1 - SETTLED) * before:
+                break
+        return unit, residual
+
+
+def _learned(slopes: Array, move: Array, change: Array) -> Array:
+    length = float(move @ move)
+    return slopes if length < 1e-12 else slopes + np.outer(change - slopes @ move, move) / length
+
+
+def _bounded(slopes: Array, residual: Array, unit: Array, damping: float) -> Array:
+    curvature = slopes.T @ slopes
+    diagonal = np.diag(curvature)
+    raised = curvature + np.diag(damping * diagonal + 1e-9 * diagonal.max())
+    factor = np.linalg.cholesky(raised)
+    aim = -np.linalg.solve(factor, slopes.T @ residual)
+    return np.asarray(lsq_linear(factor.T, aim, (-unit - 1e-12, 1 - unit + 1e-12), method="bvls").x)
+
+
+def with_values(recordings: Sequence[Recording], values: Array) -> tuple[Recording, ...]:
+    """Recordings with other values, [D] in all."""
+    ends = np.cumsum([one.values.size for one in recordings])[:-1]
+    parts = np.split(values, ends)
+    return tuple(
+        replace(one, values=part.reshape(one.values.shape)) for one, part in zip(recordings, parts, strict=True)
+    )
+
+
+def stacked(recordings: Sequence[Recording]) -> Array:
+    """Values of all channels of recordings, [D]."""
+    return np.concatenate([one.values.ravel() for one in recordings])
+
+
+def rms(values: Array) -> float:
+    """Root mean square of what there is."""
+    told = values[np.isfinite(values)]
+    return math.sqrt(float(told @ told) / len(told)) if len(told) else 0.0
+
+
+def strength_for(
+    target: float, misfit: Callable[[float], float], start: float, limits: tuple[float, float], tries: int = 5
+) -> tuple[float, float]:
+    """The strength at which ``misfit`` is about ``target``, and the misfit there: secants between logarithms.
+
+    Where the limits do not allow it, that limit. A misfit grows about in proportion to a strength; where it does not
+    answer at all the largest strength is taken.
+    """
+    low, high = limits
+    at = min(max(start, low), high)
+    found = misfit(at)
+    best, power = (at, found), 1.0
+    for _ in range(tries):
+        if abs(math.log(max(found, 1e-12) / target)) < CLOSE:
+            return at, found
+        ratio = target / max(found, 1e-12)
+        ahead = min(max(at * ratio ** (1 / power), at / 8, low), at * 8, high)
+        if ahead == at:
+            break
+        value = misfit(ahead)
+        if value > 0 and found > 0 and value != found:
+            power = min(max(math.log(value / found) / math.log(ahead / at), 0.3), 3.0)
+        at, found = ahead, value
+        if abs(math.log(max(found, 1e-12) / target)) < abs(math.log(max(best[1], 1e-12) / target)):
+            best = at, found
+    return best

@@ -1,0 +1,261 @@
+"""All marks in one table, with counts and Wilson intervals, and the figures that are told as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.concealed.score import Mark
+
+NORMAL_90 = 1.6448536269514722
+BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
+"""Trials count for the d that they have, not for the one that was aimed at; below the first bin they count nowhere."""
+WEAK = BINS[2][0]
+
+
+@dataclass(frozen=True)
+class Rate:
+    """``hits`` among ``n``, with the 90 % interval of Wilson (1927)."""
+
+    hits: int
+    n: int
+
+    @property
+    def percent(self) -> float | None:
+        """Per cent; None of nothing."""
+        return round(100 * self.hits / self.n, 1) if self.n else None
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Between which per cent the true rate lies."""
+        if not self.n:
+            return None
+        z, p, n = NORMAL_90, self.hits / self.n, self.n
+        middle, spread = p + z * z / (2 * n), z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        low, high = ((middle + sign * spread) / (1 + z * z / n) for sign in (-1, 1))
+        return round(100 * max(low, 0.0), 1), round(100 * min(high, 1.0), 1)
+
+    def __str__(self) -> str:
+        if self.interval is None:
+            return "none"
+        low, high = self.interval
+        return f"{self.percent:5.1f} %  ({self.hits} of {self.n}; {low:.1f} to {high:.1f} %)"
+
+
+def rate(marks: Iterable[Mark], good: Callable[[Mark], bool | None]) -> Rate:
+    """How many are ``good``, of those of which that can be said."""
+    told = [bool(found) for one in marks if (found := good(one)) is not None]
+    return Rate(sum(told), len(told))
+
+
+def of(marks: Iterable[Mark], group: str) -> list[Mark]:
+    """Marks of a group of trials."""
+    return [one for one in marks if one.group == group]
+
+
+def at(marks: Iterable[Mark], d: int) -> list[Mark]:
+    """Those whose strength lies in the bin of ``d``."""
+    low, high = BINS[d]
+    return [one for one in marks if low <= one.strength < high]
+
+
+def seen(marks: Iterable[Mark]) -> list[Mark]:
+    """Those that are strong enough to count."""
+    return [one for one in marks if one.strength >= WEAK]
+
+
+@dataclass(frozen=True)
+class Advised:
+    """An ambiguous case: whether a recording under the advised condition settled it, and one under a random one.
+
+    ``verdict`` is that of the first diagnosis; ``advice`` tells the condition, None where none was advised.
+    """
+
+    trial: str
+    truth: tuple[str, ...]
+    verdict: str
+    named: tuple[str, ...]
+    advice: str | None
+    resolved: bool
+    by_chance: bool
+
+
+@dataclass(frozen=True)
+class Table:
+    """Everything that the trials showed. ``advised`` holds the ambiguous cases only, of ``asked`` trials."""
+
+    marks: tuple[Mark, ...]
+    advised: tuple[Advised, ...]
+    asked: int
+    seconds: float
+
+    @property
+    def rates(self) -> dict[str, Rate]:
+        """Every rate by its name."""
+        listed, unlisted = of(self.marks, "listed"), seen(of(self.marks, "unlisted"))
+        return {
+            "null: false alarms": rate(of(self.marks, "null"), lambda m: m.alarm),
+            **{f"listed, d = {d}: top-1": rate(at(listed, d), lambda m: m.first) for d in BINS},
+            **{f"listed, d = {d}: exact": rate(at(listed, d), lambda m: m.exact) for d in BINS},
+            **{
+                f"listed, {kind}: top-1": rate(seen(of_kind(listed, kind)), lambda m: m.first) for kind in kinds(listed)
+            },
+            "unlisted: detected": rate(unlisted, lambda m: m.verdict not in ("adequate", "failed")),
+            "unlisted: left unnamed": rate(unlisted, lambda m: m.verdict == "unnamed"),
+            **{
+                f"unlisted, {kind}: unnamed": rate(of_kind(unlisted, kind), lambda m: m.verdict == "unnamed")
+                for kind in kinds(unlisted)
+            },
+            "measurement: right side": rate(seen(of(self.marks, "measurement")), lambda m: m.right_side),
+            "pairs: both": rate(of(self.marks, "pairs"), lambda m: m.found == 2),
+            "pairs: at least one": rate(of(self.marks, "pairs"), lambda m: (m.found or 0) >= 1),
+            "all: wrong name": rate(self.marks, lambda m: m.wrong),
+            "held out: worse": rate(self.hiding, lambda m: m.worse),
+            "intervals: hold the truth": self.coverage,
+            "advice: resolved": Rate(sum(one.resolved for one in self.advised), len(self.advised)),
+            "advice: by a random recording": Rate(sum(one.by_chance for one in self.advised), len(self.advised)),
+            "plant finer than the model": rate(self.marks, lambda m: m.finer),
+        }
+
+    @property
+    def hiding(self) -> list[Mark]:
+        """Trials in which something was hidden."""
+        return [one for one in self.marks if one.truth]
+
+    @property
+    def coverage(self) -> Rate:
+        """Of all 90 % intervals whose truth is known."""
+        return Rate(sum(one.covered for one in self.marks), sum(one.intervals for one in self.marks))
+
+    @property
+    def failures(self) -> list[dict[str, Any]]:
+        """Every trial that went wrong, and how."""
+        told = [(one, what) for one in self.marks if (what := wrongs(one))]
+        wrong = [
+            {
+                "trial": one.trial,
+                "group": one.group,
+                "rig": one.rig,
+                "truth": list(one.truth),
+                "d": round(one.strength, 2),
+                "verdict": one.verdict,
+                "named": list(one.named),
+                "top": list(one.top),
+                "what": what,
+            }
+            for one, what in told
+        ]
+        return wrong + [
+            {**asdict(one), "group": "advice", "what": "advice did not settle it"}
+            for one in self.advised
+            if not one.resolved
+        ]
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures under their agreed keys."""
+        rates, marks = self.rates, self.marks
+        return {
+            "null": {"n": len(of(marks, "null")), "false_alarms": rates["null: false alarms"].hits},
+            "listed": {
+                "n": len(of(marks, "listed")),
+                "top1_percent_d2": rates["listed, d = 2: top-1"].percent,
+                "top1_percent_d5": rates["listed, d = 5: top-1"].percent,
+                "exact_percent_d2": rates["listed, d = 2: exact"].percent,
+            },
+            "unlisted": {
+                "n": rates["unlisted: detected"].n,
+                "detected_percent": rates["unlisted: detected"].percent,
+                "unnamed_percent": rates["unlisted: left unnamed"].percent,
+            },
+            "measurement": {
+                "n": rates["measurement: right side"].n,
+                "right_percent": rates["measurement: right side"].percent,
+            },
+            "wrong_name_percent": rates["all: wrong name"].percent,
+            "heldout_over_floor_median": median(m.held_out for m in self.hiding if m.group != "unlisted"),
+            "heldout_worse_percent": rates["held out: worse"].percent,
+            "coverage_percent": self.coverage.percent,
+            "place": {
+                "span_R": median(m.span for m in seen(self.hiding)),
+                "chord_c": median(m.chord for m in seen(self.hiding)),
+                "phase_deg": median(m.phase for m in seen(self.hiding)),
+            },
+            "pairs": {
+                "n": rates["pairs: both"].n,
+                "both_percent": rates["pairs: both"].percent,
+                "one_percent": rates["pairs: at least one"].percent,
+            },
+            "advice": {
+                "n": len(self.advised),
+                "resolved_percent": rates["advice: resolved"].percent,
+                "random_percent": rates["advice: by a random recording"].percent,
+            },
+            "failures": self.failures,
+            "seconds": round(self.seconds, 1),
+        }
+
+    def rows(self) -> dict[str, str]:
+        """The table for people: what is told, by its name."""
+        figures = self.as_json()
+        place = figures["place"]
+        return {
+            **{name: str(found) for name, found in self.rates.items() if found.n},
+            "held-out misfit over floor": f"median {figures['heldout_over_floor_median']}",
+            "place": f"medians {place['span_R']} R, {place['chord_c']} c, {place['phase_deg']} degrees",
+            f"too weak to count (d < {WEAK})": str(len(self.hiding) - len(seen(self.hiding))),
+            "advice: open at first": f"{len(self.advised)}; {self.asked} trials were made for it",
+            "failures": str(len(figures["failures"])),
+            "seconds of a trial": f"median {median(m.seconds for m in self.marks)}",
+        }
+
+
+def side_by_side(tables: Mapping[str, Table]) -> str:
+    """Tables of several methods in columns, under their names."""
+    columns = {name: table.rows() for name, table in tables.items()}
+    names = dict.fromkeys(row for column in columns.values() for row in column)
+    lines = [["", *columns], *([name, *(column.get(name, "") for column in columns.values())] for name in names)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    padded = [[f"{cell:{width}}" for cell, width in zip(line, widths, strict=True)] for line in lines]
+    return "\n".join("  ".join(line).rstrip() for line in padded)
+
+
+def wrongs(one: Mark) -> str:
+    """What is wrong with a trial, in words; "" where nothing is."""
+    if one.verdict == "failed":
+        return f"no finding: {one.remark}"
+    said = []
+    if not one.truth:
+        return "false alarm" if one.alarm else ""
+    if one.strength < WEAK:
+        said += ["wrong name"] * one.wrong
+        return "; ".join(said)
+    if one.group == "unlisted":
+        said += ["not detected"] * (one.verdict == "adequate")
+    elif one.group == "measurement":
+        said += ["wrong side"] * (not one.right_side)
+    elif one.group == "pairs":
+        said += ["not both"] * ((one.found or 0) < len(one.truth))
+    else:
+        said += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
+    said += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
+    return "; ".join(said)
+
+
+def kinds(marks: Sequence[Mark]) -> list[str]:
+    """What was hidden in any of them."""
+    return sorted({name for one in marks for name in one.truth})
+
+
+def of_kind(marks: Iterable[Mark], name: str) -> list[Mark]:
+    """Those in which ``name`` was hidden."""
+    return [one for one in marks if name in one.truth]
+
+
+def median(values: Iterable[float | None]) -> float | None:
+    """Of those that there are; None of none."""
+    told = [value for value in values if value is not None]
+    return round(float(np.median(told)), 4) if told else None

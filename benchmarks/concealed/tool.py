@@ -1,0 +1,51 @@
+"""The tool as a user runs it: a dataset on disk goes in, a finding comes out. Nothing here knows an answer."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from calibration.spec import CalibrationSpec
+from diagnosis import DiagnosisSpec, diagnose
+from diagnosis.finding import Finding
+from records import load_dataset
+from workers import make_evaluator
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a user asks: a dataset, the division of a wing's model, and the terms that a vehicle's model lacks."""
+
+    trial: str
+    dataset: Path
+    division: str
+    without: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of it; ``reason`` is why there is no finding, and "" where there is one."""
+
+    trial: str
+    finding: Finding | None
+    reason: str
+    seconds: float
+
+
+def run(task: Task) -> Outcome:
+    """Diagnose in this process."""
+    start, finding, reason = time.perf_counter(), None, ""
+    calibration = CalibrationSpec(without=task.without)
+    if task.division:
+        calibration = replace(calibration, division=task.division)
+    evaluator = make_evaluator("in_process")
+    try:
+        for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration), evaluator):
+            finding = progress.finding
+        reason = "" if finding else "it ended without a finding"
+    except Exception as error:  # a crash of the tool is a failed trial, and the other trials go on
+        finding, reason = None, f"{type(error).__name__}: {error}"
+    finally:
+        evaluator.close()
+    return Outcome(task.trial, finding, reason, time.perf_counter() - start)

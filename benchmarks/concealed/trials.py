@@ -1,0 +1,247 @@
+"""Which trials there are: what is hidden in which rig, how strongly, and under which conditions it is recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count, cycle, islice
+from typing import Literal
+
+import numpy as np
+
+from benchmarks.concealed.answer import GROUPS, Group
+from records import Condition
+
+TARGETS = (2.0, 3.0, 5.0)
+AIR_PA, ROOM_K = 101_325.0, 293.15
+LAGS = tuple(math.radians(degrees) for degrees in (0.0, 3.0, 7.0))
+FREQUENCIES = (2.0, 2.5, 3.0, 3.5, 4.0)
+THIN_PA, THICK_PA = 1_000.0, 100_000.0
+SPEEDS = (3.5, 5.0, 6.0, 7.5, 8.5)
+INCIDENCE = math.radians(4.0)
+
+# Body pitch and flap frequency of the DelFly by airspeed (Armanini et al. 2016, Table 4): V m/s, pitch deg, f Hz.
+FLIGHT = (
+    (0.30, 83, 13.3),
+    (0.50, 74, 12.5),
+    (0.55, 70, 12.5),
+    (0.65, 71, 12.5),
+    (0.70, 62, 11.7),
+    (0.80, 65, 13.3),
+    (1.00, 45, 11.7),
+    (2.00, 31, 10.3),
+)
+
+
+@dataclass(frozen=True)
+class Build:
+    """A rig: "wing" with the division of the tool's model and that of the plant, or "vehicle" (both are "").
+
+    ``without`` are terms that neither the vehicle's model nor its plant has, beside what is hidden.
+    """
+
+    rig: Literal["wing", "vehicle"]
+    division: str = ""
+    plant: str = ""
+    without: tuple[str, ...] = ()
+
+
+EQUAL, FINER = Build("wing", "4", "4"), Build("wing", "4", "8x1")
+ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
+WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
+FLING = "clap_and_peel"
+VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
+VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
+WINGS = (EQUAL, FINER, EQUAL, FINER, ELEVEN, FINER, EQUAL, FINER, EQUAL, ELEVEN_FINER)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial before it is made.
+
+    Attributes:
+        name: says nothing about what it holds.
+        group: what it is counted among.
+        build: of tool and plant.
+        hidden: names of what is hidden, as the plants call it; empty in a null trial.
+        target: strength d that is aimed at, of each effect that is hidden.
+        poor: whether its conditions are few and alike, so that much cannot be told apart.
+        seed: everything about it is drawn from this.
+    """
+
+    name: str
+    group: Group
+    build: Build
+    hidden: tuple[str, ...]
+    target: float
+    poor: bool
+    seed: int
+
+
+# What each rig's trials hide. Left out is what nothing can see beside noise of this size, and what no data of the kind
+# can tell from something else: docs/concealed.md.
+LISTED_WING = (
+    "hinge_offset",
+    "hinge_tilt",
+    "phase_lag_error",
+    "drive_harmonics",
+    "lumped_mass",
+    "damage",
+    "cubic_stiffness",
+    "added_mass",
+    "leading_edge_vortex",
+)
+LISTED_VEHICLE = ("clap_and_peel", "induced_inflow", "circulation_lag", "stroke_amplitude")
+UNLISTED_WING = ("band", "stop", "appendage", "glare")
+UNLISTED_VEHICLE = ("stop_knock", "tail_in_wake")
+FAULTS_WING = ("camera_shift", "lens_distortion", "marker_slip", "tracker_lag", "rolling_shutter", "scale_error")
+FAULTS_VEHICLE = ("balance_tilt", "balance_resonance", "filter_delay", "balance_offset")
+# Physics that looks like a fault of the measurement (docs/effects.md, "confused with").
+LOOKALIKES_WING = ("hinge_offset", "hinge_tilt", "phase_lag_error", "lumped_mass")
+LOOKALIKES_VEHICLE = ("circulation_lag", "induced_inflow")
+PAIRS_WING = (
+    ("hinge_offset", "lumped_mass"),
+    ("hinge_offset", "added_mass"),
+    ("phase_lag_error", "cubic_stiffness"),
+    ("drive_harmonics", "lumped_mass"),
+    ("camera_shift", "added_mass"),
+)
+PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "filter_delay"))
+# Hidden in few conditions that are alike, so that another explanation is as good.
+OPEN_WING = ("lumped_mass", "added_mass", "hinge_offset", "cubic_stiffness", "leading_edge_vortex")
+OPEN_VEHICLE = ("induced_inflow", "stroke_amplitude")
+
+COUNTS: dict[str, int] = {"null": 152, "listed": 15, "unlisted": 20, "measurement": 64, "pairs": 42, "advice": 30}
+QUICK: dict[str, int] = {"null": 10, "listed": 1, "unlisted": 1, "measurement": 6, "pairs": 4, "advice": 3}
+
+
+def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[Trial, ...]:
+    """All trials of a suite in an order, and under names, that tell nothing; the same seed plans the same ones."""
+    counts = QUICK if quick else COUNTS
+    drafts = [draft for group in GROUPS for draft in _group(group, counts[group])]
+    order = np.random.default_rng([seed, 1]).permutation(len(drafts))
+    named = [replace(drafts[k], name=f"trial-{n:04d}", seed=seed * 100_000 + n) for n, k in enumerate(order)]
+    return tuple(trial for trial in named if not only or trial.group in only)
+
+
+def _group(group: Group, n: int) -> Iterator[Trial]:
+    """Drafts of a group: ``n`` in all, or of each kind of the listed and the unlisted."""
+    if group == "null":
+        builds = (EQUAL, FINER, VEHICLE, FINER, ELEVEN, EQUAL, FINER, BARE, ELEVEN_FINER, FINER)
+        large = (WHOLE, WHOLE_FINER)[: n // 50]
+        yield from (_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large))))
+    elif group == "listed":
+        yield from _each(group, LISTED_WING, WINGS, n)
+        yield from _each(group, LISTED_VEHICLE, VEHICLES, n)
+        yield from (_draft(group, WHOLE, (name,), 3.0) for name in LISTED_WING[: n // 5])
+    elif group == "unlisted":
+        yield from _each(group, UNLISTED_WING, WINGS, n)
+        yield from _each(group, UNLISTED_VEHICLE, VEHICLES, n)
+    elif group == "measurement":
+        wing, vehicle = FAULTS_WING + LOOKALIKES_WING, FAULTS_VEHICLE + LOOKALIKES_VEHICLE
+        yield from _mixed(group, [(name,) for name in wing], [(name,) for name in vehicle], n)
+    elif group == "pairs":
+        yield from _mixed(group, PAIRS_WING, PAIRS_VEHICLE, n)
+    else:
+        found = _mixed(group, [(name,) for name in OPEN_WING], [(name,) for name in OPEN_VEHICLE], n)
+        yield from (replace(draft, poor=True, target=3.0) for draft in found)
+
+
+def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -> Iterator[Trial]:
+    """``n`` trials of each of ``names``, over all targets and builds."""
+    turn = count()
+    for name in names:
+        for k in range(n):
+            yield _draft(group, builds[next(turn) % len(builds)], (name,), TARGETS[k % len(TARGETS)])
+
+
+def _mixed(
+    group: Group, wing: Sequence[tuple[str, ...]], vehicle: Sequence[tuple[str, ...]], n: int
+) -> Iterator[Trial]:
+    """``n`` trials, the kinds in turn, of wings and of vehicles in proportion to their kinds."""
+    kinds = [(names, True) for names in wing] + [(names, False) for names in vehicle]
+    for k in range(n):
+        names, flexible = kinds[k % len(kinds)]
+        builds = WINGS if flexible else VEHICLES
+        build = builds[(k // len(kinds) + k) % len(builds)]
+        yield _draft(group, build, names, TARGETS[(k // len(kinds)) % len(TARGETS)])
+
+
+def _draft(group: Group, build: Build, hidden: tuple[str, ...] = (), target: float = 0.0) -> Trial:
+    return Trial("", group, BARE if FLING in hidden else build, hidden, target, False, 0)
+
+
+def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+    """Conditions of a trial's recordings, and whether each is held out."""
+    if trial.build.rig == "vehicle":
+        return _flights(trial, rng)
+    return _alike(rng) if trial.poor else _campaign(rng)
+
+
+def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+    """Three recordings in the chamber and two in the tunnel; held out are one of each, at another frequency or lag."""
+    slow, fast = rng.permutation(FREQUENCIES[:2])[0], rng.permutation(FREQUENCIES[3:])[0]
+    lags, speeds = rng.permutation(LAGS), np.sort(rng.permutation(SPEEDS)[:3])
+    middle = FREQUENCIES[2]
+    return [
+        (chamber(THIN_PA, lags[0], slow), False),
+        (chamber(THIN_PA, lags[1], fast), False),
+        (chamber(THICK_PA, lags[2], middle), False),
+        (tunnel(lags[1], middle, speeds[0]), False),
+        (tunnel(lags[0], fast, speeds[2]), False),
+        (chamber(THIN_PA, lags[2], middle), True),
+        (tunnel(lags[2], middle, speeds[1]), True),
+    ]
+
+
+def _alike(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+    """Two recordings at one frequency, pressure or airspeed, and a third like them that is held out."""
+    frequency, lags = float(rng.choice(FREQUENCIES[1:4])), rng.permutation(LAGS)
+    if rng.uniform() < 0.5:
+        pressure = float(rng.choice([THIN_PA, THICK_PA]))
+        return [(chamber(pressure, lag, frequency), k == 2) for k, lag in enumerate(lags)]
+    speed = float(rng.choice(SPEEDS))
+    return [(tunnel(lag, frequency, speed), k == 2) for k, lag in enumerate(lags)]
+
+
+def _flights(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+    order = rng.permutation(len(FLIGHT))
+    chosen = np.sort(order[:2]) if trial.poor else np.sort(order[:5])
+    held_out = order[2:3] if trial.poor else order[5:7]
+    return [(flight(k), False) for k in chosen] + [(flight(k), True) for k in held_out]
+
+
+def any_condition(trial: Trial, rng: np.random.Generator) -> Condition:
+    """A condition of the rig's, drawn at random."""
+    if trial.build.rig == "vehicle":
+        return flight(int(rng.integers(len(FLIGHT))))
+    lag, frequency = float(rng.choice(LAGS)), float(rng.choice(FREQUENCIES))
+    if rng.uniform() < 0.5:
+        return chamber(float(rng.choice([THIN_PA, 1e4, THICK_PA])), lag, frequency)
+    return tunnel(lag, frequency, float(rng.choice(SPEEDS)))
+
+
+def chamber(pressure: float, lag: float, frequency: float) -> Condition:
+    """In the vacuum chamber."""
+    return Condition(float(frequency), float(lag), pressure, ROOM_K)
+
+
+def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
+    """In the wind tunnel."""
+    return Condition(float(frequency), float(lag), AIR_PA, ROOM_K, float(airspeed), INCIDENCE)
+
+
+def flight(number: int) -> Condition:
+    """Of the DelFly."""
+    speed, pitch, frequency = FLIGHT[number]
+    return Condition(frequency, 0.0, AIR_PA, ROOM_K, speed, math.radians(pitch))
+
+
+def name_of(condition: Condition) -> str:
+    """Name of a recording, such as ``chamber-0010mbar-lag3-2.5hz``."""
+    end = f"{condition.flap_frequency:.2f}hz"
+    if condition.airspeed > 0:
+        pitch = math.degrees(condition.angle_of_attack)
+        return f"stream-{condition.airspeed:.2f}ms-{pitch:.0f}deg-lag{math.degrees(condition.phase_lag):.0f}-{end}"
+    return f"chamber-{condition.pressure / 100:04.0f}mbar-lag{math.degrees(condition.phase_lag):.0f}-{end}"
