@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,18 +30,25 @@ def rivals(weighed: Weighed) -> list[Refit]:
     return [weighed.refits[k] for k in (alive if len(alive) > 1 else order[:2])[:RIVALS]]
 
 
-def advised(subject: Subject, stack: Stack, weighed: Weighed, evaluator: Evaluator) -> tuple[Advice, ...]:
-    """Conditions to record next, best first; empty where no two explanations are left or no other can be run."""
-    alive = rivals(weighed)
+def separations(
+    subject: Subject, stack: Stack, weighed: Weighed, evaluator: Evaluator
+) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
+    """How far explanations would lie apart under each condition that might be recorded, with the part that is done.
+
+    Nothing where no two explanations are left or no other condition can be run; None for one that cannot be simulated.
+    """
+    alive, able = rivals(weighed), subject.conditions()
     if len(alive) < 2:
-        return ()
-    found = []
-    for condition in subject.conditions():
+        return
+    for k, condition in enumerate(able):
         apart = _apart(subject, stack, alive, condition, evaluator)
-        if apart is not None:
-            found.append((apart, condition))
-    found.sort(key=lambda pair: -pair[0])
-    return tuple(_advice(stack, weighed, alive, apart, condition) for apart, condition in found[:TOLD])
+        yield (k + 1) / len(able), None if apart is None else (apart, condition)
+
+
+def advised(stack: Stack, weighed: Weighed, apart: Sequence[tuple[float, Condition]]) -> tuple[Advice, ...]:
+    """Conditions to record next, best first, from :func:`separations`."""
+    best, alive = sorted(apart, key=lambda pair: -pair[0])[:TOLD], rivals(weighed)
+    return tuple(_advice(stack, weighed, alive, size, condition) for size, condition in best)
 
 
 def _apart(

@@ -88,7 +88,7 @@ def beatwise(recording: Recording, compared: npt.NDArray[np.bool_] | None = None
     spectrum, scale = _spectrum(left, seen & used, advance, place, kept, beats)
     count = seen.sum(axis=0)
     density = np.array([spectrum[k] for k in order])
-    freedom = np.maximum(count - (~trend).sum(), 1)
+    taken = scale * density[~trend].sum()  # by the fit of the mean beat
     return Beatwise(
         order,
         trend,
@@ -96,7 +96,7 @@ def beatwise(recording: Recording, compared: npt.NDArray[np.bool_] | None = None
         inverse,
         used,
         spread * scale[:, None] * density,
-        np.sqrt(np.maximum((left**2).sum(axis=0) / freedom, 0.0)),
+        np.sqrt(((left**2).sum(axis=0) + taken) / np.maximum(count, 1)),
         _memory(left, seen & used),
         count,
         beats >= 2,

@@ -1,165 +1,212 @@
-"""From weighed hypotheses to a finding: verdict, words, genes."""
+"""From an assessment to a finding: what was decided, where, how sure, the proof, and what to record next."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
-from diagnosis.decide import ALIKE, SURE, Weighed
-from diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
-from diagnosis.intervals import gene_values
+from calibration.evaluator import Evaluator
+from calibration.problem import Problem
+from diagnosis import maps
+from diagnosis.advise import advised, separations
+from diagnosis.assess import Assessment
+from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
+from diagnosis.proof import Predicted, predicted, proof, recording_misfits
 from diagnosis.refit import Refit
-from diagnosis.screen import Trial
 from diagnosis.stack import Stack
-from diagnosis.subject import Suspect
+from diagnosis.unexplained import Unexplained, missing_forces, probed_recordings, unexplained
+from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
+from diagnosis.where import where
+from records import Recording
+from sim.effects.probe import Probe
 
-LISTED = 12  # suspects that were not refitted and are told all the same
-
-
-@dataclass(frozen=True)
-class Decision:
-    """The verdict, probabilities of all verdicts, the effects it names, and the best refit."""
-
-    verdict: Verdict
-    probabilities: dict[str, float]
-    named: tuple[str, ...]
-    alike: tuple[tuple[str, ...], ...]
-    best: Refit
+Array = npt.NDArray[np.float64]
+Step = tuple[float, str, Finding | None]
 
 
-def decided(weighed: Weighed) -> Decision:
-    """Which verdict the probabilities of the hypotheses make."""
-    nominal, effects = float(weighed.probabilities[0]), weighed.probabilities[1:]
-    refits = weighed.refits[1:]
-    probability: dict[str, float] = dict.fromkeys(VERDICTS, 0.0)
-    probability["adequate"], probability["unnamed"] = nominal, weighed.unknown
-    total = float(effects.sum())
-    possible: list[Refit] = []
-    best = weighed.refits[0]
-    if len(effects):
-        top = int(np.argmax(effects))
-        possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= ALIKE * max(total, 1e-300)]
-        one: Verdict = "measurement fault" if _measured(refits[top]) else "named"
-        if effects[top] >= SURE * total:
-            probability[one] = float(effects[top])
-            probability["ambiguous"] = total - float(effects[top])
-        else:
-            probability["ambiguous"] = total
-    if total > max(nominal, weighed.unknown):
-        sure = effects[top] >= SURE * total
-        verdict: Verdict = one if sure else "ambiguous"
-        best = refits[top]
-    else:
-        verdict = "adequate" if nominal >= weighed.unknown else "unnamed"
-        if verdict == "unnamed" and len(effects):
-            best = refits[top]
-    alike = tuple(refit.names for refit in possible) if len(possible) > 1 else ()
-    if verdict == "ambiguous":
-        named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
-    else:
-        named = best.names if verdict in ("named", "measurement fault") else ()
-    return Decision(verdict, probability, named, alike, best)
+def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evaluator: Evaluator) -> Iterator[Step]:
+    """Make the finding of an assessment that has ended; yields the part of the work done and what comes next."""
+    if state.nominal is None or state.weighed is None:
+        raise ValueError("a finding needs an assessment that has ended")
+    decision = decided(state.weighed)
+    best = state.nominal.refit if decision.verdict == "adequate" else decision.best
+    yield 0.92, "predicting the held-out recordings", None
+    seen = None
+    if held_out:
+        seen = predicted(Stack.of(held_out, state.stack.axes), evaluator, state.nominal.refit.fit, best.fit)
+    lacking = Unexplained()
+    if decision.verdict in ("named", "ambiguous", "unnamed"):
+        for fraction, stage, told in _lacking(state, law=decision.verdict == "unnamed"):
+            lacking = told
+            yield 0.93 + 0.03 * fraction, stage, None
+    advice: tuple[Advice, ...] = ()
+    if decision.verdict != "adequate":
+        apart = []
+        for part, one in separations(state.subject, state.stack, state.weighed, evaluator):
+            apart += [one] if one else []
+            yield 0.96 + 0.03 * part, "comparing conditions to record next", None
+        advice = advised(state.stack, state.weighed, apart)
+    found = _finding(
+        state, name, decision, best, seen, lacking, advice, _where(state, decision, best, lacking, evaluator)
+    )
+    yield 1.0, "done", found
 
 
-def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:
-    """All that was weighed, most probable first, then what was only tested, by score."""
-    start = weighed.left[0]
-    order = np.argsort(-weighed.probabilities, kind="stable")
-    gains = {one[0].suspect.name: one[0] for one in trials if one}
-    told = [_weighed(stack, weighed, int(k), start, gains) for k in order]
-    known = {refit.names for refit in weighed.refits}
-    rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
-    whole = max(_chi_squared(weighed.refits[0], stack), 1e-300)
-    return (*told, *(_tested(trial, whole, start, stack) for trial in rest[:LISTED]))
+def _lacking(state: Assessment, *, law: bool) -> Iterator[tuple[float, str, Unexplained]]:
+    """The missing load, recording by recording."""
+    nominal = _nominal(state)
+    if state.stack.recordings[0].kind == "forces":
+        yield 1.0, "locating the missing force", Unexplained(missing_forces(state.subject, state.stack, nominal))
+        return
+    probe, found = Probe(), []
+    for k, (r, one) in enumerate(probed_recordings(state.subject, state.stack, nominal, probe)):
+        if one is None:
+            continue
+        found.append((r, one))
+        yield k / 8.0, f"probing the wing under {state.stack.recordings[r].name}", Unexplained()
+    yield 1.0, "locating the missing load", unexplained(state.stack, nominal, found, probe, law=law)
 
 
-def _chi_squared(refit: Refit, stack: Stack) -> float:
-    white = refit.fit.coefficients / stack.scale
-    return float(white @ white) - len(white)
+def _nominal(state: Assessment) -> Refit:
+    if state.nominal is None:
+        raise ValueError("the nominal model has not been fitted")
+    return state.nominal.refit
 
 
-def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mapping[str, Trial]) -> Hypothesis:
-    refit = weighed.refits[k]
-    suspects = [trial.suspect for trial in refit.trials]
-    unit = stack.noise**2
-    first = start if start > 0 else 1.0
-    predicted = None
-    if refit.predicted is not None and weighed.refits[0].predicted is not None:
-        before = max(weighed.refits[0].predicted / unit, 1e-12)
-        predicted = 1.0 - max(refit.predicted / unit, 0.0) / before if k else 0.0
-    return Hypothesis(
-        effects=refit.names,
-        title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
-        family=suspects[0].family if suspects else "",
-        source="; ".join(s.source for s in suspects),
-        signature="; ".join(s.signature for s in suspects),
-        probability=float(weighed.probabilities[k]),
-        evidence=float(weighed.evidence[k]),
-        score=sum(gains[s.name].gain for s in suspects if s.name in gains),
-        freedom=refit.freedom,
-        explained=float(np.clip(1.0 - weighed.left[k] / first, -1.0, 1.0)) if k else 0.0,
-        predicted=None if predicted is None else float(np.clip(predicted, -1.0, 1.0)),
-        misfit=float(np.sqrt(max(refit.excess, 0.0) + stack.noise**2)),
-        refitted=True,
-        genes=effect_genes(stack, refit),
+def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplained, evaluator: Evaluator) -> Where:
+    """Where the misfit lies; of an effect that is named, where this acts: the fit smears a misfit over the beat."""
+    coefficients = _nominal(state).fit.coefficients
+    if decision.verdict in ("named", "measurement fault"):
+        action = _action(state, best, evaluator)
+        coefficients = coefficients if action is None else action
+    found = where(state.stack, maps.pieces(state.subject, state.stack, coefficients), coefficients)
+    return Where(
+        found.words,
+        _placed(best, "span") or lacking.span or found.span,
+        _placed(best, "chord") or found.chord,
+        lacking.phase if lacking.phase and decision.verdict != "measurement fault" else found.phase,
+        found.axis,
+        found.harmonics,
+        found.exponents,
     )
 
 
-def _tested(trial: Trial, whole: float, start: float, stack: Stack) -> Hypothesis:
-    suspect = trial.suspect
-    explained = float(np.clip(trial.gain / whole, 0.0, 1.0)) if whole > 0 else 0.0
-    left = max(start * (1.0 - explained), 0.0)
-    return Hypothesis(
-        (suspect.name,),
-        suspect.title,
-        suspect.family,
-        suspect.source,
-        suspect.signature,
-        0.0,
-        0.0,
-        trial.gain,
-        trial.freedom,
-        explained,
-        None,
-        float(stack.noise * np.sqrt(1.0 + left)),
-        False,
+def _placed(best: Refit, along: str) -> Interval | None:
+    """Where the effect itself says that it acts; None where it has no place."""
+    for trial in best.trials:
+        gene = {str(k): v for k, v in trial.suspect.places.items()}.get(along)
+        if gene is not None:
+            value = best.fit.values[gene]
+            return Interval(value, None, None)
+    return None
+
+
+def _action(state: Assessment, best: Refit, evaluator: Evaluator) -> Array | None:
+    """What switching the effects off changes of the coefficients [D], all other genes as they are."""
+    fit, off = best.fit, dict(best.fit.values)
+    for trial in best.trials:
+        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.sizes}
+    problem = Problem(fit.problem.model, state.stack.recordings, fit.problem.free, fit.problem.base, state.stack.axes)
+    found, reasons, _ = state.stack.evaluate(problem, evaluator, np.array([list(off.values())]))
+    return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
+
+
+def _finding(
+    state: Assessment,
+    name: str,
+    decision: Decision,
+    best: Refit,
+    seen: Predicted | None,
+    lacking: Unexplained,
+    advice: tuple[Advice, ...],
+    lies: Where,
+) -> Finding:
+    subject, stack, weighed = state.subject, state.stack, state.weighed
+    if state.nominal is None or weighed is None:
+        raise ValueError("a finding needs an assessment that has ended")
+    nominal, division = state.nominal.refit, _division(state)
+    own = Predicted(stack, nominal.fit.residuals, best.fit.residuals)
+    rows = recording_misfits(own, held_out=False, floor=division)
+    shown = list(maps.overlays(subject, stack, own.before, own.after, held_out=False))
+    kind = stack.recordings[0].kind
+    unit: Literal["m", "N"] = "m" if kind == "tracks" else "N"
+    proved = None
+    if seen is not None:
+        rows += recording_misfits(seen, held_out=True, floor=division)
+        proved = proof(seen, division, unit)
+        if not seen.failed:
+            shown += maps.overlays(subject, seen.stack, seen.before, seen.after, held_out=True)
+    before, after = (maps.pieces(subject, stack, one.fit.coefficients) for one in (nominal, best))
+    suspects = {suspect.name: suspect for suspect in subject.suspects}
+    return Finding(
+        dataset=name,
+        kind=kind,
+        unit=unit,
+        model=subject.told,
+        verdict=decision.verdict,
+        summary=summary(decision, suspects, _told(stack, nominal, best, lies.words, proved)),
+        probabilities=decision.probabilities,
+        named=decision.named,
+        strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / stack.noise**2)),
+        floors=_floors(state, division),
+        hypotheses=hypotheses(stack, weighed, state.trials),
+        alike=decision.alike,
+        where=lies,
+        markers=maps.markers(before, after),
+        phase_map=maps.phase_map(before, after),
+        missing=lacking.loads,
+        recordings=rows,
+        proof=proved,
+        overlays=tuple(shown),
+        genes=all_genes(stack, best),
+        law=lacking.law,
+        advice=advice,
+        outline=subject.outline,
+        remarks=(*state.nominal.remarks, *_doubts(stack)),
     )
 
 
-def effect_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
-    """Genes of the suspects of a refit."""
-    own = {gene.name for trial in refit.trials for gene in trial.suspect.genes}
-    return tuple(gene for gene in all_genes(stack, refit) if gene.name in own)
+def _division(state: Assessment) -> float:
+    """Misfit that the model's division leaves: what a finer one says, but no more than the best explanation leaves."""
+    if state.nominal is None or state.weighed is None or state.nominal.division is None:
+        return 0.0
+    least = min(one.excess for one in state.weighed.refits)
+    return min(state.nominal.division, float(np.sqrt(max(least, 0.0))))
 
 
-def all_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
-    """All free genes of a refit."""
-    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.sizes}
-    return gene_values(stack, refit.fit, off)
+def _floors(state: Assessment, division: float) -> Floors:
+    stack, nominal = state.stack, state.nominal
+    if nominal is None:
+        raise ValueError("the nominal model has not been fitted")
+    memory = float(np.median([view.memory for view in stack.views]))
+    total = float(np.sqrt(stack.noise**2 + division**2 + stack.tolerance**2))
+    return Floors(stack.noise, memory, nominal.division, nominal.finer, stack.tolerance, total)
 
 
-def _measured(refit: Refit) -> bool:
-    return bool(refit.trials) and all(trial.suspect.family == "measurement" for trial in refit.trials)
+def _told(stack: Stack, nominal: Refit, best: Refit, place: str, proved: Proof | None) -> Mapping[str, str]:
+    """What the summary is made of, in words."""
+    unit = "mm" if stack.recordings[0].kind == "tracks" else "mN"
+
+    def size(excess: float) -> str:
+        return f"{1e3 * np.sqrt(stack.noise**2 + max(excess, 0.0)):.3g} {unit}"
+
+    return {
+        "before": size(nominal.excess),
+        "after": size(best.excess),
+        "noise": f"{1e3 * stack.noise:.3g} {unit}",
+        "where": place,
+        "held_out": f"On {proved.words}." if proved else "No recording is held out, so that nothing proves it.",
+    }
 
 
-def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
-    """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
-    names = " and ".join(suspects[name].title.lower() for name in decision.named if name in suspects)
-    start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
-    if decision.verdict == "adequate":
-        return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
-    if decision.verdict == "unnamed":
-        return (
-            f"Something is lacking that nothing in the library explains: {told['where']}. {start} "
-            f"The nearest effect, {' and '.join(decision.best.names) or 'none'}, leaves {told['after']}."
-        )
-    if decision.verdict == "ambiguous":
-        return (
-            f"Something is lacking, and these recordings cannot tell which: {names}. {start} The best leaves "
-            f"{told['after']}. {told['held_out']}"
-        )
-    kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
-    link = ": " if decision.verdict == "measurement fault" else " "
-    return f"{kind}{link}{names}. {start} With it the misfit is {told['after']}. {told['held_out']}"
+def _doubts(stack: Stack) -> tuple[str, ...]:
+    untold = [r.name for r, v in zip(stack.recordings, stack.views, strict=True) if not v.told]
+    if not untold:
+        return ()
+    return (
+        f"{', '.join(untold)}: less than two beats in the order of the frames, so that noise is known only from what "
+        "no harmonic of the beat explains; slow noise may pass for misfit",
+    )

@@ -141,7 +141,7 @@ def overlays(
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:
         recording = stack.recordings[r]
-        square = np.nan_to_num(np.nanmean(np.where(stack.views[r].used, (before[r] - after[r]) ** 2, np.nan), axis=0))
+        square = np.where(stack.views[r].used, np.nan_to_num((before[r] - after[r]) ** 2).sum(axis=0), 0.0)
         channel = int(np.argmax(square))
         seen = np.isfinite(before[r][:, channel])
         psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen] - subject.origin(recording)

@@ -21,10 +21,12 @@ from sim.blade_element_wing import BladeElementWing
 from sim.blades.terms import PRESETS
 from sim.division import Division
 from sim.effects.contract import Effect
+from sim.effects.probe import Probe
 from sim.effects.registry import EFFECTS
 from sim.flexible_wing import FlexibleWing
 from sim.model import Model
 from sim.planform import Planform
+from sim.probing import Probed, probed
 
 Array = npt.NDArray[np.float64]
 
@@ -116,6 +118,13 @@ class WingSubject:
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
+    def probed(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+        """Tracks of the wing under known loads; None where it cannot be simulated so."""
+        try:
+            return probed(self.model, genome, recording, probe)
+        except ValueError:
+            return None
+
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions that the rig can run and that one might record next."""
         return _conditions(self.dataset)
@@ -186,6 +195,9 @@ class VehicleSubject:
         blank = _blank(self.dataset, condition, forces=("x", "z"))
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+
+    def probed(self, genome: Array, recording: Recording, probe: Probe) -> None:
+        """None: what forces lack is seen as it is."""
 
     def conditions(self) -> tuple[Condition, ...]:
         """Conditions that the rig can run and that one might record next."""

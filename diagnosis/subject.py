@@ -13,7 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Condition, Gene, Recording
+from sim.effects.probe import Probe
 from sim.model import Model
+from sim.probing import Probed
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
@@ -112,6 +114,10 @@ class Subject(Protocol):
 
     def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
         """What ``model`` with ``genome`` [G] shows under ``condition``, recorded as the rig does; None if it fails."""
+        ...
+
+    def probed(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+        """What the nominal model with ``genome`` [G] answers to known loads; None for a rig that cannot be probed."""
         ...
 
     def conditions(self) -> tuple[Condition, ...]:

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from diagnosis.subject import Family, Place, Suspect
 from records import Condition, Gene, Recording
+from sim.effects.probe import Probe
 from sim.model import Array, Model, Observation, genome_batch
 
 REACH = 0.25  # m, from the axis to the end of the arm
@@ -271,6 +272,9 @@ class PendulumRig:
         empty = blank(condition)
         seen = model.observe(genome[None], empty)
         return None if seen.reasons[0] else replace(empty, values=seen.channels[0])
+
+    def probed(self, genome: Array, recording: Recording, probe: Probe) -> None:
+        """None: it has no span."""
 
     def conditions(self) -> tuple[Condition, ...]:
         """From the lowest frequency to the highest, between those that are recorded."""

@@ -1,0 +1,165 @@
+"""From weighed hypotheses to a verdict, in words and with genes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.decide import ALIKE, SURE, Weighed
+from diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
+from diagnosis.intervals import gene_values
+from diagnosis.refit import Refit
+from diagnosis.screen import Trial
+from diagnosis.stack import Stack
+from diagnosis.subject import Suspect
+
+LISTED = 12  # suspects that were not refitted and are told all the same
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The verdict, probabilities of all verdicts, the effects it names, and the best refit."""
+
+    verdict: Verdict
+    probabilities: dict[str, float]
+    named: tuple[str, ...]
+    alike: tuple[tuple[str, ...], ...]
+    best: Refit
+
+
+def decided(weighed: Weighed) -> Decision:
+    """Which verdict the probabilities of the hypotheses make."""
+    nominal, effects = float(weighed.probabilities[0]), weighed.probabilities[1:]
+    refits = weighed.refits[1:]
+    probability: dict[str, float] = dict.fromkeys(VERDICTS, 0.0)
+    probability["adequate"], probability["unnamed"] = nominal, weighed.unknown
+    total = float(effects.sum())
+    possible: list[Refit] = []
+    best = weighed.refits[0]
+    if len(effects):
+        top = int(np.argmax(effects))
+        possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= ALIKE * max(total, 1e-300)]
+        one: Verdict = "measurement fault" if _measured(refits[top]) else "named"
+        if effects[top] >= SURE * total:
+            probability[one] = float(effects[top])
+            probability["ambiguous"] = total - float(effects[top])
+        else:
+            probability["ambiguous"] = total
+    if total > max(nominal, weighed.unknown):
+        sure = effects[top] >= SURE * total
+        verdict: Verdict = one if sure else "ambiguous"
+        best = refits[top]
+    else:
+        verdict = "adequate" if nominal >= weighed.unknown else "unnamed"
+        if verdict == "unnamed" and len(effects):
+            best = refits[top]
+    alike = tuple(refit.names for refit in possible) if len(possible) > 1 else ()
+    if verdict == "ambiguous":
+        named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
+    else:
+        named = best.names if verdict in ("named", "measurement fault") else ()
+    return Decision(verdict, probability, named, alike, best)
+
+
+def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:
+    """All that was weighed, most probable first, then what was only tested, by score."""
+    start = weighed.left[0]
+    order = np.argsort(-weighed.probabilities, kind="stable")
+    gains = {one[0].suspect.name: one[0] for one in trials if one}
+    told = [_weighed(stack, weighed, int(k), start, gains) for k in order]
+    known = {refit.names for refit in weighed.refits}
+    rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
+    whole = max(_chi_squared(weighed.refits[0], stack), 1e-300)
+    return (*told, *(_tested(trial, whole, start, stack) for trial in rest[:LISTED]))
+
+
+def _chi_squared(refit: Refit, stack: Stack) -> float:
+    white = refit.fit.coefficients / stack.scale
+    return float(white @ white) - len(white)
+
+
+def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mapping[str, Trial]) -> Hypothesis:
+    refit = weighed.refits[k]
+    suspects = [trial.suspect for trial in refit.trials]
+    unit = stack.noise**2
+    first = start if start > 0 else 1.0
+    predicted = None
+    if refit.predicted is not None and weighed.refits[0].predicted is not None:
+        before = max(weighed.refits[0].predicted / unit, 1e-12)
+        predicted = 1.0 - max(refit.predicted / unit, 0.0) / before if k else 0.0
+    return Hypothesis(
+        effects=refit.names,
+        title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
+        family=suspects[0].family if suspects else "",
+        source="; ".join(s.source for s in suspects),
+        signature="; ".join(s.signature for s in suspects),
+        probability=float(weighed.probabilities[k]),
+        evidence=float(weighed.evidence[k]),
+        score=sum(gains[s.name].gain for s in suspects if s.name in gains),
+        freedom=refit.freedom,
+        explained=float(np.clip(1.0 - weighed.left[k] / first, -1.0, 1.0)) if k else 0.0,
+        predicted=None if predicted is None else float(np.clip(predicted, -1.0, 1.0)),
+        misfit=float(np.sqrt(max(refit.excess, 0.0) + stack.noise**2)),
+        refitted=True,
+        genes=effect_genes(stack, refit),
+    )
+
+
+def _tested(trial: Trial, whole: float, start: float, stack: Stack) -> Hypothesis:
+    suspect = trial.suspect
+    explained = float(np.clip(trial.gain / whole, 0.0, 1.0)) if whole > 0 else 0.0
+    left = max(start * (1.0 - explained), 0.0)
+    return Hypothesis(
+        (suspect.name,),
+        suspect.title,
+        suspect.family,
+        suspect.source,
+        suspect.signature,
+        0.0,
+        0.0,
+        trial.gain,
+        trial.freedom,
+        explained,
+        None,
+        float(stack.noise * np.sqrt(1.0 + left)),
+        False,
+    )
+
+
+def effect_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+    """Genes of the suspects of a refit."""
+    own = {gene.name for trial in refit.trials for gene in trial.suspect.genes}
+    return tuple(gene for gene in all_genes(stack, refit) if gene.name in own)
+
+
+def all_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+    """All free genes of a refit."""
+    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.sizes}
+    return gene_values(stack, refit.fit, off)
+
+
+def _measured(refit: Refit) -> bool:
+    return bool(refit.trials) and all(trial.suspect.family == "measurement" for trial in refit.trials)
+
+
+def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
+    """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
+    names = " and ".join(suspects[name].title.lower() for name in decision.named if name in suspects)
+    start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
+    if decision.verdict == "adequate":
+        return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
+    if decision.verdict == "unnamed":
+        return (
+            f"Something is lacking that nothing in the library explains: {told['where']}. {start} "
+            f"The nearest effect, {' and '.join(decision.best.names) or 'none'}, leaves {told['after']}."
+        )
+    if decision.verdict == "ambiguous":
+        return (
+            f"Something is lacking, and these recordings cannot tell which: {names}. {start} The best leaves "
+            f"{told['after']}. {told['held_out']}"
+        )
+    kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
+    link = ": " if decision.verdict == "measurement fault" else " "
+    return f"{kind}{link}{names}. {start} With it the misfit is {told['after']}. {told['held_out']}"
