@@ -11,7 +11,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, tolerated, weighed
-from diagnosis.nominal import LIMIT, MATTERS, Nominal, first_fit, improves, settled
+from diagnosis.nominal import Nominal, first_fit, improves, matters, settled
 from diagnosis.refit import Refit, again, pairs, partners, refitted, worth_a_refit
 from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
@@ -88,16 +88,14 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
 
     Beside a large effect a division's own misfit does not show before the effect is in the model.
     """
-    stack, finer = state.stack, nominal.subject.finer()
+    stack = state.stack
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
-    coarse = finer is None or nominal.division is None or nominal.division < MATTERS * stack.noise
-    if coarse or finer is None or best.excess < (LIMIT * stack.noise) ** 2:
+    if best is nominal.refit or nominal.division is None or not matters(stack, nominal.division, best):
         return
-    better = again(finer, stack, evaluator, best)
-    if better is None or not improves(better, best):
-        return
-    first = again(finer, stack, evaluator, nominal.refit)
-    if first is None:
+    found = ((finer, again(finer, stack, evaluator, best)) for finer in nominal.subject.finer())
+    finer, better = next(((f, r) for f, r in found if r is not None and improves(r, best)), (nominal.subject, None))
+    first = None if better is None else again(finer, stack, evaluator, nominal.refit)
+    if better is None or first is None:
         return
     others = [better if one is best else again(finer, stack, evaluator, one) for one in state.refits]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"

@@ -34,6 +34,7 @@ GENE = 2.0  # price of a gene in units of the logarithm of the evidence
 EFFECT = 3.0  # the same for a second effect at once, and each further one
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
+SLACK = 2.0  # standard errors of a mean square beyond the noise, which noise alone may make
 PREDICTED = 0.25  # of the weight, for recordings left out
 SURE = 0.75  # probability from which a single explanation is named
 ALIKE = 0.05  # probability from which another explanation is said to be possible
@@ -70,7 +71,7 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float)
 
 def tolerated(stack: Stack, excess: float, floor: float) -> float:
     """Mean square (m^2 or N^2) that a right explanation may leave of the nominal model's ``excess``."""
-    return (ADEQUATE * stack.noise) ** 2 + floor**2 + FORM**2 * max(excess, 0.0)
+    return (ADEQUATE * stack.noise) ** 2 + floor**2 + FORM**2 * max(excess, 0.0) + SLACK * stack.uncertainty
 
 
 def _misfit(refit: Refit) -> float:

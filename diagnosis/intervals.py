@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm
+from scipy.stats import t as student
 
 from calibration.linearised import free_genes
 from diagnosis.finding import GeneValue, Interval
@@ -31,16 +31,24 @@ def covariance(stack: Stack, fit: Fit) -> Array:
     scores -= scores.mean(axis=0)
     recordings = len(scores)
     systematic = max(0.0, 1.0 - len(white) / float(white @ white))
+    if _clustered(stack):
+        systematic = 1.0
     meat = information + np.eye(len(fit.unit)) / PRIOR**2
     if recordings > 1:
         meat = meat + systematic * recordings / (recordings - 1.0) * scores.T @ scores
     return np.asarray(bread @ meat @ bread)
 
 
+def _clustered(stack: Stack) -> bool:
+    """Whether recordings are the only independent pieces: beats of a force differ in size with all their harmonics."""
+    return any(recording.kind == "forces" for recording in stack.recordings)
+
+
 def gene_values(stack: Stack, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
     """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
     errors = np.sqrt(np.diag(covariance(stack, fit)))
-    reach = float(norm.ppf(0.5 + CONFIDENCE / 2))
+    freedom = max(len(stack.recordings) - 1, 1) if _clustered(stack) else np.inf
+    reach = float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
     off = sizes or {}
     found = []
     for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):

@@ -20,9 +20,10 @@ from diagnosis.subject import Subject
 Array = npt.NDArray[np.float64]
 
 STEPS = 20
+ROUNDS = 3  # of refinement
 MATTERS = 0.25  # of the noise: a division that leaves less is fine enough
 BETTER = 0.25  # of the excess that a finer division must take away to be worth its cost
-LIMIT = 0.15  # of the noise: a misfit below needs no finer division
+LIMIT = 0.3  # of the noise: a misfit below needs no finer division
 
 
 @dataclass(frozen=True)
@@ -63,22 +64,36 @@ def first_fit(
 def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, refine: bool) -> Nominal:
     """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
     now, remarks = judged(stack, fit), list[str]()
-    while True:
-        finer = subject.finer()
-        if finer is None:
-            return Nominal(subject, now, None, "", tuple(remarks))
-        left = _leaves(finer, stack, evaluator, now.fit)
-        excess = max(now.excess, 0.0)
-        if left is None or not refine or left < MATTERS * stack.noise or excess < (LIMIT * stack.noise) ** 2:
-            return Nominal(subject, now, left, finer.told, tuple(remarks))
-        better = again(finer, stack, evaluator, now)
-        if better is None or not improves(better, now):
-            return Nominal(subject, now, left, finer.told, tuple(remarks))
+    for _ in range(ROUNDS):
+        left, finest, better = 0.0, "", None
+        for finer in subject.finer():
+            changes = _leaves(finer, stack, evaluator, now.fit)
+            if changes is None or changes <= left:
+                continue
+            left, finest = changes, finer.told
+            if refine and matters(stack, changes, now):
+                better = _better(finer, stack, evaluator, now)
+            if better is not None:
+                break
+        if better is None:
+            return Nominal(subject, now, left if finest else None, finest, tuple(remarks))
         remarks.append(
-            f"the division limits the model: {finer.told} leaves {_percent(better.excess, now.excess)} of the excess "
+            f"the division limits the model: {finest} leaves {_percent(better.excess, now.excess)} of the excess "
             f"misfit that {subject.told} leaves, and was taken instead"
         )
         subject, now = finer, better
+    return Nominal(subject, now, None, "", tuple(remarks))
+
+
+def matters(stack: Stack, changes: float, now: Refit) -> bool:
+    """Whether a division that makes such a difference (m or N) may be what limits a fit."""
+    return changes >= MATTERS * stack.noise and now.excess >= (LIMIT * stack.noise) ** 2
+
+
+def _better(finer: Subject, stack: Stack, evaluator: Evaluator, now: Refit) -> Refit | None:
+    """``now`` fitted with the finer model; None where that is not worth its cost."""
+    found = again(finer, stack, evaluator, now)
+    return found if found is not None and improves(found, now) else None
 
 
 def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> float | None:

@@ -86,18 +86,22 @@ class WingSubject:
         own = len(self.model.genes) - sum(len(effect.parameters) for effect in self.model.chosen)
         return replace(model, near=tuple(genome[:own].tolist())) if isinstance(model, FlexibleWing) else model
 
-    def finer(self) -> WingSubject | None:
-        """Two strips more, and along the chord the next even number of bodies; None beyond MOST_BODIES.
+    def finer(self) -> tuple[WingSubject, ...]:
+        """More strips with as many bodies along the chord; then more strips with the next even number of these.
 
-        Both at once: strips alone would not show the bending along the chord that a division leaves out, and that is
-        most of its error (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm).
-        Even, since an odd number is worse than one fewer: of 18 bodies, 3 along the chord, 3 to 5 mm.
+        Strips alone do not show the bending along the chord that a division leaves out, and that is most of the error
+        of a coarse one (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm). Yet it is
+        the strips where the chord does not bend. Even, since an odd number is worse than one fewer: of 18 bodies, 3
+        along the chord, 3 to 5 mm. None beyond MOST_BODIES.
         """
         bodies = Division.parse(self.model.division).bodies
-        strips, chordwise = len(bodies) + 2, max(bodies) // 2 * 2 + 2
-        if strips * chordwise > MOST_BODIES:
-            return None
-        return replace(self, model=replace(self.model, division=f"{strips}x{chordwise}"))
+        chordwise, strips = max(bodies), len(bodies) + 2
+        finer = [(2 * len(bodies) if chordwise == 1 else strips, chordwise), (strips, chordwise // 2 * 2 + 2)]
+        return tuple(
+            replace(self, model=replace(self.model, division=f"{along}x{across}"))
+            for along, across in finer
+            if along * across <= MOST_BODIES
+        )
 
     def places(self, recording: Recording) -> tuple[Place, ...]:
         """Where each channel of ``recording`` is measured: three of each marker, at its place at rest."""
@@ -167,12 +171,12 @@ class VehicleSubject:
         """Prescribed motion needs no search."""
         return model
 
-    def finer(self) -> VehicleSubject | None:
-        """Twice as many elements and instants; None where this changes no recorded force by CONVERGED, or too many."""
+    def finer(self) -> tuple[VehicleSubject, ...]:
+        """Twice as many elements and instants; none where this changes no recorded force by CONVERGED, or too many."""
         finer = replace(self.model, elements=2 * self.model.elements, instants=2 * self.model.instants)
         if finer.elements > MOST_ELEMENTS or not self._changes(finer):
-            return None
-        return replace(self, model=finer)
+            return ()
+        return (replace(self, model=finer),)
 
     def _changes(self, finer: BladeElementWing) -> bool:
         nominal = np.array([[gene.nominal for gene in self.model.genes]])

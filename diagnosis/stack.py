@@ -101,6 +101,19 @@ class Stack:
         used = np.array([int(view.used.sum()) for view in self.views], float)
         return np.asarray(used / used.sum())
 
+    @cached_property
+    def uncertainty(self) -> float:
+        """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
+
+        Markers are independent of each other. Harmonics are not: where beats differ in size or timing, all of them do
+        together; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
+        """
+        independent = sum(
+            1.0 if recording.kind == "forces" else view.used.sum() / 3.0
+            for recording, view in zip(self.recordings, self.views, strict=True)
+        )
+        return float(np.sqrt(2.0 / independent) * (self.weight @ self.variance))
+
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Array
     ) -> tuple[Array, tuple[str | None, ...], list[Array]]:

@@ -100,8 +100,8 @@ class Subject(Protocol):
         """``model``, told that individuals will be near ``genome`` [G], so that it may begin its search there."""
         ...
 
-    def finer(self) -> Subject | None:
-        """The same with the next finer division; None where there is none, or it would cost too much."""
+    def finer(self) -> Sequence[Subject]:
+        """The same with finer divisions, cheapest first; none where there is none, or it would cost too much."""
         ...
 
     def places(self, recording: Recording) -> tuple[Place, ...]:

@@ -254,8 +254,9 @@ class PendulumRig:
     def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
         return model
 
-    def finer(self) -> None:
+    def finer(self) -> tuple[()]:
         """None: a pendulum is one body."""
+        return ()
 
     def places(self, recording: Recording) -> tuple[Place, ...]:
         return tuple(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -156,27 +155,32 @@ def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Datase
 
 
 def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject], wing: Dataset) -> None:
-    seen, subject = [], subjects["wing"]
-    while isinstance(subject, WingSubject):
-        seen.append(subject.model.structure.division)
-        subject = subject.finer()  # type: ignore[assignment]
-    assert seen[0].total == 4
-    assert len(seen) > 2
-    for coarse, fine in pairwise(seen):
-        assert len(fine.bodies) > len(coarse.bodies)
-        assert max(fine.bodies) > max(coarse.bodies)
-        assert fine.total <= MOST_BODIES
-    eleven = subject_of(wing, CalibrationSpec(division="11")).finer()
+    divisions, subject = [], subjects["wing"]
+    assert isinstance(subject, WingSubject)
+    while True:
+        coarse = subject.model.structure.division
+        divisions.append(coarse.total)
+        finer = subject.finer()
+        for one in finer:
+            fine = one.model.structure.division
+            assert len(fine.bodies) > len(coarse.bodies)
+            assert max(fine.bodies) >= max(coarse.bodies)
+            assert coarse.total < fine.total <= MOST_BODIES
+        if not finer:
+            break
+        subject = finer[-1]
+    assert divisions[0] == 4
+    assert len(divisions) > 2
+    eleven = subject_of(wing, CalibrationSpec(division="11"))
     assert isinstance(eleven, WingSubject)
-    assert eleven.model.structure.division.bodies == (4,) * 6, "that of 24 bodies"
+    assert [one.model.structure.division.bodies for one in eleven.finer()] == [(3,) * 6, (4,) * 6]
 
 
 def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
     """Of 4 bodies, against a wing finer than any that a diagnosis compares with."""
     subject = subjects["wing"]
     assert isinstance(subject, WingSubject)
-    finer = subject.finer()
-    assert finer is not None
+    finer = subject.finer()[-1]
     best = FlexibleWing(subject.model.wing, "10x6")
     found = [subject.shown(model, nominal(subject)[0], SMALL[5][0]) for model in (subject.model, finer.model, best)]
     coarse, fine, true = (one.values for one in found if one is not None)
@@ -188,10 +192,9 @@ def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict
 def test_a_finer_vehicle_only_where_it_tells(vehicle: Dataset) -> None:
     subject = subject_of(vehicle, CalibrationSpec())
     assert isinstance(subject, VehicleSubject)
-    assert subject.finer() is None, "40 elements are enough"
+    assert subject.finer() == (), "40 elements are enough"
     coarse = replace(subject, model=replace(subject.model, elements=3, instants=80))
-    finer = coarse.finer()
-    assert finer is not None
+    (finer,) = coarse.finer()
     assert finer.model.elements == 6
 
 
