@@ -84,26 +84,27 @@ def fitted(
 ) -> Fit:
     """Fit the free genes from ``start`` [F]; ValueError where that cannot be simulated.
 
-    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first.
+    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first, and again where a step
+    does not keep its promise; if that does not help, all are, once.
     """
     look = _Look(subject, stack, problem, evaluator)
     first = _at(look, start)
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
-    every = np.ones(len(start), bool)
     now = replace(_measured(look, replace(first, jacobian=own), ~columns), fresh=not columns.any())
+    again = [np.ones(len(start), bool), ~columns] if columns.any() else [np.ones(len(start), bool)]
     for _ in range(steps):
         better, gain = _step(look, now, FEW)
         if better is None:
-            if now.fresh:
-                return replace(now, converged=True)
-            now = _measured(look, now, every)
+            if now.fresh or not again:
+                return replace(now, converged=now.fresh)
+            now = _measured(look, now, again.pop())
             continue
         ends, now = _settles(now, better, gain), better
         if ends:
             return replace(now, converged=True)
-        if gain < GOOD:
-            now = _measured(look, now, every)
+        if gain < GOOD and again:
+            now = _measured(look, now, again.pop())
     return now
 
 

@@ -90,8 +90,8 @@ class WingSubject:
         """More strips with as many bodies along the chord; then more strips with the next even number of these.
 
         Strips alone do not show the bending along the chord that a division leaves out, and that is most of the error
-        of a coarse one (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm). Yet it is
-        the strips where the chord does not bend. Even, since an odd number is worse than one fewer: of 18 bodies, 3
+        of a coarse one (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm). Yet it
+        is the strips where the chord does not bend. Even, since an odd number is worse than one fewer: of 18 bodies, 3
         along the chord, 3 to 5 mm. None beyond MOST_BODIES.
         """
         bodies = Division.parse(self.model.division).bodies

@@ -23,8 +23,8 @@ from diagnosis.subject import Subject, Suspect
 
 Array = npt.NDArray[np.float64]
 
-PLACES = 16  # of a suspect that acts at a place
-SHAPES = 8  # of one with other shape genes
+PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
+SHAPES = 7  # of one with other shape genes
 INDEPENDENT = 1e-7  # of the largest direction of what the nominal genes can do
 SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
 
