@@ -80,7 +80,7 @@ def assess(
         _refined(state, nominal, evaluator)
     floor = 0.0 if spec.refine else nominal.division or 0.0
     first = state.nominal or nominal
-    state.weighed = weighed(stack, first.refit, state.refits, floor)
+    state.weighed = weighed(stack, first.refit, state.refits, floor, len(suspects))
 
 
 def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:

@@ -8,7 +8,8 @@ explain: a likelihood in which the misfit of a law that is right but for its for
     ln p = -nu/2 ln(tau^2 + E) - genes c,
 
 E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
-nu the number of independent pieces that such misfits have (a few for each recording). Two hypotheses always compete
+nu the number of independent pieces that such misfits have (a few for each recording). Beforehand each effect is as
+unlikely as the suspects are many. Two hypotheses always compete
 beside the effects: *nothing is lacking*, and *something that is not in the library*, which is taken to explain all but
 a part UNKNOWN of the misfit at the price of the genes that a law of its own would need.
 """
@@ -31,7 +32,6 @@ FORM = 0.1  # of the misfit of the nominal model: what a law right but for its f
 PIECES = 6.0  # independent pieces of such misfits, per recording
 MOST_PIECES = 48.0
 GENE = 2.0  # price of a gene in units of the logarithm of the evidence
-EFFECT = 3.0  # the same for a second effect at once, and each further one
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
 SLACK = 2.0  # standard errors of a mean square beyond the noise, which noise alone may make
@@ -52,16 +52,20 @@ class Weighed:
     floor: float
 
 
-def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float) -> Weighed:
-    """Weigh ``refits`` against the nominal model; ``floor`` (m or N) is what the model's division leaves."""
+def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float, suspects: int) -> Weighed:
+    """Weigh ``refits`` against the nominal model.
+
+    ``floor`` (m or N) is what the model's division leaves; ``suspects`` how many were considered: each of them is as
+    unlikely beforehand as they are many.
+    """
     every = (nominal, *refits)
     unit = stack.noise**2
     left = np.array([max(_misfit(one), 0.0) / unit for one in every])
     tau = tolerated(stack, left[0] * unit, floor) / unit
     pieces = min(PIECES * len(stack.recordings), MOST_PIECES)
     genes = np.array([one.freedom for one in every], float)
-    more = np.array([max(len(one.trials) - 1, 0) for one in every], float)
-    log = -0.5 * pieces * np.log(tau + left) - GENE * genes - EFFECT * more
+    named = np.array([len(one.trials) for one in every], float)
+    log = -0.5 * pieces * np.log(tau + left) - GENE * genes - np.log(max(suspects, 2)) * named
     unknown = -0.5 * pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)

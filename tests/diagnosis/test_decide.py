@@ -1,0 +1,81 @@
+"""How explanations are weighed: by what they leave, above floors, against nothing and against the unknown."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from diagnosis.decide import weighed
+from diagnosis.refit import Refit
+from diagnosis.stack import Stack
+from diagnosis.verdict import decided
+
+
+def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure") -> Refit:
+    """A refit that leaves ``left`` noises (root mean square)."""
+    trials = tuple(
+        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
+    )
+    return Refit(cast("Any", trials), cast("Any", None), left**2, left**2)
+
+
+def stack(recordings: int = 6) -> Stack:
+    return cast("Stack", SimpleNamespace(noise=1.0, recordings=(None,) * recordings, uncertainty=0.0))
+
+
+def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
+    found = decided(weighed(stack(), refit(nominal), others, floor, 40))
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    return found.verdict, found.named
+
+
+def test_a_misfit_below_the_noise_is_adequate() -> None:
+    assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
+
+
+def test_what_takes_nearly_all_is_named() -> None:
+    assert verdict(2.0, refit(0.3, ("a",)), refit(1.5, ("b",))) == ("named", ("a",))
+
+
+def test_a_fault_of_the_measurement_is_called_one() -> None:
+    found = verdict(2.0, refit(0.3, ("a",), family="measurement"), refit(1.5, ("b",)))
+    assert found == ("measurement fault", ("a",))
+
+
+def test_what_explains_as_well_is_not_told_apart() -> None:
+    assert verdict(2.0, refit(0.30, ("a",)), refit(0.31, ("b",)))[0] == "ambiguous"
+
+
+def test_what_leaves_most_is_no_name() -> None:
+    assert verdict(3.0, refit(2.2, ("a",)), refit(2.5, ("b",))) == ("unnamed", ())
+
+
+def test_a_second_effect_must_earn_its_place() -> None:
+    assert verdict(3.0, refit(0.4, ("a",)), refit(0.35, ("a", "b"), 1)) == ("named", ("a",))
+    found = verdict(3.0, refit(1.4, ("a",)), refit(0.2, ("a", "b"), 1))
+    assert found[0] == "named"
+    assert set(found[1]) == {"a", "b"}
+
+
+def test_more_genes_must_earn_theirs() -> None:
+    assert verdict(2.0, refit(0.32, ("a",), 1), refit(0.30, ("b",), 8)) == ("named", ("a",))
+
+
+def test_a_floor_of_the_division_forgives_as_much() -> None:
+    assert verdict(0.9, refit(0.5, ("a",), 2), floor=1.0)[0] == "adequate"
+    assert verdict(0.9, refit(0.2, ("a",), 2))[0] == "named"
+
+
+def test_probabilities_move_smoothly() -> None:
+    """As an effect takes more and more, it goes from unlikely to sure without a jump."""
+    found = [
+        weighed(stack(), refit(2.0), [refit(left, ("a",))], 0.0, 40).probabilities[1]
+        for left in np.linspace(1.6, 0.1, 80)
+    ]
+    assert found[0] < 0.05
+    assert found[-1] > 0.95
+    assert np.all(np.diff(found) > -1e-12)
+    assert np.max(np.diff(found)) < 0.25
