@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 ALIVE = 0.02  # probability from which an explanation is alive
 RIVALS = 3
 TOLD = 5  # conditions
+DECIDED = 0.9  # probability from which few conditions are compared: there is little to separate
+FEW = 8
 
 
 def rivals(weighed: Weighed) -> list[Refit]:
@@ -40,6 +42,8 @@ def separations(
     alive, able = rivals(weighed), subject.conditions()
     if len(alive) < 2:
         return
+    if weighed.probabilities.max() >= DECIDED:
+        able = able[:FEW]
     for k, condition in enumerate(able):
         apart = _apart(subject, stack, alive, condition, evaluator)
         yield (k + 1) / len(able), None if apart is None else (apart, condition)
@@ -57,17 +61,19 @@ def _apart(
     """Least root mean square difference (in noises) between the first explanation and another under ``condition``."""
     first = alive[0].fit
     genome = first.problem.genomes(np.array(list(first.values.values())))[0]
-    shell = subject.shown(subject.extended(alive[0].names), genome, condition)
+    shell = subject.shown(subject.beside(subject.extended(alive[0].names), genome), genome, condition)
     if shell is None:
         return None
-    differences = [_difference(shell, other, evaluator) for other in alive[1:]]
+    differences = [_difference(subject, genome, shell, other, evaluator) for other in alive[1:]]
     known = [one for one in differences if one is not None]
     return min(known) / stack.noise if known else None
 
 
-def _difference(shell: Recording, other: Refit, evaluator: Evaluator) -> float | None:
+def _difference(subject: Subject, genome: Array, shell: Recording, other: Refit, evaluator: Evaluator) -> float | None:
     fit = other.fit
-    problem = Problem(fit.problem.model, (shell,), fit.problem.free, fit.problem.base, fit.problem.axes)
+    problem = Problem(
+        subject.beside(fit.problem.model, genome), (shell,), fit.problem.free, fit.problem.base, fit.problem.axes
+    )
     evaluation = evaluator.evaluate(problem, np.array([list(fit.values.values())]), residuals=True)
     residuals = evaluation.per_recording[0].residuals
     if evaluation.reasons[0] is not None or residuals is None:

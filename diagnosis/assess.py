@@ -18,6 +18,8 @@ from diagnosis.spec import DiagnosisSpec
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject, Suspect
 
+SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
+WEAKER = 0.6  # of the best score
 RIVALS = 3  # explanations to which a partner is sought
 
 
@@ -109,6 +111,8 @@ def _refits(
     stack, fit = state.stack, nominal.refit.fit
     chosen = worth_a_refit(state.trials, spec.refits)
     for k, trial in enumerate(chosen):
+        if _outdone(state, nominal, trial, chosen[0]):
+            continue
         yield 0.6 + 0.15 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
     if not state.refits or min(one.excess for one in state.refits) <= tolerated(stack, nominal.refit.excess, 0.0):
@@ -129,6 +133,14 @@ def _refits(
             tried.add(names)
             yield 0.86, f"refit with {' and '.join(sorted(names))}"
             _add(state, refitted(state.subject, stack, fit, evaluator, two))
+
+
+def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:
+    """Whether a refit has explained so much already that a trial so much weaker in its score test cannot compete."""
+    if not state.refits or trial.gain > WEAKER * best.gain:
+        return False
+    left = min(one.excess for one in state.refits)
+    return left <= max(SOLVED * nominal.refit.excess, tolerated(state.stack, 0.0, 0.0))
 
 
 def _add(state: Assessment, refit: Refit | None) -> None:

@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 20
 ROUNDS = 3  # of refinement
+PROMISING = 0.1  # of the excess that a finer division must take away by the linearised model to be fitted
+MOST = 1.5  # times what the finer division changes: the true wing may be finer still
 MATTERS = 0.25  # of the noise: a division that leaves less is fine enough
 BETTER = 0.25  # of the excess that a finer division must take away to be worth its cost
 LIMIT = 0.3  # of the noise: a misfit below needs no finer division
@@ -67,11 +69,11 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
     for _ in range(ROUNDS):
         left, finest, better = 0.0, "", None
         for finer in subject.finer():
-            changes = _leaves(finer, stack, evaluator, now.fit)
-            if changes is None or changes <= left:
+            changes, takes = _leaves(finer, stack, evaluator, now.fit)
+            if changes <= left:
                 continue
             left, finest = changes, finer.told
-            if refine and matters(stack, changes, now):
+            if refine and takes > PROMISING and matters(stack, changes, now):
                 better = _better(finer, stack, evaluator, now)
             if better is not None:
                 break
@@ -96,15 +98,23 @@ def _better(finer: Subject, stack: Stack, evaluator: Evaluator, now: Refit) -> R
     return found if found is not None and improves(found, now) else None
 
 
-def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> float | None:
-    """Root mean square of what the finer model says differently and the genes cannot make up for; None if it fails."""
+def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> tuple[float, float]:
+    """What the finer model says differently and the genes cannot make up for: root mean square (m or N).
+
+    And which part of the misfit that would take away, as far as the linearised model knows; zeros if it fails.
+    """
     problem = Problem(finer.model, stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
     found, reasons, _ = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
     if reasons[0] is not None:
-        return None
-    change = (found[0] - fit.coefficients) / stack.scale
-    rest = Nuisance(fit.jacobian, stack.scale).rest(change) * stack.scale
-    return float(np.sqrt(stack.weight @ rest**2))
+        return 0.0, 0.0
+    nuisance = Nuisance(fit.jacobian, stack.scale)
+    rest = nuisance.rest((found[0] - fit.coefficients) / stack.scale)
+    left = nuisance.rest(fit.coefficients / stack.scale)
+    power = float(rest @ rest)
+    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, MOST))
+    excess = max(float(left @ left) - len(left), 1e-300)
+    taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
+    return float(np.sqrt(stack.weight @ (rest * stack.scale) ** 2)), taken
 
 
 def improves(finer: Refit, coarse: Refit) -> bool:

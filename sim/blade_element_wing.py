@@ -166,7 +166,7 @@ class BladeElementWing:
         return [(effects, np.array(members)) for effects, members in groups.items()]
 
     def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array, Array]:
-        """With ``effects`` on: weights [B, rows], forces [B, rows, 2, n] of active rows, those beside them [B, 2, n]."""
+        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; others [B, 2, n]."""
         moving = {} if recording.motion else self._moving(batch)
         scene = self._scene(moving | self._coefficients(batch), len(batch), recording)
         for effect in effects:

@@ -7,6 +7,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -30,12 +31,17 @@ from sim.wing_genes import FACTOR, lanes, wing_genes
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Places = npt.NDArray[np.intp]
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 LARGEST_SHIFT = 0.05  # rad, about 3 degrees of the beat
 _DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near")
 _MOST_SETTLED = 256
 # Individuals that others begin beside, by wing and condition: models that differ in their effects alone share them.
 _SETTLED: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
+_MOST_BEATS = 64
+# Beats of wings without effects: what cameras make of one and the same is tried over and over.
+_BEATS: OrderedDict[tuple[bytes, Condition, bytes], Beat] = OrderedDict()
 _GRID = 96  # instants of a beat that effects of the observation see
 _HARMONICS = 30  # of the periodic tracks that are kept; the rest is below the integrator's error
 
@@ -132,20 +138,33 @@ class FlexibleWing:
         for k, one in enumerate(wings):
             alike.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
         found: dict[int, Beat] = {}
-        for rows in alike.values():
+        keys = (
+            {k: self._key(wings[k], recording.condition) for k in alike.get((), ())}
+            if self.near and not with_motion
+            else {}
+        )
+        found.update({k: _BEATS[key] for k, key in keys.items() if key in _BEATS})
+        for rows in ([k for k in rows if k not in found] for rows in alike.values()):
+            if not rows:
+                continue
             subject = self.subject(self.switched_on(wings[rows[0]]), recording.condition)
             near = self._settled_near(recording.condition) if self.near else None
             beats = periodic_beats(subject, wings[rows], self.numerics, with_motion=with_motion, near=near)
             found.update(zip(rows, beats, strict=True))
+        for k, key in keys.items():
+            _remember(_BEATS, key, found[k], _MOST_BEATS)
         return [found[k] for k in range(len(wings))], wing
+
+    def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
+        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
+        return self._bare_key, condition, genome[:own].tobytes()
 
     def _settled_near(self, condition: Condition) -> Course | None:
         """The individual ``near`` under ``condition``, settled; None where it fails."""
         bare, key = self._bare, (self._bare_key, condition)
         if key not in _SETTLED:
-            while len(_SETTLED) >= _MOST_SETTLED:
-                _SETTLED.popitem(last=False)
-            _SETTLED[key] = settled_course(bare.subject((), condition), np.array(self.near), self.numerics)
+            found = settled_course(bare.subject((), condition), np.array(self.near), self.numerics)
+            _remember(_SETTLED, key, found, _MOST_SETTLED)
         return _SETTLED[key]
 
     @cached_property
@@ -231,6 +250,13 @@ def _distinct(rows: Array) -> tuple[Places, Places]:
     first = dict[bytes, int]()
     kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]
     return np.unique(kinds, return_index=True)[1], np.array(kinds, np.intp)
+
+
+def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int) -> None:
+    """Keep ``value``, and forget what was kept longest ago beyond ``most``."""
+    known[key] = value
+    while len(known) > most:
+        known.popitem(last=False)
 
 
 def _on_grid(tracks: Array) -> Array:

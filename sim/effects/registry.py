@@ -40,6 +40,7 @@ _NAMES: tuple[str, ...] = (
     "rotational_circulation",
     "circulation_lag",
     "clap_and_peel",
+    "varying_coefficients",
     "tip_loss",
     "induced_inflow",
     "wake_capture",
