@@ -4,10 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check serve format lock install clean
+.PHONY: demo proof test check serve format lock install clean
 
 demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m service.demo
+
+proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a report; under 15 minutes
+	@$(BIN)/python -m benchmarks.proof --json
 
 serve: $(INSTALLED)  ## start the service and stay
 	@$(BIN)/wingfit serve

@@ -25,9 +25,10 @@ from benchmarks.concealed.plant.vehicle_laws import LAWS as VEHICLE_LAWS
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.trials import Build
 from calibration.plan import prepared
-from calibration.spec import CalibrationSpec, model_for
+from calibration.spec import CalibrationSpec, model_for, wing_model
 from records import Condition, Dataset, Recording, Vehicle, Wing
 from sim.balance import delfly
+from sim.flexible_wing import FlexibleWing
 from sim.model import Model
 from sim.rig import robird_wing
 
@@ -116,6 +117,10 @@ class Bench(ABC, Generic[Motion, Quality]):
             spec = replace(spec, division=self.build.division)
         return model_for(Dataset("nominal", self.rig, ()), spec)
 
+    def model_beside(self, genome: Mapping[str, float]) -> Model:  # noqa: ARG002
+        """The same for individuals near ``genome``."""
+        return self.model
+
     def phase(self, beat: Motion, name: str, parameters: Parameters) -> float | None:  # noqa: ARG002
         """When in the beat, as a dataset defines it, a thing acts; None where it acts all the time."""
         return parameters.get("phase")
@@ -173,6 +178,11 @@ class WingBench(Bench[Beat, Filmset]):
         """The Robird's wing."""
         return robird_wing()
 
+    def model_beside(self, genome: Mapping[str, float]) -> FlexibleWing:
+        """It begins each search for a periodic motion at that of ``genome``: half the beats for neighbours."""
+        found = wing_model(Dataset("nominal", self.rig, ()), CalibrationSpec(division=self.build.division))
+        return replace(found, near=tuple(genome[gene.name] for gene in found.genes))
+
     @property
     def faults(self) -> Mapping[str, Law]:
         """Of cameras, clocks and trackers."""
@@ -186,7 +196,7 @@ class WingBench(Bench[Beat, Filmset]):
     def limits(self, name: str) -> tuple[float, float]:
         """As of any bench; a kind of the plant's says itself how large it may be."""
         low, high = super().limits(name)
-        return low, min(high, KINDS[name].largest / KINDS[name].typical) if name in KINDS else high
+        return low, KINDS[name].largest / KINDS[name].typical if name in KINDS else high
 
     def phase(self, beat: Beat, name: str, parameters: Parameters) -> float | None:
         """Of the drive phases that plant and cameras know, counted from the start of the beat."""

@@ -23,7 +23,7 @@ STEP = 0.01  # of a gene's box, of finite differences
 DAMPINGS = (0.0, 1e-3, 1e-2, 1e-1, 1.0)  # of Gauss-Newton, tried at once
 STEPS = 8
 SETTLED = 5e-3  # relative gain in root mean square below which a refit ends
-CLOSE = 0.12  # relative error of d that a search for a strength is content with
+CLOSE = 0.15  # relative error of d that a search for a strength is content with
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +48,25 @@ class Refit:
         return np.array([float(gene.to_unit(self.start[gene.name])) for gene in self.genes])
 
     def observed(self, units: Array, recordings: Sequence[Recording]) -> Array:
-        """What [B, F] is recorded as, [B, D]; RuntimeError where that cannot be simulated."""
+        """What [B, F] is recorded as, [B, D]; NaN throughout for one that cannot be simulated."""
         base = np.array([self.start.get(gene.name, gene.nominal) for gene in self.model.genes])
         genomes = np.tile(base, (len(units), 1))
         names = [gene.name for gene in self.model.genes]
         for k, gene in enumerate(self.genes):
             genomes[:, names.index(gene.name)] = gene.from_unit(np.clip(units[:, k], 0.0, 1.0))
-        parts = []
+        parts, failed = [], np.zeros(len(units), bool)
         for recording in recordings:
             found = self.model.observe(genomes, recording)
-            if any(found.reasons):
-                raise RuntimeError(f"{recording.name}: {next(reason for reason in found.reasons if reason)}")
+            failed |= [reason is not None for reason in found.reasons]
             parts.append(found.channels.reshape(len(units), -1))
-        return np.concatenate(parts, axis=1)
+        seen = np.concatenate(parts, axis=1)
+        seen[failed] = np.nan
+        return seen
 
     @cached_property
     def nominal(self) -> Array:
-        """[D] of the true values."""
-        return np.asarray(self.observed(self.unit[None], self.recordings)[0])
+        """[D] of the true values; RuntimeError where they cannot be simulated."""
+        return _whole(self.observed(self.unit[None], self.recordings))[0]
 
     @cached_property
     def tangent(self) -> Array:
@@ -73,20 +74,22 @@ class Refit:
         return self.tangent_at(self.unit, self.recordings)
 
     def tangent_at(self, unit: Array, recordings: Sequence[Recording]) -> Array:
-        """[D, F] about ``unit`` [F], by central differences per part of the box."""
+        """[D, F] about ``unit`` [F], by central differences per part of the box; RuntimeError as :attr:`nominal`."""
         moves = STEP * np.eye(len(self.genes))
         around = np.clip(np.vstack([unit + moves, unit - moves]), 0.0, 1.0)
-        seen = self.observed(around, recordings)
+        seen = _whole(self.observed(around, recordings))
         n = len(self.genes)
         width = np.diag(around[:n] - around[n:])
         return np.asarray(((seen[:n] - seen[n:]) / width[:, None]).T)
 
     def linear(self, change: Array) -> float:
-        """Root mean square that is left of a change [D] of the recordings, the genes' tangent projected out."""
+        """Root mean square that is left of a change [D] of the recordings, as far as the genes answer linearly.
+
+        They stay inside their boxes. It costs no simulation once the tangent is known.
+        """
         told = np.isfinite(change)
-        fitted, *_ = np.linalg.lstsq(self.tangent[told], change[told], rcond=1e-8)
-        left = change[told] - self.tangent[told] @ fitted
-        return rms(left)
+        slopes = self.tangent[told]
+        return rms(slopes @ _bounded(slopes, -change[told], self.unit, 0.0) - change[told])
 
     def full(self, change: Array, *, rounds: int = 1) -> float:
         """The same by a refit inside the genes' boxes.
@@ -117,8 +120,9 @@ class Refit:
         for _ in range(STEPS):
             moves = np.array([_bounded(slopes, residual[told], unit, damping) for damping in DAMPINGS])
             found = self.observed(unit + moves, recordings) - target
-            left = [rms(one) for one in found]
-            for k in np.argsort(left)[::-1]:  # the best last: what it shows holds exactly
+            left = np.array([rms(one) if np.isfinite(one[told]).all() else np.inf for one in found])
+            good = np.flatnonzero(np.isfinite(left))
+            for k in good[np.argsort(left[good])[::-1]]:  # the best last: what it shows holds exactly
                 slopes = _learned(slopes, moves[k], (found[k] - residual)[told])
             best, before = int(np.argmin(left)), rms(residual)
             if left[best] >= before:
@@ -127,6 +131,12 @@ class Refit:
             if left[best] > (1 - SETTLED) * before:
                 break
         return unit, residual
+
+
+def _whole(seen: Array) -> Array:
+    if np.isnan(seen).all(axis=1).any():
+        raise RuntimeError("the nominal model has no periodic motion about the true genome: draw another")
+    return seen
 
 
 def _learned(slopes: Array, move: Array, change: Array) -> Array:
@@ -164,28 +174,37 @@ def rms(values: Array) -> float:
 
 
 def strength_for(
-    target: float, misfit: Callable[[float], float], start: float, limits: tuple[float, float], tries: int = 5
+    target: float, misfit: Callable[[float], float], start: float, limits: tuple[float, float], tries: int = 4
 ) -> tuple[float, float]:
     """The strength at which ``misfit`` is about ``target``, and the misfit there: secants between logarithms.
 
     Where the limits do not allow it, that limit. A misfit grows about in proportion to a strength; where it does not
-    answer at all the largest strength is taken.
+    answer at all the largest strength is taken. An ArithmeticError of ``misfit`` says that the rig cannot run so: the
+    way there is halved. One at ``start`` passes through.
     """
     low, high = limits
     at = min(max(start, low), high)
     found = misfit(at)
     best, power = (at, found), 1.0
     for _ in range(tries):
-        if abs(math.log(max(found, 1e-12) / target)) < CLOSE:
+        if _off(found, target) < CLOSE:
             return at, found
         ratio = target / max(found, 1e-12)
         ahead = min(max(at * ratio ** (1 / power), at / 8, low), at * 8, high)
         if ahead == at:
             break
-        value = misfit(ahead)
+        try:
+            value = misfit(ahead)
+        except ArithmeticError:
+            high = math.sqrt(at * ahead) if ahead > at else high
+            low = math.sqrt(at * ahead) if ahead < at else low
+            continue
         if value > 0 and found > 0 and value != found:
             power = min(max(math.log(value / found) / math.log(ahead / at), 0.3), 3.0)
         at, found = ahead, value
-        if abs(math.log(max(found, 1e-12) / target)) < abs(math.log(max(best[1], 1e-12) / target)):
-            best = at, found
+        best = min(best, (at, found), key=lambda one: _off(one[1], target))
     return best
+
+
+def _off(found: float, target: float) -> float:
+    return abs(math.log(max(found, 1e-12) / target))

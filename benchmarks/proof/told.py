@@ -1,0 +1,114 @@
+"""What both stories share: a dataset on disk, the tool as its user runs it, the report, and claims that may fail."""
+
+from __future__ import annotations
+
+import webbrowser
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from diagnosis.finding import Finding, GeneValue, Hypothesis
+from records import Dataset, save_dataset
+from report import html
+from service.commands.output import progress
+from service.local import diagnose
+
+Numbers = Mapping[str, Any]
+
+IN_A_TERMINAL = ("www-browser", "links", "elinks", "lynx", "w3m")
+"""Browsers that would take the terminal away, and draw no figure."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One sentence of a story, and whether it came true."""
+
+    words: str
+    holds: bool
+
+
+@dataclass(frozen=True)
+class Story:
+    """A story that was played: ``figures`` for programs, ``lines`` for people, and the page that tells it."""
+
+    figures: Numbers
+    lines: tuple[str, ...]
+    claims: tuple[Claim, ...]
+    report: Path
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values."""
+        return {**self.figures, "claims": [asdict(claim) for claim in self.claims], "report": str(self.report)}
+
+
+def diagnosed(dataset: Dataset, asked: Mapping[str, Any], folder: Path, workers: int) -> tuple[Finding, Path]:
+    """Write ``dataset`` to ``folder``, diagnose it as ``wingfit diagnose --local`` does, and write the report.
+
+    Nothing but the files of the dataset and ``asked`` (the options of that command) reaches the tool.
+    """
+    path = folder / dataset.name
+    save_dataset(dataset, path)
+    with progress(f"{dataset.name}: diagnosing") as tell:
+        finding = diagnose(path, dict(asked), workers, tell)
+    page = folder / f"{dataset.name}.html"
+    page.write_text(html(finding), encoding="utf-8")
+    return finding, page
+
+
+def leader(finding: Finding) -> Hypothesis:
+    """The explanation that is named; else the most probable one."""
+    named = set(finding.named)
+    return next((one for one in finding.hypotheses if set(one.effects) == named), finding.hypotheses[0])
+
+
+def nominal_misfit(finding: Finding) -> float:
+    """What the nominal model leaves after its best refit, root mean square, m or N."""
+    return next(one.misfit for one in finding.hypotheses if not one.effects)
+
+
+def families(finding: Finding) -> tuple[str, ...]:
+    """Family of each effect that is named."""
+    known = {one.effects[0]: one.family for one in finding.hypotheses if len(one.effects) == 1}
+    return tuple(known.get(name, "") for name in finding.named)
+
+
+def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Each true value beside what was found, with its 90 % interval; None where no such effect was named."""
+    rows = []
+    for name, true in truth.items():
+        found = genes[name].value if name in genes else None
+        ends = (None, None) if found is None else (found.low, found.high)
+        rows.append(
+            {
+                "gene": name,
+                "true": true,
+                "found": None if found is None else found.value,
+                "low": ends[0],
+                "high": ends[1],
+                "covered": None if None in ends else bool(ends[0] <= true <= ends[1]),  # type: ignore[operator]
+            }
+        )
+    return rows
+
+
+def over_floor(finding: Finding) -> dict[str, float | None]:
+    """Misfit to the held-out recordings in parts of the floor, before and after."""
+    proof = finding.proof
+    return {
+        "heldout_before_over_floor": None if proof is None else proof.before.value,
+        "heldout_over_floor": None if proof is None else proof.after.value,
+        "heldout_over_floor_low": None if proof is None else proof.after.low,
+        "heldout_over_floor_high": None if proof is None else proof.after.high,
+    }
+
+
+def opened(page: Path) -> bool:
+    """Open a page in a browser with a screen, if there is one; whether there was."""
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return False
+    if isinstance(browser, webbrowser.GenericBrowser) and browser.name in IN_A_TERMINAL:
+        return False
+    return browser.open(page.resolve().as_uri())
