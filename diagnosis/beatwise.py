@@ -29,7 +29,10 @@ SPARE = 1.5  # samples per coefficient, at least; a channel with fewer is not lo
 POOLED = 10.0  # lines that the mean scale of all channels counts for in the scale of one
 LOCAL = 0.6  # harmonics to either side over which the noise's spectrum is averaged
 BLURRED = 5.0  # times the variance that a coefficient would have if no other were fitted: a channel with long gaps
-FLAT = 0.02  # of the largest: a spectrum is taken to be nowhere lower
+LOWEST = 3  # lines whose power law is taken
+STEEPEST = -2.0  # of the power law: a random walk
+SEEN_BY_MEAN = 0.35  # lines that the mean of a recording sees noise of 1/f at
+FLAT = 0.002  # of the largest: a spectrum is taken to be nowhere lower
 
 
 @dataclass(frozen=True)
@@ -210,7 +213,24 @@ def _spectrum(
         density = np.array([_near(lines, mean, k) for k in range(kept + 1)])
     else:
         density = _first_order(lines, mean, advance, kept)
+    if beats >= 2:
+        steep = max(float(density[0]), _at_rest(lines, mean, beats))
+        density[0] = np.sqrt(
+            density[0] * steep
+        )  # between noise that levels off below the lines and noise that does not
     return np.maximum(density, FLAT * density.max()), scale
+
+
+def _at_rest(lines: Array, mean: Array, beats: int) -> float:
+    """Density that the mean of a recording sees, by the power law of the lowest lines.
+
+    Noise such as 1/f has most of its power below the first line between harmonics; there it moves the mean.
+    """
+    low = np.argsort(lines)[: max(LOWEST, beats - 1)]
+    slope = np.polyfit(np.log(lines[low]), np.log(np.maximum(mean[low], 1e-300)), 1)[0]
+    middle = float(np.exp(np.mean(np.log(lines[low]))))
+    level = float(np.exp(np.mean(np.log(np.maximum(mean[low], 1e-300)))))
+    return level * (SEEN_BY_MEAN / beats / middle) ** float(np.clip(slope, STEEPEST, 0.0))
 
 
 def _near(lines: Array, mean: Array, k: int) -> float:

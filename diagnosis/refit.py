@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
+from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem, base_genome
 from diagnosis.fit import Fit, fitted
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns
@@ -22,6 +23,7 @@ WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
+BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
 HALVINGS = 3  # of a start that cannot be simulated
 
 
@@ -87,20 +89,56 @@ def refitted(
     before = base or nominal
     model = subject.extended([trial.suspect.name for trial in trials])
     added = [trials[-1]] if base else list(trials)
-    free = (*before.problem.free, *(gene.name for trial in added for gene in trial.suspect.genes))
+    genes = [(gene.name, trial) for trial in added for gene in trial.suspect.genes]
     values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
-    problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
-    width = len(free) - len(before.unit)
-    known = np.concatenate([np.ones(len(before.unit), bool), np.zeros(width, bool)])
-    jacobian = np.hstack([before.jacobian, np.zeros((len(before.jacobian), width))])
+    problem = Problem(
+        model, stack.recordings, (*before.problem.free, *(g for g, _ in genes)), base_genome(model, values), stack.axes
+    )
     for part in 0.5 ** np.arange(HALVINGS):
         start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
         try:
-            fit = fitted(subject, stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+            fit = _widened(subject, stack, problem, evaluator, start, before)
         except ValueError:
             continue
+        if len(trials) == 1 and stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves:
+            sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
+            first = _some(subject, stack, problem, evaluator, start, before, sizes)
+            if not sizes.all():
+                first = _widened(subject, stack, problem, evaluator, first.unit, first)
+            fit = min((fit, first), key=lambda one: one.cost)
         return judged(stack, fit, trials)
     return None
+
+
+def _widened(subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, before: Fit) -> Fit:
+    """Fit all genes of ``problem``; the slopes of the first of them are those of ``before``."""
+    known = np.arange(len(start)) < before.jacobian.shape[1]
+    jacobian = np.zeros((len(before.jacobian), len(start)))
+    jacobian[:, known] = before.jacobian[:, : known.sum()]
+    return fitted(subject, stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+
+
+def _some(
+    subject: Subject,
+    stack: Stack,
+    problem: Problem,
+    evaluator: Evaluator,
+    start: Array,
+    before: Fit,
+    which: npt.NDArray[np.bool_],
+) -> Fit:
+    """Fit the genes ``which`` [F] of ``problem`` alone; the others stay where they start, with slopes of zero.
+
+    A shape that moves before its size is known may be led astray.
+    """
+    genes = free_genes(problem)
+    base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
+    free = tuple(name for name, one in zip(problem.free, which, strict=True) if one)
+    part = Problem(problem.model, problem.recordings, free, base, problem.axes)
+    found = _widened(subject, stack, part, evaluator, start[which], before)
+    unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
+    unit[which], jacobian[:, which] = found.unit, found.jacobian
+    return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
 
 
 def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:

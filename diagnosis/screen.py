@@ -40,6 +40,7 @@ class Trial:
         gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
         amounts: [S] by how much each must be multiplied.
         freedom: degrees of freedom, genes of place and shape included.
+        leaves: chi-squared that is then left, by the linearised model.
     """
 
     suspect: Suspect
@@ -48,6 +49,7 @@ class Trial:
     gain: float
     amounts: Array
     freedom: int
+    leaves: float
 
     @property
     def start(self) -> Array:
@@ -122,8 +124,8 @@ def _tried(
 def _trial(stack: Stack, suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance, left: Array) -> Trial:
     own = nuisance.rest(fields / stack.scale)
     amounts = _amounts(own, left, _limits(suspect, block), seen=SEEN * np.sqrt(len(left)))
-    gain = float(left @ left - np.sum((left + amounts @ own) ** 2))
-    return Trial(suspect, block, fields, max(gain, 0.0), amounts, len(suspect.genes))
+    leaves = float(np.sum((left + amounts @ own) ** 2))
+    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), amounts, len(suspect.genes), leaves)
 
 
 def _amounts(own: Array, left: Array, limits: tuple[Array, Array], *, seen: float) -> Array:

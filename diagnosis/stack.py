@@ -86,6 +86,10 @@ class Stack:
         found = [view.of(one)[..., view.used, :] for view, one in zip(self.views, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
+    def chi_squared(self, coefficients: Array) -> float:
+        """Sum of squares of whitened coefficients [D]."""
+        return float(np.sum((coefficients / self.scale) ** 2))
+
     def excess(self, coefficients: Array) -> float:
         """Mean square beyond the noise of residuals with these coefficients [D], m^2 or N^2; noise may make it < 0."""
         return float(self.weight @ (coefficients**2 - self.variance))
@@ -105,14 +109,17 @@ class Stack:
     def uncertainty(self) -> float:
         """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
-        Markers are independent of each other. Harmonics are not: where beats differ in size or timing, all of them do
+        What noise does to means and trends comes from below the lowest line between harmonics, and is known to a factor
+        only; all of it counts. Else markers are independent of each other. Harmonics are not: where beats differ in size or timing, all of them do
         together; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
         """
         independent = sum(
             1.0 if recording.kind == "forces" else view.used.sum() / 3.0
             for recording, view in zip(self.recordings, self.views, strict=True)
         )
-        return float(np.sqrt(2.0 / independent) * (self.weight @ self.variance))
+        every = self.weight * self.variance
+        slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.views])
+        return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Array
