@@ -20,6 +20,7 @@ from diagnosis.subject import Subject, Suspect
 
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
+PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
 RIVALS = 3  # explanations to which a partner is sought
 
 
@@ -115,7 +116,9 @@ def _refits(
             continue
         yield 0.6 + 0.15 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
-    if not state.refits or min(one.excess for one in state.refits) <= tolerated(stack, nominal.refit.excess, 0.0):
+    if not state.refits or min(one.excess for one in state.refits) <= tolerated(
+        stack, PART * nominal.refit.excess, 0.0
+    ):
         return
     tried: set[frozenset[str]] = set()
     best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]

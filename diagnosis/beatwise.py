@@ -230,7 +230,7 @@ def _at_rest(lines: Array, mean: Array, beats: int) -> float:
     slope = np.polyfit(np.log(lines[low]), np.log(np.maximum(mean[low], 1e-300)), 1)[0]
     middle = float(np.exp(np.mean(np.log(lines[low]))))
     level = float(np.exp(np.mean(np.log(np.maximum(mean[low], 1e-300)))))
-    return level * (SEEN_BY_MEAN / beats / middle) ** float(np.clip(slope, STEEPEST, 0.0))
+    return float(level * (SEEN_BY_MEAN / beats / middle) ** np.clip(slope, STEEPEST, 0.0))
 
 
 def _near(lines: Array, mean: Array, k: int) -> float:

@@ -110,8 +110,9 @@ class Stack:
         """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
         What noise does to means and trends comes from below the lowest line between harmonics, and is known to a factor
-        only; all of it counts. Else markers are independent of each other. Harmonics are not: where beats differ in size or timing, all of them do
-        together; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
+        only; half of it counts. Else markers are independent of each other. Harmonics are not: where beats differ in
+        size or timing, all of them do together; so each marker, and a recording of forces as a whole, counts as one
+        sample of its noise.
         """
         independent = sum(
             1.0 if recording.kind == "forces" else view.used.sum() / 3.0
