@@ -38,7 +38,7 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
     if held_out:
         seen = predicted(Stack.of(held_out, state.stack.axes), evaluator, state.nominal.refit.fit, best.fit)
     lacking = Unexplained()
-    if decision.verdict in ("named", "ambiguous", "unnamed"):
+    if decision.verdict == "unnamed" or _is_load(decision, best):
         for fraction, stage, told in _lacking(state, law=decision.verdict == "unnamed"):
             lacking = told
             yield 0.93 + 0.03 * fraction, stage, None
@@ -53,6 +53,12 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
         state, name, decision, best, seen, lacking, advice, _where(state, decision, best, lacking, evaluator)
     )
     yield 1.0, "done", found
+
+
+def _is_load(decision: Decision, best: Refit) -> bool:
+    """Whether what was named acts as a load: a drive or a camera that is off moves markers without any."""
+    families = {trial.suspect.family for trial in best.trials}
+    return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
 def _lacking(state: Assessment, *, law: bool) -> Iterator[tuple[float, str, Unexplained]]:

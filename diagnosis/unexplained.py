@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from diagnosis.subject import Subject
 from sim.effects.probe import Probe
 from sim.probing import Probed
 
+LARGEST = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
 MOST = 6  # recordings that are probed: those with the largest misfit
 
 
@@ -56,8 +57,18 @@ def unexplained(
         return Unexplained()
     cases = [_case(stack, nominal, r, one) for r, one in found]
     inferred = infer(cases, probe)
+    loads = missing_loads(inferred)
+    if not _plausible(loads, [one for _, one in found]):
+        return Unexplained()
     told = free_law(cases, probe, [one.motion for _, one in found]) if law else None
-    return Unexplained(missing_loads(inferred), place(inferred), told)
+    return Unexplained(loads, place(inferred), told)
+
+
+def _plausible(loads: Sequence[MissingLoad], found: Sequence[Probed]) -> bool:
+    """Whether the loads are no larger than some times the wing's own inertia: what is lacking may be no load at all."""
+    size = np.sqrt(np.mean([np.mean(np.square(load.values)) for load in loads]))
+    own = np.sqrt(np.mean([np.mean((one.motion.mass[:, None] * one.motion.acceleration) ** 2) for one in found]))
+    return bool(size <= LARGEST * own)
 
 
 def _case(stack: Stack, nominal: Refit, r: int, probed: Probed) -> Case:
