@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.concealed.bench import VehicleBench
 from benchmarks.concealed.trials import Build
 from benchmarks.delfly import LIFT_CORRELATION, fit
-from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor
+from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
 from calibration.evaluation import agreements
 from calibration.evaluator import Evaluator
 from calibration.plan import prepared
@@ -104,7 +104,7 @@ def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) 
 def play(folder: Path, seed: int, workers: int) -> Story:
     """Weigh, locate, diagnose, tell; everything written goes to ``folder``."""
     dataset = campaign(seed)
-    finding, page = diagnosed(dataset, {"preset": BASELINE}, folder, workers)
+    finding, page = diagnosed(saved(dataset, folder), {"preset": BASELINE}, workers)
     evaluator = make_evaluator("in_process")
     try:
         return told(finding, located(dataset, evaluator), lifts(dataset, finding, evaluator), page)

@@ -8,7 +8,7 @@ and neither is told.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,22 @@ import numpy as np
 from benchmarks.concealed.bench import WingBench
 from benchmarks.concealed.plant.observe_law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
-from benchmarks.proof.told import Claim, Story, beside_truth, diagnosed, families, leader, nominal_misfit, over_floor
+from benchmarks.proof.told import (
+    Claim,
+    Story,
+    beside_truth,
+    diagnosed,
+    families,
+    leader,
+    nominal_misfit,
+    over_floor,
+    saved,
+)
 from calibration.evaluator import Evaluator
+from calibration.problem import base_genome
 from calibration.result import Result, judge
 from calibration.search import calibrate
-from calibration.spec import CalibrationSpec
+from calibration.spec import CalibrationSpec, wing_model
 from diagnosis.finding import Finding
 from records import Condition, Dataset
 from service.commands.output import progress
@@ -31,10 +42,11 @@ from workers import make_evaluator
 DIVISION = "11"
 HIDDEN: Concealed = {
     "hinge_offset": {"strength": 0.033, "direction": -0.8},  # m, rad from y to z
-    "drive_harmonics": {"strength": 0.125},  # part by which the frame of the linkage is longer
+    "drive_harmonics": {"strength": 0.08},  # part by which the frame of the linkage is longer
 }
-"""About the largest that a builder would not notice by eye, and that the library's bounds (0.15 mean chords, a tenth of
-the stroke) hold: markers are moved by 16 to 18 mm on average."""
+"""Markers are moved by 13 to 16 mm on average. The axis can hardly lie further off within the library's bounds. The
+linkage could, but what the library's drive lacks of it, its fourth harmonic, then swings the wing by millimetres.
+"""
 FITTED: tuple[Condition, ...] = (
     chamber(THIN_PA, LAGS[0], 2.0),
     chamber(THIN_PA, LAGS[1], 3.5),
@@ -46,23 +58,41 @@ HELD_OUT: tuple[Condition, ...] = (chamber(THIN_PA, LAGS[2], 2.5), tunnel(LAGS[2
 """At a frequency, and with a lag and an airspeed, that no fitted recording has together."""
 
 SEARCH_S = 240.0  # of the thesis's search, which is stopped then if it has not stalled
+RECENT, LITTLE = 10, 0.02  # generations that gain less than this part have stalled
 CENTIMETRES = 0.01  # m of mean distance: less is no stall "at centimetres"
 AT_FLOOR = 1.15  # held-out misfit over the floor that counts as the floor
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A dataset, and what was hidden in it: true values of the library's genes."""
+    """A dataset, true values of the nominal ``genome``, and of the library's genes for what was hidden."""
 
     dataset: Dataset
+    genome: Mapping[str, float]
     truth: Mapping[str, float]
+
+    def left_by_truth(self) -> float:
+        """Root mean square (m) that the true values leave on the held-out recordings, in the library's form.
+
+        Not zero but for noise: the library's drive has two harmonics in error, the plant's has all.
+        """
+        spec = CalibrationSpec(division=DIVISION, effects=tuple({name.partition(".")[0] for name in self.truth}))
+        model = wing_model(self.dataset, spec)
+        values = base_genome(model, {**self.genome, **self.truth}).values
+        held_out = [one for one in self.dataset.recordings if one.name in self.dataset.held_out]
+        left = [(model.observe([values], one).channels[0] - one.values).ravel() for one in held_out]
+        return float(np.sqrt(np.nanmean(np.concatenate(left) ** 2)))
 
 
 @dataclass(frozen=True)
 class Stall:
-    """Where the thesis's search ended; ``stalled`` by itself, or stopped for want of time."""
+    """Where the thesis's search ended; ``stalled`` by itself, or stopped for want of time.
+
+    ``gain`` is the part by which the best misfit fell over the last RECENT generations of its last stage.
+    """
 
     result: Result
+    gain: float
     generations: int
     evaluations: int
     seconds: float
@@ -83,7 +113,7 @@ def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
             tell((number + 1) / len(conditions), None, name_of(condition))
     truth = {gene: value for name, one in hidden.items() for gene, value in bench.laws[name].values(one).items()}
     dataset = Dataset("robird", bench.rig, tuple(recordings), tuple(name_of(condition) for condition in HELD_OUT))
-    return Campaign(dataset, truth)
+    return Campaign(dataset, genome, truth)
 
 
 def stall(
@@ -91,10 +121,12 @@ def stall(
 ) -> Stall:
     """Search the nominal model as the thesis does (population 50, structure in vacuum first), until it stalls."""
     spec, began = spec or CalibrationSpec(division=DIVISION), time.monotonic()
-    last, count, stalled = None, 0, True
+    last, stalled, stages, best = None, True, list[str](), list[float]()
     with progress(f"{dataset.name}: the thesis's search") as tell:
         for last in calibrate(spec, dataset, evaluator):
-            count, spent = count + 1, time.monotonic() - began
+            spent = time.monotonic() - began
+            stages.append(last.stage)
+            best.append(last.distance)
             note = f"{last.stage}, generation {last.index}, best {1e3 * last.distance:.1f} mm"
             tell(min(max(last.progress, spent / seconds if seconds else 1.0), 1.0), None, note)
             if spent > seconds and last.progress < 1.0:
@@ -103,18 +135,25 @@ def stall(
     if last is None:
         raise RuntimeError("the search had no generation")
     result = judge(spec, dataset, evaluator, last.genome)
-    return Stall(result, count, last.evaluations, time.monotonic() - began, stalled)
+    return Stall(result, gained(stages, best), len(best), last.evaluations, time.monotonic() - began, stalled)
+
+
+def gained(stages: Sequence[str], best: Sequence[float]) -> float:
+    """Part by which ``best`` fell over the last RECENT generations, of those of the last of ``stages``."""
+    recent = [one for stage, one in zip(stages, best, strict=True) if stage == stages[-1]][-RECENT - 1 :]
+    return 1.0 - recent[-1] / recent[0]
 
 
 def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> Story:
     """Record, search, diagnose, tell; everything written goes to ``folder``."""
     made = campaign(seed)
+    path = saved(made.dataset, folder)
     evaluator = make_evaluator("processes", workers)
     try:
         search = stall(made.dataset, evaluator, seconds)
     finally:
         evaluator.close()
-    finding, page = diagnosed(made.dataset, {"division": DIVISION}, folder, workers)
+    finding, page = diagnosed(path, {"division": DIVISION}, workers)
     return told(made, search, finding, page)
 
 
@@ -122,12 +161,14 @@ def told(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
     """The story in figures and in words."""
     best, kinds, floors = leader(finding), families(finding), over_floor(finding)
     rows = beside_truth({gene.name: gene for gene in finding.genes}, made.truth)
-    after = floors["heldout_over_floor"]
+    after, truth = floors["heldout_over_floor"], made.left_by_truth()
+    left = None if finding.proof is None else finding.proof.after.value * finding.proof.floor
     figures: dict[str, Any] = {
         "nominal_mm": 1e3 * search.result.before,
         "stall_mm": 1e3 * search.result.after,
         "stall_heldout_mm": _mm(search.result.held_out_after),
         "stalled": search.stalled,
+        "last_gain_percent": 100 * search.gain,
         "generations": search.generations,
         "evaluations": search.evaluations,
         "search_seconds": search.seconds,
@@ -141,26 +182,37 @@ def told(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
         "found_rms_mm": 1e3 * best.misfit,
         "noise_rms_mm": 1e3 * finding.floors.noise,
         **floors,
+        "truth_heldout_rms_mm": 1e3 * made.left_by_truth(),
+        "found_heldout_rms_mm": None
+        if finding.proof is None
+        else 1e3 * finding.proof.after.value * finding.proof.floor,
         "diagnosis_seconds": finding.seconds,
     }
     claims = (
-        Claim("the thesis's search stalls at centimetres", search.result.after >= CENTIMETRES),
+        Claim(
+            "the thesis's search stalls at centimetres",
+            search.result.after >= CENTIMETRES and (search.stalled or search.gain < LITTLE),
+        ),
         Claim("the tool says that it is the actuation", bool(kinds) and set(kinds) == {"actuation"}),
         Claim("it names the displaced axis and the drive profile", set(finding.named) == set(HIDDEN)),
         Claim("the held-out misfit falls to the floor", after is not None and after <= AT_FLOOR),
+        Claim("it falls to what the true values leave", left is not None and left <= AT_FLOOR * truth),
     )
-    return Story(figures, _lines(search, finding, rows), claims, page)
+    return Story(figures, _lines(search, finding, rows, left, truth), claims, page)
 
 
-def _lines(search: Stall, finding: Finding, rows: list[dict[str, Any]]) -> tuple[str, ...]:
+def _lines(
+    search: Stall, finding: Finding, rows: list[dict[str, Any]], left: float | None, truth: float
+) -> tuple[str, ...]:
     result = search.result
-    how = "stalls" if search.stalled else "is stopped"
+    how = "stalls" if search.stalled else f"is stopped (last {RECENT} generations: {100 * search.gain:.1f} % better)"
     return (
         f"the thesis's search begins at {1e3 * result.before:.1f} mm of mean distance and {how} at "
         f"{1e3 * result.after:.1f} mm ({search.generations} generations of 50, {search.seconds:.0f} s)",
         f"the tool, {finding.seconds:.0f} s: {finding.verdict}: {', '.join(finding.named) or 'nothing'}",
         finding.summary,
         *(_row(row) for row in rows),
+        f"  held out, root mean square: {_told(left)} with what was found; the true values leave {_told(truth)}",
     )
 
 
@@ -173,3 +225,7 @@ def _row(row: Mapping[str, Any]) -> str:
 
 def _mm(metres: float | None) -> float | None:
     return None if metres is None else 1e3 * metres
+
+
+def _told(metres: float | None) -> str:
+    return "unknown" if metres is None else f"{1e3 * metres:.2f} mm"

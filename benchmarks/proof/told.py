@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import webbrowser
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -42,16 +43,23 @@ class Story:
         return {**self.figures, "claims": [asdict(claim) for claim in self.claims], "report": str(self.report)}
 
 
-def diagnosed(dataset: Dataset, asked: Mapping[str, Any], folder: Path, workers: int) -> tuple[Finding, Path]:
-    """Write ``dataset`` to ``folder``, diagnose it as ``wingfit diagnose --local`` does, and write the report.
-
-    Nothing but the files of the dataset and ``asked`` (the options of that command) reaches the tool.
-    """
+def saved(dataset: Dataset, folder: Path) -> Path:
+    """Write ``dataset`` into ``folder``, in the place of one of an earlier run."""
     path = folder / dataset.name
+    if (path / "dataset.yaml").is_file():
+        shutil.rmtree(path)
     save_dataset(dataset, path)
-    with progress(f"{dataset.name}: diagnosing") as tell:
+    return path
+
+
+def diagnosed(path: Path, asked: Mapping[str, Any], workers: int) -> tuple[Finding, Path]:
+    """Diagnose the dataset at ``path`` as ``wingfit diagnose --local`` does, and write the report beside it.
+
+    Nothing but its files and ``asked`` (the options of that command) reaches the tool.
+    """
+    with progress(f"{path.name}: diagnosing") as tell:
         finding = diagnose(path, dict(asked), workers, tell)
-    page = folder / f"{dataset.name}.html"
+    page = path.with_name(f"{path.name}.html")
     page.write_text(html(finding), encoding="utf-8")
     return finding, page
 

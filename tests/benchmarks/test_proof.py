@@ -13,12 +13,12 @@ from benchmarks.proof import delfly, robird
 from benchmarks.proof.__main__ import main
 from benchmarks.proof.delfly import FLING, Lift
 from benchmarks.proof.robird import HIDDEN, Campaign, Stall
-from benchmarks.proof.told import Claim, Story, beside_truth, families, leader, opened, over_floor
+from benchmarks.proof.told import Claim, Story, beside_truth, families, leader, opened, over_floor, saved
 from calibration.evaluator import Evaluator
 from calibration.result import Result
 from calibration.spec import CalibrationSpec
-from diagnosis.finding import GeneValue, Interval
-from records import Dataset
+from diagnosis.finding import GeneValue, Interval, Proof
+from records import Dataset, load_dataset
 from sim.balance import TRIALS
 from sim.rig import robird_wing
 from tests.report.findings import force_finding, wing_finding
@@ -83,6 +83,12 @@ def test_what_is_hidden_moves_the_markers_by_centimetres(filmed: Campaign) -> No
         assert np.nanmean(np.linalg.norm(apart, axis=2)) > robird.CENTIMETRES
 
 
+def test_the_truth_leaves_less_than_the_description_and_more_than_noise(filmed: Campaign) -> None:
+    quiet = robird.campaign(4, hidden={})
+    noise, described = quiet.left_by_truth(), replace(filmed, truth={}).left_by_truth()
+    assert 1.2 * noise < filmed.left_by_truth() < 0.2 * described
+
+
 def test_the_thesis_search_reports_where_it_ended(filmed: Campaign, evaluator: Evaluator) -> None:
     chosen = [r for r in filmed.dataset.recordings if r.condition in (chamber(1e3, 0.0, 2.0), robird.FITTED[3])]
     small = replace(filmed.dataset, recordings=tuple(chosen), held_out=())
@@ -95,21 +101,31 @@ def test_the_thesis_search_reports_where_it_ended(filmed: Campaign, evaluator: E
     assert cut.generations < found.generations
 
 
-def test_the_robirds_claims_fail_where_the_tool_is_wrong() -> None:
-    made = Campaign(Dataset("robird", robird_wing(), (), ()), {"hinge_offset.y": 0.0120, "hinge_offset.z": -0.005})
-    search = Stall(Result((), (), 0.03, 0.02, 0.031, 0.021, 3e-4), 30, 1500, 60.0, stalled=True)
-    found = wing_finding()
+def test_what_a_search_gained_lately_is_that_of_its_last_stage() -> None:
+    assert robird.gained(["a", "a", "b", "b"], [0.04, 0.03, 0.02, 0.015]) == pytest.approx(0.25)
+    assert robird.gained(["a"] * 12, [0.05, 0.04, *[0.03] * 10]) == pytest.approx(0.25)
+    assert robird.gained(["a"], [0.02]) == 0.0
+
+
+def test_the_robirds_claims_fail_where_the_tool_is_wrong(filmed: Campaign) -> None:
+    made = replace(filmed, truth={"hinge_offset.y": 0.0120, "hinge_offset.z": -0.005})
+    search = Stall(Result((), (), 0.03, 0.02, 0.031, 0.021, 3e-4), 0.01, 30, 1500, 60.0, stalled=True)
+    found, proof = wing_finding(), Proof(Interval(4.4, 4.1, 4.7), Interval(1.04, 1.0, 1.1), 1e-3, True, "")
+    found = replace(found, proof=proof)
     story = robird.told(made, search, found, PAGE)
-    assert held(story) == [True] * 4
+    assert held(story) == [True] * 5
     assert [row["covered"] for row in story.figures["genes"]] == [True, False]
     assert story.figures["stall_mm"] == pytest.approx(20.0)
     wrong = replace(found, named=("camera_rotation",), verdict="measurement fault")
-    assert held(robird.told(made, search, wrong, PAGE)) == [True, False, False, True]
-    assert held(robird.told(made, search, replace(found, named=()), PAGE)) == [True, False, False, True]
-    assert found.proof is not None
-    worse = replace(found, proof=replace(found.proof, after=Interval(1.2, 1.1, 1.3)))
-    assert held(robird.told(made, search, worse, PAGE))[3] is False
-    assert held(robird.told(made, search, replace(found, proof=None), PAGE))[3] is False
+    assert held(robird.told(made, search, wrong, PAGE)) == [True, False, False, True, True]
+    assert held(robird.told(made, search, replace(found, named=()), PAGE)) == [True, False, False, True, True]
+    worse = replace(found, proof=replace(proof, after=Interval(1.2, 1.1, 1.3)))
+    assert held(robird.told(made, search, worse, PAGE))[3:] == [False, True]
+    far = replace(found, proof=replace(proof, floor=1.3 * made.left_by_truth()))
+    assert held(robird.told(made, search, far, PAGE))[3:] == [True, False]
+    assert held(robird.told(made, search, replace(found, proof=None), PAGE))[3:] == [False, False]
+    moving = replace(search, stalled=False, gain=0.1)
+    assert held(robird.told(made, moving, found, PAGE))[0] is False
     near = replace(search, result=replace(search.result, after=0.004))
     assert held(robird.told(made, near, found, PAGE))[0] is False
 
@@ -204,3 +220,15 @@ def test_the_command_ends_with_figures_and_fails_with_a_claim(
     assert last["robird"]["stall_mm"] == 20.0
     assert last["robird"]["claims"] == [{"words": "it is so", "holds": holds}]
     assert "delfly" not in last
+
+
+def test_a_dataset_takes_the_place_of_an_earlier_one_and_of_nothing_else(weighed: Dataset, tmp_path: Path) -> None:
+    (tmp_path / "delfly").mkdir()
+    kept = tmp_path / "delfly" / "notes.txt"
+    kept.write_text("mine")
+    with pytest.raises(ValueError, match="not an empty folder"):
+        saved(weighed, tmp_path)
+    assert kept.exists()
+    kept.unlink()
+    for _ in range(2):
+        assert len(load_dataset(saved(weighed, tmp_path)).recordings) == len(weighed.recordings)
