@@ -20,7 +20,7 @@ EFFECT = Effect(
     family="actuation",
     port="drive",
     size=tuple(
-        Parameter(axis, "m", -0.15, 0.15, 0.03, f"how far the true axis lies {where} the one told", of="chord")
+        Parameter(axis, "m", -0.4, 0.4, 0.03, f"how far the true axis lies {where} the one told", of="chord")
         for axis, where in (("y", "outboard of"), ("z", "above"))
     ),
     source="rotation about a displaced axis, p' = s + R (p - s) (Euler 1776; Goldstein 1950, Classical Mechanics, "

@@ -61,8 +61,8 @@ def _shape(draft: Draft, strength: float, _: Values) -> None:
 
 def _shape_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
     change = _otherwise(wing, strength) / abs(series_of(wing.drive)[1])
-    found = {f"drive_harmonics.cos{k}": float(change[k].real) for k in (2, 3)}
-    return found | {f"drive_harmonics.sin{k}": -float(change[k].imag) for k in (2, 3)}
+    found = {f"drive_harmonics.cos{k}": float(change[k].real) for k in (2, 3, 4)}
+    return found | {f"drive_harmonics.sin{k}": -float(change[k].imag) for k in (2, 3, 4)}
 
 
 def _late(draft: Draft, strength: float, _: Values) -> None:
