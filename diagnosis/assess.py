@@ -99,6 +99,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     finer, better = next(((f, r) for f, r in found if r is not None and improves(r, best)), (nominal.subject, None))
     first = None if better is None else again(finer, stack, evaluator, nominal.refit)
     if better is None or first is None:
+        state.nominal = replace(nominal, innocent=True)
         return
     others = [better if one is best else again(finer, stack, evaluator, one) for one in state.refits]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"

@@ -14,6 +14,7 @@ from diagnosis import maps
 from diagnosis.advise import advised, separations
 from diagnosis.assess import Assessment
 from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
+from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
@@ -171,13 +172,16 @@ def _finding(
         law=lacking.law,
         advice=advice,
         outline=subject.outline,
-        remarks=(*state.nominal.remarks, *_doubts(stack)),
+        remarks=(*state.nominal.remarks, *_innocence(state.nominal), *_doubts(stack)),
     )
 
 
 def _division(state: Assessment) -> float:
-    """Misfit that the model's division leaves: what a finer one says, but no more than the best explanation leaves."""
-    if state.nominal is None or state.weighed is None or state.nominal.division is None:
+    """Misfit that the model's division leaves: what a finer one says, but no more than the best explanation leaves.
+
+    None of it where a finer division fits no better.
+    """
+    if state.nominal is None or state.weighed is None or state.nominal.division is None or state.nominal.innocent:
         return 0.0
     least = min(one.excess for one in state.weighed.refits)
     return min(state.nominal.division, float(np.sqrt(max(least, 0.0))))
@@ -189,7 +193,8 @@ def _floors(state: Assessment, division: float) -> Floors:
         raise ValueError("the nominal model has not been fitted")
     memory = float(np.median([view.memory for view in stack.views]))
     total = float(np.sqrt(stack.noise**2 + division**2 + stack.tolerance**2))
-    return Floors(stack.noise, memory, nominal.division, nominal.finer, stack.tolerance, total)
+    left = 0.0 if nominal.innocent else nominal.division
+    return Floors(stack.noise, memory, left, nominal.finer, stack.tolerance, total)
 
 
 def _told(stack: Stack, nominal: Refit, best: Refit, place: str, proved: Proof | None) -> Mapping[str, str]:
@@ -206,6 +211,12 @@ def _told(stack: Stack, nominal: Refit, best: Refit, place: str, proved: Proof |
         "where": place,
         "held_out": f"On {proved.words}." if proved else "No recording is held out, so that nothing proves it.",
     }
+
+
+def _innocence(nominal: Nominal) -> tuple[str, ...]:
+    if not nominal.innocent:
+        return ()
+    return (f"a finer division ({nominal.finer}) was fitted and did no better: the division is not what limits",)
 
 
 def _doubts(stack: Stack) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ class Nominal:
         refit: its fit.
         division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
         finer: in words.
+        innocent: whether a finer division was fitted and did no better, so that it is not the division that limits.
         remarks: for the reader.
     """
 
@@ -45,6 +46,7 @@ class Nominal:
     division: float | None
     finer: str
     remarks: tuple[str, ...]
+    innocent: bool = False
 
 
 def first_fit(
@@ -67,18 +69,18 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
     """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
     now, remarks = judged(stack, fit), list[str]()
     for _ in range(ROUNDS):
-        left, finest, better = 0.0, "", None
+        left, finest, better, tried = 0.0, "", None, False
         for finer in subject.finer():
             changes, takes = _leaves(finer, stack, evaluator, now.fit)
             if changes <= left:
                 continue
             left, finest = changes, finer.told
             if refine and takes > PROMISING and matters(stack, changes, now):
-                better = _better(finer, stack, evaluator, now)
+                better, tried = _better(finer, stack, evaluator, now), True
             if better is not None:
                 break
         if better is None:
-            return Nominal(subject, now, left if finest else None, finest, tuple(remarks))
+            return Nominal(subject, now, left if finest else None, finest, tuple(remarks), tried)
         remarks.append(
             f"the division limits the model: {finest} leaves {_percent(better.excess, now.excess)} of the excess "
             f"misfit that {subject.told} leaves, and was taken instead"

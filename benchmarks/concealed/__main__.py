@@ -28,7 +28,11 @@ def main() -> None:
     parser.add_argument("--only", action="append", choices=GROUPS, default=[], help="only this group of trials")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--seed", type=int, default=1, help=f"below {DEVELOPMENT}; the same seed, the same table")
-    parser.add_argument("--keep", type=Path, help="keep datasets, answers and findings in this folder")
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        help="keep datasets, answers and findings in this folder, and go on with those that it holds",
+    )
     parser.add_argument("--peers", action="store_true", help="also the peers of the extra [peers]")
     parser.add_argument("--make", type=Path, help="only leave datasets for development in this folder")
     parser.add_argument("--n", type=int, default=10, help="how many of those")

@@ -6,8 +6,7 @@ searched, so that the scorer's refit leaves the misfit that is aimed at. The sam
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -27,8 +26,8 @@ from records import Condition, Dataset, Recording, load_dataset, save_dataset
 Array = npt.NDArray[np.float64]
 
 ATTEMPTS = 4  # draws of a trial, where the plant cannot run one
-ROUNDS = 2  # of the final refit
-CORRECTIONS, NEAR = 3, 0.2  # full refits within a search for a strength; relative error of d that ends it
+ROUNDS = 3  # of a refit, at most
+CORRECTIONS = 1  # of a strength by full refits; what then lacks, less noise makes up for
 LITTLE = 0.85  # of the d that is aimed at: what stays below is recorded with less noise, where cameras get as good
 
 
@@ -178,8 +177,8 @@ class Strength:
     """What is left of changes when the nominal model is refitted: of a bare specimen under the fitted conditions.
 
     The plant is changed at the model's own division, which is cheaper and means the same. A strength is searched with
-    the genes' tangent about the true genome; a full refit then says how far that is from the truth, and the search goes
-    on from there.
+    the genes' tangent about the true genome first, then by full refits, each of which may begin where one before ended
+    (``ends``: what it left, and where, by what is hidden).
     """
 
     bare: Specimen
@@ -187,7 +186,8 @@ class Strength:
     refit: Refit
     coarse: Specimen
     plain: Array
-    changes: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
+    changes: dict[Hashable, Array] = field(default_factory=dict, repr=False)
+    ends: dict[Hashable, tuple[float, Array]] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
@@ -201,7 +201,7 @@ class Strength:
 
     def change(self, hidden: Concealed) -> Array:
         """[D] that hiding ``hidden`` changes. It is remembered."""
-        key = tuple((name, *values.items()) for name, values in hidden.items())
+        key = _key(hidden)
         if key not in self.changes:
             self.changes[key] = stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
         return self.changes[key]
@@ -226,19 +226,39 @@ class Strength:
         def linear(size: float) -> float:
             return self.refit.linear(self.change({name: sized(size)})) / noise
 
-        size, factor, limits = 1.0, 1.0, self.bare.bench.limits(name)
-        for _ in range(CORRECTIONS):
-            size, said = strength_for(target / factor, linear, size, limits)
-            found = self.refit.full(self.change({name: sized(size)})) / noise
-            if abs(math.log(max(found, 1e-9) / target)) < NEAR or (found < target and size >= 0.999 * limits[1]):
-                break
-            factor = min(max(found, 1e-9) / max(said, 1e-9), 1.0)
+        def full(size: float) -> float:
+            truth, hidden = self.refit.unit, {name: sized(size)}
+            near = [truth + part * (end - truth) for old, end in ends.items() for part in (1, size / old)]
+            left = self._refit(hidden, [np.clip(one, 0.0, 1.0) for one in near])
+            ends[size] = self.ends[_key(hidden)][1]
+            return left / noise
+
+        ends: dict[float, Array] = {}
+        limits = self.bare.bench.limits(name)
+        start, _ = strength_for(target, linear, 1.0, limits)
+        size, found = strength_for(target, full, start, limits, CORRECTIONS)
         return sized(size), found
 
     def final(self, specimen: Specimen) -> float:
-        """Root mean square that a full refit leaves of what is hidden, m or N."""
-        return self.refit.full(self.change(specimen.hidden), rounds=ROUNDS) if specimen.hidden else 0.0
+        """Root mean square that a full refit leaves of what is hidden, m or N; of a single thing it is known by now."""
+        hidden = specimen.hidden
+        key = _key(hidden)
+        if hidden and key not in self.ends:
+            self._refit(hidden, [end for _, end in self.ends.values()])
+        return self.ends[key][0] if hidden else 0.0
+
+    def _refit(self, hidden: Concealed, near: Sequence[Array]) -> float:
+        self.ends[_key(hidden)] = self.refit.full(self.change(hidden), rounds=ROUNDS, near=near)
+        return self.ends[_key(hidden)][0]
 
     def division(self) -> float:
-        """The same of the plant with nothing hidden, linearly: by the model's division, and by what solvers differ."""
-        return self.refit.linear(stacked(self.refit.recordings) - self.refit.nominal)
+        """The same of the plant with nothing hidden, linearly: by the model's division, and by what solvers differ.
+
+        At equal divisions only the solvers differ, and no refit is needed to see that it is little.
+        """
+        change = stacked(self.refit.recordings) - self.refit.nominal
+        return rms(change) if self.coarse.bench is self.bare.bench else self.refit.linear(change)
+
+
+def _key(hidden: Concealed) -> Hashable:
+    return tuple((name, *sorted(values.items())) for name, values in hidden.items())

@@ -34,6 +34,7 @@ class Mark:
         held_out: misfit over floor on held-out recordings; worse: larger than the refitted nominal model's.
         span, chord, phase: distances from the truth in parts of R and c, and in degrees.
         covered, intervals: 90 % intervals that hold the truth, and their number.
+        finer, division, plant: as in the answer.
         remark: why there is no finding, or what else a reader of failures wants.
     """
 
@@ -61,6 +62,8 @@ class Mark:
     covered: int = 0
     intervals: int = 0
     finer: bool = False
+    division: str = ""
+    plant: str = ""
     seconds: float = 0.0
     remark: str = ""
 
@@ -82,6 +85,8 @@ def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
         found=0 if missed else None,
         right_side=False if missed else None,
         finer=answer.finer,
+        division=answer.division,
+        plant=answer.plant,
         remark=remark,
     )
 

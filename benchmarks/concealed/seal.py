@@ -36,9 +36,16 @@ def digest(text: str) -> str:
 
 
 def close(hashes: Mapping[str, str], folder: Path) -> str:
-    """Write the manifest of all hashes; its own hash is returned, to be told before the diagnosis."""
+    """Write the manifest of all hashes; its own hash is returned, to be told before the diagnosis.
+
+    BrokenSealError where the folder has been closed before and an answer has changed since.
+    """
+    path = folder / MANIFEST
+    before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    if changed := [name for name, known in before.items() if hashes.get(name, known) != known]:
+        raise BrokenSealError(f"answers have changed since they were sealed: {', '.join(changed)}; run them again")
     text = json.dumps(dict(sorted(hashes.items())), indent=1)
-    (folder / MANIFEST).write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return digest(text)
 
 

@@ -20,10 +20,13 @@ from sim.model import Model
 Array = npt.NDArray[np.float64]
 
 STEP = 0.01  # of a gene's box, of finite differences
-DAMPINGS = (0.0, 1e-3, 1e-2, 1e-1, 1.0)  # of Gauss-Newton, tried at once
-STEPS = 8
-SETTLED = 5e-3  # relative gain in root mean square below which a refit ends
-CLOSE = 0.15  # relative error of d that a search for a strength is content with
+DAMPINGS = (0.0, 1e-3, 1e-2, 1e-1, 1.0)  # of Gauss-Newton, tried at once with a part of the first moves:
+PART, PARTS = 0.4, 3
+STEPS = 5  # with slopes that are not measured anew
+SETTLED = 0.02  # relative gain in root mean square below which a refit ends
+FAR = 4.0  # times a strength: as far as one step of a search goes
+ALIKE = 0.92, 1.04  # times the misfit that the tangent foretells
+CLOSE = 0.2  # relative error of d that a search for a strength is content with
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,7 @@ class Refit:
     @cached_property
     def nominal(self) -> Array:
         """[D] of the true values; RuntimeError where they cannot be simulated."""
-        return _whole(self.observed(self.unit[None], self.recordings))[0]
+        return np.asarray(_whole(self.observed(self.unit[None], self.recordings))[0])
 
     @cached_property
     def tangent(self) -> Array:
@@ -91,26 +94,41 @@ class Refit:
         slopes = self.tangent[told]
         return rms(slopes @ _bounded(slopes, -change[told], self.unit, 0.0) - change[told])
 
-    def full(self, change: Array, *, rounds: int = 1) -> float:
-        """The same by a refit inside the genes' boxes.
+    def full(self, change: Array, *, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[float, Array]:
+        """The same by a refit inside the genes' boxes, and the genes [F] that it ends with, in parts of their boxes.
 
         The refitted data are what the nominal model shows, with ``change`` added; so a coarser division of the model
-        counts for nothing here.
+        counts for nothing here. It begins at the best of the true values and all ``near`` [F]. Where the first round
+        leaves what the tangent foretold there are no more.
         """
-        return rms(self.refitted(self.nominal + change, rounds)[1])
+        target = self.nominal + change
+        unit, residual = self.refitted(target, 1, near)
+        low, high = (part * self.linear(change) for part in ALIKE)
+        if rounds > 1 and not low < rms(residual) < high:
+            unit, residual = self.refitted(target, rounds - 1, [unit])
+        return rms(residual), unit
 
-    def refitted(self, target: Array, rounds: int = 1) -> tuple[Array, Array]:
+    def refitted(self, target: Array, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[Array, Array]:
         """Genes [F] in parts of their boxes and the residual [D] of a refit to ``target`` [D].
 
-        Damped Gauss-Newton steps, of several dampings the best; the slopes learn from every step (Broyden 1965), and
-        are measured anew before each of the ``rounds`` but the first.
+        Damped Gauss-Newton steps, of several the best; the slopes learn from every step (Broyden 1965), and are
+        measured anew before each of the ``rounds`` (about the true values they are known already), as far as the model
+        moves there.
         """
         recordings = with_values(self.recordings, target)
-        told = np.isfinite(target)
-        unit, residual = self.unit, self.observed(self.unit[None], recordings)[0] - target
+        starts = np.stack([self.unit, *near])
+        seen = self.observed(starts, recordings) - target
+        best = _best(seen, np.isfinite(target))
+        unit, residual = starts[best], _whole(seen[best][None])[0]
         for turn in range(rounds):
-            slopes = (self.tangent_at(unit, recordings) if turn else self.tangent)[told]
-            unit, residual = self._descended(recordings, target, unit, residual, slopes)
+            before = rms(residual)
+            try:
+                slopes = self.tangent if turn == 0 and best == 0 else self.tangent_at(unit, recordings)
+            except RuntimeError:
+                break
+            unit, residual = self._descended(recordings, target, unit, residual, slopes[np.isfinite(target)])
+            if rms(residual) > (1 - SETTLED) * before:
+                break
         return unit, residual
 
     def _descended(
@@ -118,24 +136,38 @@ class Refit:
     ) -> tuple[Array, Array]:
         told = np.isfinite(target)
         for _ in range(STEPS):
-            moves = np.array([_bounded(slopes, residual[told], unit, damping) for damping in DAMPINGS])
+            whole = np.array([_bounded(slopes, residual[told], unit, damping) for damping in DAMPINGS])
+            moves = np.concatenate([whole, PART * whole[:PARTS]])
             found = self.observed(unit + moves, recordings) - target
-            left = np.array([rms(one) if np.isfinite(one[told]).all() else np.inf for one in found])
-            good = np.flatnonzero(np.isfinite(left))
-            for k in good[np.argsort(left[good])[::-1]]:  # the best last: what it shows holds exactly
+            for k in _order(found, told)[::-1]:  # the best last: what it shows holds exactly
                 slopes = _learned(slopes, moves[k], (found[k] - residual)[told])
-            best, before = int(np.argmin(left)), rms(residual)
-            if left[best] >= before:
+            best, before = _best(found, told), rms(residual)
+            if not _left(found[best], told) < before:
                 break
             unit, residual = unit + moves[best], found[best]
-            if left[best] > (1 - SETTLED) * before:
+            if rms(residual) > (1 - SETTLED) * before:
                 break
         return unit, residual
 
 
+def _left(residual: Array, told: npt.NDArray[np.bool_]) -> float:
+    """Root mean square; infinite for what could not be simulated."""
+    return rms(residual) if np.isfinite(residual[told]).all() else math.inf
+
+
+def _order(residuals: Array, told: npt.NDArray[np.bool_]) -> list[int]:
+    """Rows of ``residuals`` that could be simulated, the smallest first."""
+    left = [_left(one, told) for one in residuals]
+    return [int(k) for k in np.argsort(left) if left[k] < math.inf]
+
+
+def _best(residuals: Array, told: npt.NDArray[np.bool_]) -> int:
+    return next(iter(_order(residuals, told)), 0)
+
+
 def _whole(seen: Array) -> Array:
     if np.isnan(seen).all(axis=1).any():
-        raise RuntimeError("the nominal model has no periodic motion about the true genome: draw another")
+        raise RuntimeError("the nominal model has no periodic motion about these genes: draw others")
     return seen
 
 
@@ -190,7 +222,7 @@ def strength_for(
         if _off(found, target) < CLOSE:
             return at, found
         ratio = target / max(found, 1e-12)
-        ahead = min(max(at * ratio ** (1 / power), at / 8, low), at * 8, high)
+        ahead = min(max(at * ratio ** (1 / power), at / FAR, low), at * FAR, high)
         if ahead == at:
             break
         try:

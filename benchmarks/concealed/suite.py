@@ -12,9 +12,9 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -27,6 +27,7 @@ from benchmarks.concealed.table import Advised, Table
 from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
 from records import Condition
+from report import finding_from_json, finding_json
 
 if TYPE_CHECKING:
     from benchmarks.concealed.peers import PeerOutcome
@@ -60,6 +61,10 @@ class Folders:
         """What the tool said, as JSON."""
         return self.root / "findings"
 
+    def answer(self, trial: str) -> Path:
+        """Sealed."""
+        return self.sealed / f"{trial}.json"
+
     def dataset(self, label: str) -> Path:
         """Of a trial, or of its repetition."""
         return self.datasets / f"{label}.nc"
@@ -82,15 +87,23 @@ def pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def each(
-    executor: ProcessPoolExecutor, work: Callable[[In], Out], items: Iterable[In], label: str, *, quiet: bool = False
+    executor: Executor,
+    work: Callable[[In], Out],
+    items: Iterable[In],
+    label: str,
+    keep: Callable[[Out], None] | None = None,
 ) -> list[Out]:
-    """Results in the order of ``items``, with progress and the time that is left on standard error."""
+    """Results in the order of ``items``, with progress and the time that is left on standard error.
+
+    ``keep`` is called with each as it comes.
+    """
     start, running = time.perf_counter(), [executor.submit(work, item) for item in items]
     done: set[Future[Out]] = set()
     for future in as_completed(running):
         done.add(future)
-        if not quiet:
-            _tell(label, len(done), len(running), time.perf_counter() - start)
+        if keep:
+            keep(future.result())
+        _tell(label, len(done), len(running), time.perf_counter() - start)
     return [future.result() for future in running]
 
 
@@ -102,12 +115,31 @@ def _tell(label: str, done: int, total: int, seconds: float) -> None:
 
 
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
-    """Write the datasets and seal the answers; returns the hash of the manifest."""
+    """Write the datasets and seal the answers; returns the hash of the manifest.
+
+    Trials that the folder holds already, of the same seed, are not made again.
+    """
     folders.datasets.mkdir(parents=True, exist_ok=True)
+    lacking = [trial for trial in trials if not _made(trial, folders)]
     with pool(jobs) as executor:
-        orders = [laboratory.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in trials]
-        hashes = each(executor, laboratory.make, orders, "recording and sealing")
-    return seal.close(dict(zip((t.name for t in trials), hashes, strict=True)), folders.sealed)
+        orders = [laboratory.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in lacking]
+        each(executor, laboratory.make, orders, "recording and sealing")
+    hashes = {trial.name: seal.digest(folders.answer(trial.name).read_text(encoding="utf-8")) for trial in trials}
+    return seal.close(hashes, folders.sealed)
+
+
+def _made(trial: Trial, folders: Folders) -> bool:
+    """Whether the folder holds it; ValueError where what it holds under its name is another suite's."""
+    if not (folders.answer(trial.name).exists() and folders.dataset(trial.name).exists()):
+        return False
+    kept = seal.read(folders.answer(trial.name))
+    told, asked = (kept.seed, kept.names, kept.plant, kept.target), (trial.seed, frozenset(trial.hidden))
+    if told != (*asked, trial.build.plant, trial.target):
+        raise ValueError(
+            f"{folders.root} holds another {trial.name} (seed {kept.seed}) than is asked for (seed {trial.seed}): "
+            "name an empty folder, or the suite that it was made for"
+        )
+    return True
 
 
 def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = False) -> dict[str, Table]:
@@ -149,16 +181,32 @@ def _table_of_peer(outcomes: Sequence[PeerOutcome], answers: Mapping[str, Answer
     return Table(marks, (), 0, sum(outcome.seconds for outcome in outcomes))
 
 
-def diagnosed(
-    tool: ProcessPoolExecutor, labelled: Sequence[tuple[Trial, str]], folders: Folders, what: str
-) -> list[Outcome]:
+def diagnosed(tool: Executor, labelled: Sequence[tuple[Trial, str]], folders: Folders, what: str) -> list[Outcome]:
     """Diagnose the datasets of trials under their labels, and keep the findings."""
     tasks = [task(trial, label, folders) for trial, label in labelled]
-    outcomes = each(tool, run, tasks, what)
-    for outcome in outcomes:
-        kept = asdict(outcome.finding) if outcome.finding else {"failed": outcome.reason}
-        (folders.findings / f"{outcome.trial}.json").write_text(json.dumps(kept), encoding="utf-8")
-    return outcomes
+    kept = {one.trial: found for one in tasks if (found := _kept(one, folders)) is not None}
+
+    def keep(outcome: Outcome) -> None:
+        kept[outcome.trial] = outcome
+        path = folders.findings / f"{outcome.trial}.json"
+        told = finding_json(outcome.finding) if outcome.finding else {"failed": outcome.reason}
+        path.with_suffix(".part").write_text(json.dumps(told), encoding="utf-8")
+        path.with_suffix(".part").replace(path)
+
+    each(tool, run, [one for one in tasks if one.trial not in kept], what, keep)
+    return [kept[one.trial] for one in tasks]
+
+
+def _kept(asked: Task, folders: Folders) -> Outcome | None:
+    """The finding of an earlier run, if it was about the very dataset; a failed one is tried again."""
+    path = folders.findings / f"{asked.trial}.json"
+    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+        return None
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    if "failed" in stored:
+        return None
+    finding = finding_from_json(stored)
+    return Outcome(asked.trial, finding, "", finding.seconds)
 
 
 def task(trial: Trial, label: str, folders: Folders) -> Task:
@@ -174,7 +222,7 @@ def _open(trial: Trial, outcome: Outcome) -> bool:
 
 
 def follow_up(
-    tool: ProcessPoolExecutor, trials: Sequence[Trial], first: dict[str, Outcome], folders: Folders, jobs: int
+    tool: Executor, trials: Sequence[Trial], first: dict[str, Outcome], folders: Folders, jobs: int
 ) -> dict[str, Outcome]:
     """Record each trial's rig once more, as advised and at random, and diagnose again; outcomes by label."""
     wanted = [

@@ -119,6 +119,11 @@ class Table:
             "advice: resolved": Rate(sum(one.resolved for one in self.advised), len(self.advised)),
             "advice: by a random recording": Rate(sum(one.by_chance for one in self.advised), len(self.advised)),
             "plant finer than the model": rate(self.marks, lambda m: m.finer),
+            **{
+                f"{where}: {what}": rate([one for one in of(self.marks, group) if of_rig(one) == where], good)
+                for where in sorted({of_rig(one) for one in self.marks})
+                for group, what, good in BY_RIG
+            },
         }
 
     @property
@@ -243,6 +248,25 @@ def wrongs(one: Mark) -> str:
         said += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
     said += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
     return "; ".join(said)
+
+
+def of_rig(one: Mark) -> str:
+    """The rig of a trial with the divisions of tool and plant, for people."""
+    return f"{one.rig} {one.division} of {one.plant}".removesuffix("  of ")
+
+
+def right(one: Mark) -> bool | None:
+    """Whether a trial that is strong enough went as its group asks; None of those that are too weak to count."""
+    return None if one.truth and one.strength < WEAK else not wrongs(one)
+
+
+BY_RIG: tuple[tuple[str, str, Callable[[Mark], bool | None]], ...] = (
+    ("null", "nulls without alarm", lambda m: not m.alarm),
+    ("listed", "listed all right", right),
+    ("unlisted", "unlisted unnamed", lambda m: None if m.strength < WEAK else m.verdict == "unnamed"),
+    ("measurement", "measurement right side", lambda m: None if m.strength < WEAK else m.right_side),
+    ("pairs", "pairs both", lambda m: m.found == 2),
+)
 
 
 def kinds(marks: Sequence[Mark]) -> list[str]:

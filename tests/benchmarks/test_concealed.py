@@ -1,23 +1,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.concealed.answer import Answer, Secret
+from benchmarks.concealed.answer import GROUPS, Answer, Secret
 from benchmarks.concealed.laboratory import Addition, Order, add, make
+from benchmarks.concealed.plant import observe, observe_forces
+from benchmarks.concealed.plant.catalogue import UNKNOWN
 from benchmarks.concealed.score import Mark, beats_apart, blank, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
-from benchmarks.concealed.strength import Refit, rms, strength_for
+from benchmarks.concealed.strength import rms
+from benchmarks.concealed.suite import Folders, diagnosed
+from benchmarks.concealed.suite import make as make_all
 from benchmarks.concealed.table import Advised, Rate, Table, at
 from benchmarks.concealed.trials import COUNTS, EQUAL, VEHICLE, Trial, any_condition, conditions, name_of, plan
 from diagnosis.finding import Finding, Floors, GeneValue, Hypothesis, Interval, RecordingMisfit, Verdict, Where
-from records import Condition, Gene, Recording, load_dataset
-from sim.model import Observation
+from records import Condition, load_dataset
+from report import finding_json
 
 CONDITION = Condition(3.0, 0.05, 1e5, 293.15)
 MASS = Secret("lumped_mass", True, "physics", 1.0, span=0.8, chord=0.3, phase=0.02, values={"lumped_mass.mass": 0.004})
@@ -143,6 +147,34 @@ def test_a_changed_answer_is_refused(tmp_path: Path, spoil: str) -> None:
         open_seal("trial-0001", tmp_path, closed)
 
 
+def test_a_folder_that_was_closed_keeps_its_answers(tmp_path: Path) -> None:
+    hashes = {"trial-0001": seal(answer(MASS), tmp_path)}
+    assert close(hashes, tmp_path) == close(hashes, tmp_path)
+    with pytest.raises(BrokenSealError, match="trial-0001"):
+        close({"trial-0001": digest("another")}, tmp_path)
+
+
+def test_what_is_there_already_is_not_made_or_diagnosed_again(tmp_path: Path) -> None:
+    folders, trial = Folders(tmp_path), vehicle_trial("stroke_amplitude")
+    folders.findings.mkdir()
+    make_all([trial], folders, 1)
+    stamp = folders.dataset(trial.name).stat().st_mtime_ns
+    make_all([trial], folders, 1)
+    assert folders.dataset(trial.name).stat().st_mtime_ns == stamp
+    with pytest.raises(ValueError, match="seed"):
+        make_all([replace(trial, seed=78)], folders, 1)
+    path = folders.findings / f"{trial.name}.json"
+    path.write_text(json.dumps(finding_json(finding("unnamed"))))
+    with ThreadPoolExecutor(1) as executor:
+        (outcome,) = diagnosed(executor, [(trial, trial.name)], folders, "")
+        assert outcome.finding == finding("unnamed")
+        path.write_text(json.dumps({"failed": "it crashed"}))
+        folders.dataset(trial.name).write_bytes(b"nothing")  # so that the diagnosis fails, and says so in its place
+        (outcome,) = diagnosed(executor, [(trial, trial.name)], folders, "")
+    assert outcome.finding is None
+    assert "it crashed" not in path.read_text()
+
+
 def test_wilson_interval_as_in_print() -> None:
     """Brown, Cai and DasGupta (2001): 0 of 10 at 95 % reaches 0.278; at 90 % z^2 / (n + z^2)."""
     assert Rate(0, 150).interval == pytest.approx((0.0, 100 * 1.6449**2 / (150 + 1.6449**2)), abs=0.05)
@@ -177,6 +209,10 @@ def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
     assert [row["trial"] for row in figures["failures"]] == ["trial-1", "trial-2", "trial-3", "trial-6"]
     assert {"seconds", "coverage_percent", "place", "pairs", "measurement"} <= set(figures)
     assert len(at(marks, 5)) == 1
+    rows = Table((*marks, replace(marks[0], division="4", plant="8x1")), advised, 1, 3.0).rows()
+    assert rows["wing 4 of 4: nulls without alarm"].startswith(" 50.0 %  (1 of 2")
+    assert rows["wing 4 of 8x1: nulls without alarm"].startswith("100.0 %  (1 of 1")
+    assert rows["wing 4 of 4: unlisted unnamed"].startswith(" 50.0 %  (1 of 2")
     json.dumps(figures)
 
 
@@ -203,11 +239,22 @@ def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
     assert sum(trial.build.plant != trial.build.division for trial in trials) >= len(trials) / 3
     assert {trial.build.division for trial in trials} == {"", "4", "11", "24"}
     assert len({trial.name for trial in trials}) == len(trials) == len({trial.seed for trial in trials})
+    physics = {kind for (kind,) in set(unlisted)} - set(observe.FAULTS) - set(observe_forces.FAULTS)
+    assert len(physics & set(UNKNOWN)) >= 5
+    assert len(physics - set(UNKNOWN)) >= 2
     groups = [trial.group for trial in trials[:60]]
     assert len(set(groups)) >= 4  # names are dealt at random
     assert trials == plan(3)
     assert trials != plan(4)
     assert plan(3, only=["pairs"]) == tuple(trial for trial in trials if trial.group == "pairs")
+
+
+def test_a_sample_touches_every_group_and_both_rigs() -> None:
+    sample = plan(1, quick=True)
+    assert len(sample) <= 40
+    for group in GROUPS:
+        rigs = {trial.build.rig for trial in sample if trial.group == group}
+        assert rigs == {"wing", "vehicle"}, group
 
 
 def test_conditions_keep_to_the_rigs() -> None:
@@ -220,70 +267,6 @@ def test_conditions_keep_to_the_rigs() -> None:
             if trial.build.rig == "wing":
                 assert 2.0 <= condition.flap_frequency <= 4.0
                 assert condition.airspeed == 0.0 or 3.5 <= condition.airspeed <= 8.5
-
-
-class Line:
-    """Two genes: height and slope; the second is bounded closely."""
-
-    genes = (
-        Gene("height", "m", 0.0, -10.0, 10.0, "linear", ""),
-        Gene("slope", "m", 1.0, 0.5, 1.5, "linear", ""),
-    )
-    searched = ("height", "slope")
-
-    def observe(self, genomes: np.ndarray, recording: Recording) -> Observation:
-        x = recording.times
-        values = genomes[:, :1] + genomes[:, 1:] * x + 0.1 * genomes[:, 1:] ** 2
-        return Observation(np.repeat(values[:, :, None], 3, axis=2), (None,) * len(genomes))
-
-
-def line(start: Mapping[str, float] | None = None) -> tuple[Refit, np.ndarray]:
-    x = np.linspace(-1.0, 1.0, 41)
-    recording = Recording("r", "vacuum_chamber", CONDITION, x, ("m",), np.zeros((41, 3)))
-    return Refit(Line(), start or {"height": 1.0, "slope": 1.0}, (recording,)), x
-
-
-def test_what_the_genes_can_do_leaves_no_strength() -> None:
-    refit, x = line()
-    change = np.repeat(0.3 + 0.2 * x, 3)
-    assert refit.linear(change) == pytest.approx(0.0, abs=1e-9)
-    assert refit.full(change) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_the_rest_is_the_strength_and_a_box_stops_a_refit() -> None:
-    refit, x = line()
-    beyond = x**2 - np.mean(x**2) - 0.0 * x
-    assert refit.linear(np.repeat(beyond, 3)) == pytest.approx(rms(beyond), rel=1e-6)
-    assert refit.full(np.repeat(beyond, 3)) == pytest.approx(rms(beyond), rel=1e-6)
-    steep = np.repeat(2.0 * x, 3)  # the slope may go up by one half only
-    assert refit.linear(steep) == pytest.approx(0.0, abs=1e-9)
-    assert refit.full(steep) == pytest.approx(rms(1.5 * x), rel=0.02)
-
-
-def test_missing_samples_count_for_nothing() -> None:
-    refit, x = line()
-    change = np.repeat(x**2, 3)
-    change[::4] = np.nan
-    assert np.isfinite(refit.linear(change))
-    assert refit.full(change) == pytest.approx(refit.linear(change), rel=1e-3)
-
-
-@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
-def test_a_strength_is_found_that_gives_the_target(power: float) -> None:
-    calls = []
-
-    def misfit(strength: float) -> float:
-        calls.append(strength)
-        return float(0.7 * strength**power)
-
-    found, there = strength_for(3.0, misfit, 1.0, (1e-3, 1e3), tries=5)
-    assert there == pytest.approx(3.0, rel=0.2)
-    assert there == pytest.approx(0.7 * found**power)
-    assert len(calls) <= 6
-
-
-def test_a_strength_stays_within_its_limits() -> None:
-    assert strength_for(3.0, lambda s: 0.1 * s, 1.0, (0.1, 2.0)) == pytest.approx((2.0, 0.2))
 
 
 def vehicle_trial(*hidden: str, group: str = "listed", target: float = 3.0) -> Trial:
