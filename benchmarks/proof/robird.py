@@ -44,9 +44,7 @@ HIDDEN: Concealed = {
     "hinge_offset": {"strength": 0.055, "direction": -0.8},  # m, rad from y to z
     "drive_harmonics": {"strength": 0.06},  # part by which the frame of the linkage is longer
 }
-"""Markers are moved by 13 to 16 mm on average. The axis can hardly lie further off within the library's bounds. The
-linkage could, but what the library's drive lacks of it, its fourth harmonic, then swings the wing by millimetres.
-"""
+"""Markers are moved by 2 cm on average, as in the thesis."""
 FITTED: tuple[Condition, ...] = (
     chamber(THIN_PA, LAGS[0], 2.0),
     chamber(THIN_PA, LAGS[1], 3.5),
@@ -74,7 +72,7 @@ class Campaign:
     def left_by_truth(self) -> float:
         """Root mean square (m) that the true values leave on the held-out recordings, in the library's form.
 
-        Not zero but for noise: the library's drive has two harmonics in error, the plant's has all.
+        Not zero but for noise: the library's drive has three harmonics in error, the plant's has all.
         """
         spec = CalibrationSpec(division=DIVISION, effects=tuple({name.partition(".")[0] for name in self.truth}))
         model = wing_model(self.dataset, spec)
