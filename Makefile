@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test check serve format lock install clean
+.PHONY: demo proof test test-service test-rest check serve format lock install clean
 
 demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m service.demo
@@ -15,8 +15,14 @@ proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a 
 serve: $(INSTALLED)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: check  ## every check and every test
-	$(BIN)/python -m pytest
+test: $(INSTALLED)  ## every check and every test, two at a time
+	@$(MAKE) --no-print-directory -k -j2 test-rest test-service check
+
+test-service:  # servers, browsers, clusters: they wait more than they compute
+	$(BIN)/python -m pytest tests/service tests/workers
+
+test-rest:
+	$(BIN)/python -m pytest --ignore tests/service --ignore tests/workers
 
 check: $(INSTALLED)  ## every check, no test
 	$(BIN)/ruff check .
