@@ -36,13 +36,6 @@ class Assessment:
     weighed: Weighed | None = None
     evaluations: int = 0
 
-    @property
-    def best(self) -> Refit:
-        """The most probable explanation, be it the nominal model."""
-        if self.weighed is None:
-            raise ValueError("nothing has been weighed yet")
-        return self.weighed.refits[int(self.weighed.probabilities.argmax())]
-
 
 @dataclass(frozen=True)
 class Counted:
@@ -64,7 +57,6 @@ def assess(
     state: Assessment, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     """Fill ``state``; yields the part of the work done and what comes next."""
-    evaluator = Counted(evaluator, state)
     stack = state.stack
     yield 0.0, "fitting the nominal model"
     steps = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
@@ -73,7 +65,7 @@ def assess(
     yield 0.15, "comparing with a finer division"
     nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
     state.nominal, state.subject = nominal, nominal.subject
-    suspects = _suspects(state.subject, spec)
+    suspects = suspected(state.subject, spec)
     for k, (suspect, trials) in enumerate(screened(state.subject, stack, nominal.refit.fit, evaluator, suspects)):
         state.trials.append(trials)
         yield 0.25 + 0.35 * (k + 1) / len(suspects), f"score test of {suspect.name}"
@@ -95,15 +87,20 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit or nominal.division is None or not matters(stack, nominal.division, best):
         return
-    found = ((finer, again(finer, stack, evaluator, best)) for finer in nominal.subject.finer())
-    finer, better = next(((f, r) for f, r in found if r is not None and improves(r, best)), (nominal.subject, None))
-    first = None if better is None else again(finer, stack, evaluator, nominal.refit)
+    innocent, better, first = False, None, None
+    for finer in nominal.subject.finer():
+        better = again(finer, stack, evaluator, best)
+        if better is not None and improves(better, best):
+            first = again(finer, stack, evaluator, nominal.refit)
+            break
+        innocent |= better is not None
     if better is None or first is None:
-        state.nominal = replace(nominal, innocent=True)
+        state.nominal = replace(nominal, innocent=innocent)
         return
     others = [better if one is best else again(finer, stack, evaluator, one) for one in state.refits]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
-    state.nominal = replace(nominal, subject=finer, refit=first, remarks=(*nominal.remarks, remark))
+    remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
+    state.nominal = Nominal(finer, first, None, "", remarks)
     state.subject, state.refits = finer, [one for one in others if one is not None]
 
 
@@ -130,7 +127,7 @@ def _refits(
                 tried.add(names)
                 yield 0.76 + 0.03 * k, f"refit with {' and '.join(sorted(names))}"
                 _add(state, refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
-    least = min(float(np.sum((one.fit.coefficients / stack.scale) ** 2)) for one in state.refits)
+    least = min(stack.chi_squared(one.fit.coefficients) for one in state.refits)
     for two in pairs(stack, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
@@ -152,7 +149,8 @@ def _add(state: Assessment, refit: Refit | None) -> None:
         state.refits.append(refit)
 
 
-def _suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
+def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
+    """The suspects that ``spec`` asks for; ValueError for one that the rig has not."""
     known = {suspect.name: suspect for suspect in subject.suspects}
     for name in spec.suspects:
         if name not in known:

@@ -9,9 +9,9 @@ explain: a likelihood in which the misfit of a law that is right but for its for
 
 E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
 nu the number of independent pieces that such misfits have (a few for each recording). Beforehand each effect is as
-unlikely as the suspects are many. Two hypotheses always compete
-beside the effects: *nothing is lacking*, and *something that is not in the library*, which is taken to explain all but
-a part UNKNOWN of the misfit at the price of the genes that a law of its own would need.
+unlikely as the suspects are many. Two hypotheses always compete beside the effects: *nothing is lacking*, and
+*something that is not in the library*, which is taken to explain all but a part UNKNOWN of the misfit at the price of
+the genes that a law of its own would need.
 """
 
 from __future__ import annotations
@@ -49,7 +49,6 @@ class Weighed:
     probabilities: Array
     unknown: float
     left: Array
-    floor: float
 
 
 def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float, suspects: int) -> Weighed:
@@ -70,7 +69,7 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float,
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)
     total = weight.sum() + other
-    return Weighed(every, log - log[0], weight / total, float(other / total), left, float(np.sqrt(tau) * stack.noise))
+    return Weighed(every, log - log[0], weight / total, float(other / total), left)
 
 
 def tolerated(stack: Stack, excess: float, floor: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from calibration.evaluator import Evaluator
 from calibration.plan import plan, prepared
-from diagnosis.assess import Assessment, assess
+from diagnosis.assess import Assessment, Counted, assess, suspected
 from diagnosis.conclude import concluded
 from diagnosis.finding import Finding
 from diagnosis.rigs import subject_of
@@ -22,10 +22,7 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
     """ValueError, for the user, where ``spec`` does not fit ``dataset``; nothing is simulated."""
     subject, fitted, _, _ = _prepared(dataset, spec)
     Stack.of(fitted, _axes(dataset, spec))
-    known = {suspect.name for suspect in subject.suspects}
-    for name in spec.suspects:
-        if name not in known:
-            raise ValueError(f"unknown suspect {name!r}; for this rig there are {', '.join(sorted(known))}")
+    suspected(subject, spec)
 
 
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
@@ -51,10 +48,11 @@ def diagnose_subject(
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     state = Assessment(subject, Stack.of(fitted, axes))
-    for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), evaluator):
+    counted = Counted(evaluator, state)
+    for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), counted):
         yield Progress(fraction, stage, state.evaluations)
     finding: Finding | None = None
-    for fraction, stage, found in concluded(state, name, held_out, evaluator):
+    for fraction, stage, found in concluded(state, name, held_out, counted):
         finding = found
         yield Progress(fraction, stage, state.evaluations)
     if finding is None:

@@ -49,7 +49,6 @@ class Fit:
         cost: sum of squares of whitened coefficients, and of the prior.
         damping: last good one.
         fresh: whether the Jacobian was measured there.
-        evaluations: individuals it took.
         converged: whether it ended because nothing was to be gained.
     """
 
@@ -61,7 +60,6 @@ class Fit:
     cost: float
     damping: float = FIRST_DAMPING
     fresh: bool = False
-    evaluations: int = 0
     converged: bool = False
 
     @property
@@ -92,7 +90,9 @@ def fitted(
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
     now = replace(_measured(look, replace(first, jacobian=own), ~columns), fresh=not columns.any())
-    again = [np.ones(len(start), bool), ~columns] if columns.any() else [np.ones(len(start), bool)]
+    again = [np.ones(len(start), bool)]
+    if columns.any() and not columns.all():
+        again.append(~columns)
     for _ in range(steps):
         better, gain = _step(look, now, FEW)
         if better is None:
@@ -169,7 +169,7 @@ def _at(look: _Look, unit: Array) -> Fit:
         raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
     cost = float(_cost(look.stack, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
-    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, evaluations=1)
+    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost)
 
 
 def _measured(look: _Look, fit: Fit, which: Flags) -> Fit:
@@ -191,7 +191,6 @@ def _measured(look: _Look, fit: Fit, which: Flags) -> Fit:
         fit,
         jacobian=jacobian,
         fresh=bool(which.all()),
-        evaluations=fit.evaluations + len(around),
     )
 
 
@@ -212,7 +211,6 @@ def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
     bad = np.array([reason is not None for reason in reasons])
     cost = np.where(bad, np.inf, _cost(look.stack, np.where(bad[:, None], FAILED, found), units))
     k = int(np.argmin(cost))
-    evaluations = fit.evaluations + len(units)
     if not cost[k] < fit.cost:
         return None, 0.0
     jacobian = fit.jacobian
@@ -227,7 +225,6 @@ def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
         tuple(r[k] for r in residuals),
         float(cost[k]),
         float(dampings[k]),
-        evaluations=evaluations,
     )
     return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))
 

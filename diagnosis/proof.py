@@ -18,7 +18,6 @@ Array = npt.NDArray[np.float64]
 
 DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
 CONFIDENCE = 0.9
-FLOORED = 1.15  # of the floor: as good as it gets
 
 
 @dataclass(frozen=True)

@@ -71,13 +71,8 @@ def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]
     told = [_weighed(stack, weighed, int(k), start, gains) for k in order]
     known = {refit.names for refit in weighed.refits}
     rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
-    whole = max(_chi_squared(weighed.refits[0], stack), 1e-300)
+    whole = max(stack.chi_squared(weighed.refits[0].fit.coefficients) - len(stack.scale), 1e-300)
     return (*told, *(_tested(trial, whole, start, stack) for trial in rest[:LISTED]))
-
-
-def _chi_squared(refit: Refit, stack: Stack) -> float:
-    white = refit.fit.coefficients / stack.scale
-    return float(white @ white) - len(white)
 
 
 def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mapping[str, Trial]) -> Hypothesis:
@@ -109,7 +104,7 @@ def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mappin
 
 def _tested(trial: Trial, whole: float, start: float, stack: Stack) -> Hypothesis:
     suspect = trial.suspect
-    explained = float(np.clip(trial.gain / whole, 0.0, 1.0)) if whole > 0 else 0.0
+    explained = float(np.clip(trial.gain / whole, 0.0, 1.0))
     left = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),

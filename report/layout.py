@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from report.markup import Markup, joined, tag
+from report.markup import Markup, tag
 
 
 def section(heading: str, *parts: object) -> Markup:
@@ -34,11 +34,6 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int
 def folded(summary: str, *parts: object) -> Markup:
     """Details that open on a click, and are always open on paper."""
     return tag("details", tag("summary", summary), *parts)
-
-
-def paragraphs(*texts: str | None) -> Markup:
-    """A paragraph for each text that says something."""
-    return joined(*(tag("p", words) for words in texts if words))
 
 
 def _side(column: int, first: int) -> str | None:

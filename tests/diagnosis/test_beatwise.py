@@ -35,7 +35,6 @@ def noise(frames: int, memory: float, seed: int, channels: int = 3 * MARKERS) ->
 @pytest.mark.parametrize("beats", [2, 4])
 def test_a_periodic_signal_is_told_exactly_and_has_no_noise(beats: int) -> None:
     frames = 30 * beats
-    psi = -2 * np.pi * np.arange(frames) / 30  # a strobe that is slower than the beat looks backwards
     psi = 2 * np.pi * CONDITION.flap_frequency * recording(np.zeros((frames, 3))).times
     wave = 0.1 + 0.02 * np.cos(psi) - 0.03 * np.sin(3 * psi)
     view = beatwise(recording(np.stack([wave, wave, 2 * wave], axis=1)))
