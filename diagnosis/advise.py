@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
 from calibration.problem import Problem
-from diagnosis.decide import PIECES, SURE, Weighed, tolerated
+from diagnosis.decide import SURE, Weighed, tolerated
 from diagnosis.finding import Advice
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
@@ -85,7 +85,7 @@ def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float
     share = 1.0 / (len(stack.recordings) + 1.0)
     unit = stack.noise**2
     tau = tolerated(stack, weighed.left[0] * unit, 0.0) / unit + float(weighed.left.min())
-    gain = 0.5 * PIECES * (len(stack.recordings) + 1) * np.log1p(share * apart**2 / tau)
+    gain = 0.5 * stack.pieces / (1.0 - share) * np.log1p(share * apart**2 / tau)
     odds = np.log(SURE / (1.0 - SURE))
     resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))
     lag, incidence = float(np.degrees(condition.phase_lag)), float(np.degrees(condition.angle_of_attack))

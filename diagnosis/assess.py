@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
-from diagnosis.decide import Weighed, tolerated, weighed
+from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.nominal import Nominal, first_fit, improves, matters, settled
-from diagnosis.refit import Refit, again, pairs, partners, refitted, worth_a_refit
+from diagnosis.refit import Refit, again, continued, pairs, partners, refitted, worth_a_refit
 from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
 from diagnosis.stack import Stack
@@ -21,6 +21,9 @@ from diagnosis.subject import Subject, Suspect
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
 PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
+CONTINUED = 2  # refits that have not converged, of the best
+HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
+RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RIVALS = 3  # explanations to which a partner is sought
 
 
@@ -97,7 +100,8 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     if better is None or first is None:
         state.nominal = replace(nominal, innocent=innocent)
         return
-    others = [better if one is best else again(finer, stack, evaluator, one) for one in state.refits]
+    near = [one for one in state.refits if one.excess <= RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)]
+    others = [better if one is best else again(finer, stack, evaluator, one) for one in near]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
     remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
     state.nominal = Nominal(finer, first, None, "", remarks)
@@ -108,15 +112,16 @@ def _refits(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     stack, fit = state.stack, nominal.refit.fit
+    if beyond_doubt(stack, nominal.refit, len(state.trials)):
+        return
     chosen = worth_a_refit(state.trials, spec.refits)
     for k, trial in enumerate(chosen):
         if _outdone(state, nominal, trial, chosen[0]):
             continue
         yield 0.6 + 0.15 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
-    if not state.refits or min(one.excess for one in state.refits) <= tolerated(
-        stack, PART * nominal.refit.excess, 0.0
-    ):
+    yield 0.74, "continuing the best refits"
+    if _solved(state, nominal, evaluator):
         return
     tried: set[frozenset[str]] = set()
     best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
@@ -134,6 +139,18 @@ def _refits(
             tried.add(names)
             yield 0.86, f"refit with {' and '.join(sorted(names))}"
             _add(state, refitted(state.subject, stack, fit, evaluator, two))
+    yield 0.88, "continuing the best refits"
+    _solved(state, nominal, evaluator)
+
+
+def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:
+    """Whether an explanation leaves so little that none needs a partner; the best are continued until one does."""
+    enough = tolerated(state.stack, PART * nominal.refit.excess, 0.0)
+    for k in np.argsort([one.excess for one in state.refits])[:CONTINUED]:
+        one = state.refits[k]
+        if not one.fit.converged and enough < one.excess < HOPEFUL * nominal.refit.excess:
+            state.refits[k] = continued(state.subject, state.stack, evaluator, one)
+    return not state.refits or min(one.excess for one in state.refits) <= enough
 
 
 def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:

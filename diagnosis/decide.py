@@ -29,13 +29,12 @@ Array = npt.NDArray[np.float64]
 
 ADEQUATE = 0.3  # of the noise: a misfit beyond it that is no larger is none
 FORM = 0.1  # of the misfit of the nominal model: what a law right but for its form leaves
-PIECES = 6.0  # independent pieces of such misfits, per recording
-MOST_PIECES = 48.0
 GENE = 2.0  # price of a gene in units of the logarithm of the evidence
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
 SLACK = 2.0  # standard errors of a mean square beyond the noise, which noise alone may make
 PREDICTED = 0.25  # of the weight, for recordings left out
+DOUBT = 2.0  # in the logarithm of the evidence: below, an explanation is not looked for
 SURE = 0.75  # probability from which a single explanation is named
 ALIKE = 0.05  # probability from which another explanation is said to be possible
 
@@ -61,15 +60,27 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float,
     unit = stack.noise**2
     left = np.array([max(_misfit(one), 0.0) / unit for one in every])
     tau = tolerated(stack, left[0] * unit, floor) / unit
-    pieces = min(PIECES * len(stack.recordings), MOST_PIECES)
     genes = np.array([one.freedom for one in every], float)
     named = np.array([len(one.trials) for one in every], float)
-    log = -0.5 * pieces * np.log(tau + left) - GENE * genes - np.log(max(suspects, 2)) * named
-    unknown = -0.5 * pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
+    log = _evidence(stack, tau + left, genes, named, suspects)
+    unknown = -0.5 * stack.pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)
     total = weight.sum() + other
     return Weighed(every, log - log[0], weight / total, float(other / total), left)
+
+
+def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: int) -> Array:
+    """Logarithm of the evidence, for mean squares ``left`` in parts of the noise's, the floor included."""
+    return np.asarray(-0.5 * stack.pieces * np.log(left) - GENE * genes - np.log(max(suspects, 2)) * named)
+
+
+def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
+    """Whether the nominal model leaves so little that no explanation could be worth its price, were it perfect."""
+    left = max(_misfit(nominal), 0.0)
+    tau = tolerated(stack, left, 0.0)
+    ends = _evidence(stack, np.array([tau + left, tau]) / stack.noise**2, np.arange(2.0), np.arange(2.0), suspects)
+    return bool(ends[1] < ends[0] - DOUBT)
 
 
 def tolerated(stack: Stack, excess: float, floor: float) -> float:

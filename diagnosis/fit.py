@@ -31,8 +31,8 @@ FEW = 10.0 ** np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0])
 MANY = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
-SETTLED = 2e-3  # relative decrease of the cost below which a fit ends
-SMALLEST = 1.0  # decrease of the cost (a chi-squared) that is worth another step
+SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
+SMALLEST = 0.3  # decrease of the cost that is worth another step
 FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
 
 
@@ -46,7 +46,7 @@ class Fit:
         coefficients: [D] of the residuals there.
         jacobian: [D, F] of the coefficients, per part of the box.
         residuals: per recording [T, C].
-        cost: sum of squares of whitened coefficients, and of the prior.
+        cost: surprise at what is left (:meth:`diagnosis.stack.Stack.surprise`), and at the genes by their prior.
         damping: last good one.
         fresh: whether the Jacobian was measured there.
         converged: whether it ended because nothing was to be gained.
@@ -100,7 +100,7 @@ def fitted(
                 return replace(now, converged=now.fresh)
             now = _measured(look, now, again.pop())
             continue
-        ends, now = _settles(now, better, gain), better
+        ends, now = _settles(stack, now, better, gain), better
         if ends:
             return replace(now, converged=True)
         if gain < GOOD and again:
@@ -111,25 +111,28 @@ def fitted(
 def thoroughly(
     subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, steps: int
 ) -> Iterator[Fit]:
-    """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last."""
-    look, every = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool)
-    now = _measured(look, _at(look, start), every)
+    """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last.
+
+    One-sided differences point the way until they lead no further; then they are central.
+    """
+    look, every, sides = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool), 1
+    now = _measured(look, _at(look, start), every, sides)
     for _ in range(steps):
         yield now
         better, gain = _step(look, now, MANY)
-        if better is None:
-            yield replace(now, converged=True)
+        ends = better is None or _settles(stack, now, better, 1.0 if sides == 2 else gain)
+        if ends and sides == 2:
+            yield replace(_measured(look, better, every), converged=True) if better else replace(now, converged=True)
             return
-        ends, now = _settles(now, better, gain), _measured(look, better, every)
-        if ends:
-            yield replace(now, converged=True)
-            return
-    yield now
+        sides = 2 if ends else sides
+        now = _measured(look, better or now, every, sides)
+    yield now if sides == 2 else _measured(look, now, every)
 
 
-def _settles(before: Fit, after: Fit, gain: float) -> bool:
+def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
     """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
-    return before.cost - after.cost <= max(SMALLEST, SETTLED * before.cost) and gain > GOOD / 2
+    whole = stack.trust(before.coefficients) * stack.chi_squared(before.coefficients)
+    return before.cost - after.cost <= max(SMALLEST, SETTLED * whole) and gain > GOOD / 2
 
 
 def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
@@ -141,8 +144,7 @@ def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Arra
 
 
 def _cost(stack: Stack, coefficients: Array, unit: Array) -> Array:
-    white = coefficients / stack.scale
-    return np.asarray((white**2).sum(axis=-1) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
+    return np.asarray(stack.surprise(coefficients) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
 
 
 @dataclass(frozen=True)
@@ -172,39 +174,37 @@ def _at(look: _Look, unit: Array) -> Fit:
     return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost)
 
 
-def _measured(look: _Look, fit: Fit, which: Flags) -> Fit:
-    """``fit`` with the columns ``which`` of its Jacobian measured by central differences inside the box."""
+def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
+    """``fit`` with the columns ``which`` of its Jacobian measured by differences to one or two sides in the box."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
     moves = STEP * np.eye(len(fit.unit))[columns]
-    around = np.clip(np.vstack([fit.unit + moves, fit.unit - moves]), 0.0, 1.0)
+    moves[fit.unit[columns] > 1.0 - STEP] *= -1.0
+    around = np.clip(np.vstack([fit.unit + moves, *([fit.unit - moves] if sides == 2 else [])]), 0.0, 1.0)
     found, reasons, _ = look.at(around, fit.unit)
     bad = np.array([reason is not None for reason in reasons])
     found[bad] = fit.coefficients
     around[bad] = fit.unit
     up, down = np.arange(len(columns)), np.arange(len(columns)) + len(columns)
-    width = around[up, columns] - around[down, columns]
+    behind = (around[down], found[down]) if sides == 2 else (fit.unit[None], fit.coefficients[None])
+    width = (around[up] - behind[0])[np.arange(len(columns)), columns]
     jacobian = fit.jacobian.copy()
-    jacobian[:, columns] = ((found[up] - found[down]) / np.where(width > 0, width, 1.0)[:, None]).T
-    return replace(
-        fit,
-        jacobian=jacobian,
-        fresh=bool(which.all()),
-    )
+    jacobian[:, columns] = ((found[up] - behind[1]) / np.where(width != 0, width, 1.0)[:, None]).T
+    return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
 
 
 def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
     """The best of several damped steps, its Jacobian improved by what they show, and gain over promise."""
     scale = look.stack.scale
     white, slopes = fit.coefficients / scale, fit.jacobian / scale[:, None]
-    prior = np.full(len(fit.unit), PRIOR)
-    curvature = slopes.T @ slopes + np.diag(prior**-2)
-    slope = slopes.T @ white + (fit.unit - 0.5) / prior**2
+    trust = look.stack.trust(fit.coefficients)
+    curvature = trust * slopes.T @ slopes + np.eye(len(fit.unit)) / PRIOR**2
+    slope = trust * slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
     dampings = np.clip(fit.damping * relative, LEAST_DAMPING, LARGEST_DAMPING)
     moves = np.array([bounded(curvature, slope, fit.unit, d) for d in dampings])
     units = np.clip(fit.unit + moves, 0.0, 1.0)
-    promised = -2.0 * (moves @ slope) - np.einsum("df,fg,dg->d", moves, curvature, moves)
+    promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T, units)
     if promised.max() <= 1e-9 * fit.cost:
         return None, 0.0
     found, reasons, residuals = look.at(units, fit.unit)

@@ -21,21 +21,19 @@ CONFIDENCE = 0.9
 def covariance(stack: Stack, fit: Fit) -> Array:
     """[F, F] of the genes in parts of their boxes.
 
-    Noise and the box as a weak prior; beside them, to the part to which the misfit is more than noise, the scatter of
-    what each recording by itself asks for (a sandwich with recordings as clusters: Liang and Zeger 1986).
+    By noise, by what the model misses in a few independent pieces (:meth:`diagnosis.stack.Stack.trust`), and the box as
+    a weak prior. Of forces also the scatter of what each recording by itself asks for (a sandwich with recordings as
+    clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
-    information = slopes.T @ slopes
-    bread = np.linalg.inv(information + np.eye(len(fit.unit)) / PRIOR**2)
-    scores = np.array([slopes[part].T @ white[part] for part in stack.parts])
-    scores -= scores.mean(axis=0)
-    recordings = len(scores)
-    systematic = max(0.0, 1.0 - len(white) / float(white @ white))
-    if _clustered(stack):
-        systematic = 1.0
-    meat = information + np.eye(len(fit.unit)) / PRIOR**2
-    if recordings > 1:
-        meat = meat + systematic * recordings / (recordings - 1.0) * scores.T @ scores
+    trust, recordings = stack.trust(fit.coefficients), len(stack.recordings)
+    prior = np.eye(len(fit.unit)) / PRIOR**2
+    meat = trust * slopes.T @ slopes + prior
+    bread = np.linalg.inv(meat)
+    if _clustered(stack) and recordings > 1:
+        scores = trust * np.array([slopes[part].T @ white[part] for part in stack.parts])
+        scores -= scores.mean(axis=0)
+        meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
     return np.asarray(bread @ meat @ bread)
 
 

@@ -109,14 +109,13 @@ def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> tup
     found, reasons, _ = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
     if reasons[0] is not None:
         return 0.0, 0.0
-    nuisance = Nuisance(fit.jacobian, stack.scale)
-    rest = nuisance.rest((found[0] - fit.coefficients) / stack.scale)
-    left = nuisance.rest(fit.coefficients / stack.scale)
+    nuisance = Nuisance(stack, fit)
+    rest, left = nuisance.rest(found[0] - fit.coefficients), nuisance.left
     power = float(rest @ rest)
     amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, MOST))
     excess = max(float(left @ left) - len(left), 1e-300)
     taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
-    return float(np.sqrt(stack.weight @ (rest * stack.scale) ** 2)), taken
+    return float(np.sqrt(stack.weight @ (rest[: len(stack.scale)] * stack.scale) ** 2)), taken
 
 
 def improves(finer: Refit, coarse: Refit) -> bool:

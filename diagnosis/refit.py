@@ -11,7 +11,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem, base_genome
-from diagnosis.fit import Fit, fitted
+from diagnosis.fit import PRIOR, Fit, fitted, thoroughly
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -19,11 +19,13 @@ from diagnosis.subject import Subject
 Array = npt.NDArray[np.float64]
 
 STEPS = 6  # of a refit
+FURTHER = 10  # of one that is continued
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
 BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
+CHANCE = 4.0  # times what noise makes of a prediction on average: so much it makes by chance (chi-squared of one)
 HALVINGS = 3  # of a start that cannot be simulated
 
 
@@ -62,20 +64,27 @@ def judged(stack: Stack, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
 def left_out(stack: Stack, fit: Fit) -> float | None:
     """Mean square beyond the noise in each recording when the others alone were fitted, by the linearised model.
 
-    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation.
+    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation, nor is what
+    noise in the others makes of a prediction.
     """
     if len(stack.recordings) < 2:
         return None
     white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
     grams = [slopes[part].T @ slopes[part] for part in stack.parts]
     scores = [slopes[part].T @ white[part] for part in stack.parts]
-    gram, score = sum(grams) + np.eye(len(fit.unit)) / FREE**2, sum(scores)
+    trust, prior = stack.trust(fit.coefficients), (fit.unit - 0.5) / PRIOR**2
+    gram = trust * sum(grams) + np.eye(len(fit.unit)) * (FREE**-2 + PRIOR**-2)
+    score = trust * sum(scores) + prior
     total = 0.0
     for r, part in enumerate(stack.parts):
-        move = -np.linalg.solve(gram - grams[r], score - scores[r])
-        move = np.clip(fit.unit + move, 0.0, 1.0) - fit.unit
-        there = fit.coefficients[part] + fit.jacobian[part] @ move
-        total += float(stack.weight[part] @ (there**2 - stack.variance[part]))
+        others, spread = sum(grams) - grams[r], np.linalg.inv(gram - trust * grams[r])
+        move = np.clip(fit.unit - spread @ (score - trust * scores[r]), 0.0, 1.0) - fit.unit
+        here, own = fit.coefficients[part], fit.jacobian[part]
+        weight = stack.weight[part]
+        worse = float(weight @ ((here + own @ move) ** 2 - here**2))
+        noisy = trust**2 * spread @ others @ spread
+        by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
+        total += float(weight @ (here**2 - stack.variance[part])) + max(worse - CHANCE * by_noise, 0.0)
     return total
 
 
@@ -154,6 +163,14 @@ def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) ->
     return judged(stack, fit, refit.trials)
 
 
+def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit:
+    """``refit`` fitted further, with all slopes measured at every step."""
+    fit = refit.fit
+    for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, FURTHER):
+        fit = better
+    return judged(stack, fit, refit.trials)
+
+
 def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
     """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
@@ -162,13 +179,13 @@ def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
 
 def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
     """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
-    nuisance = Nuisance(base.fit.jacobian, stack.scale)
-    left = nuisance.rest(base.fit.coefficients / stack.scale)
+    nuisance = Nuisance(stack, base.fit)
+    left = nuisance.left
     scored = []
     for trials in found:
         if not trials or trials[0].suspect.name in base.names:
             continue
-        gains = [_gain(nuisance.rest(trial.fields / stack.scale), left) for trial in trials]
+        gains = [_gain(nuisance.rest(trial.fields), left) for trial in trials]
         k = int(np.argmax(gains))
         scored.append((gains[k], trials[k]))
     scored.sort(key=lambda pair: -pair[0])
@@ -180,10 +197,10 @@ def pairs(
     stack: Stack, nominal: Fit, found: Sequence[list[Trial]], beyond: float, most: int = PARTNERS
 ) -> Iterator[tuple[Trial, Trial]]:
     """Pairs of suspects that together would leave less than a chi-squared of ``beyond``, best first."""
-    nuisance = Nuisance(nominal.jacobian, stack.scale)
-    left = nuisance.rest(nominal.coefficients / stack.scale)
+    nuisance = Nuisance(stack, nominal)
+    left = nuisance.left
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
-    own = [nuisance.rest(trial.fields / stack.scale) for trial in best]
+    own = [nuisance.rest(trial.fields) for trial in best]
     scored = [(_gain(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
     scored.sort(key=lambda triple: -triple[0])
     for gain, one, other in scored[:most]:

@@ -17,7 +17,7 @@ from scipy.stats import qmc
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, unit_at, values_at
 from calibration.problem import Problem, base_genome
-from diagnosis.fit import Fit
+from diagnosis.fit import PRIOR, Fit
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject, Suspect
 
@@ -25,7 +25,6 @@ Array = npt.NDArray[np.float64]
 
 PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
 SHAPES = 7  # of one with other shape genes
-INDEPENDENT = 1e-7  # of the largest direction of what the nominal genes can do
 SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
 
 
@@ -62,15 +61,25 @@ class Trial:
 
 
 class Nuisance:
-    """What the nominal genes can do: projections of whitened vectors [..., D] on what they cannot."""
+    """What the nominal genes can do about a fit: projections of whitened vectors [..., D] on what they cannot.
 
-    def __init__(self, jacobian: Array, scale: Array) -> None:
-        basis, power, _ = np.linalg.svd(jacobian / scale[:, None], full_matrices=False)
-        self.basis: Array = np.asarray(basis[:, power > INDEPENDENT * power.max(initial=0.0)])
+    Their prior counts as F further samples, as much as it counts beside the misfit (:meth:`diagnosis.stack.Stack.trust`).
+    """
 
-    def rest(self, white: Array) -> Array:
-        """``white`` without what they can do."""
-        return np.asarray(white - (white @ self.basis) @ self.basis.T)
+    def __init__(self, stack: Stack, fit: Fit) -> None:
+        weight = 1.0 / (PRIOR * np.sqrt(stack.trust(fit.coefficients)))
+        slopes = fit.jacobian / stack.scale[:, None]
+        self.basis: Array = np.linalg.qr(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))[0]
+        self.scale = stack.scale
+        self.left: Array = np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)])
+        self.left = self.left - self.basis @ (self.basis.T @ self.left)
+
+    def rest(self, changes: Array) -> Array:
+        """Whitened changes [..., D + F] of coefficients, without what the genes can do."""
+        white = changes / self.scale
+        inside = (white @ self.basis[: white.shape[-1]]) @ self.basis.T
+        inside[..., : white.shape[-1]] -= white
+        return np.asarray(-inside)
 
 
 def off_units(suspect: Suspect) -> Array:
@@ -87,15 +96,14 @@ def screened(
     subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, suspects: Sequence[Suspect]
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
     """Try every suspect about the nominal fit; yields its trials, best first (none where it cannot be simulated)."""
-    nuisance = Nuisance(nominal.jacobian, stack.scale)
-    left = nuisance.rest(nominal.coefficients / stack.scale)
+    nuisance = Nuisance(stack, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
         genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
         model = subject.beside(subject.extended([suspect.name]), genome)
         free = tuple(gene.name for gene in suspect.genes)
         problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
-        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance, left)
+        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance)
 
 
 def _tried(
@@ -105,7 +113,6 @@ def _tried(
     evaluator: Evaluator,
     suspect: Suspect,
     nuisance: Nuisance,
-    left: Array,
 ) -> list[Trial]:
     blocks = list(_blocks(suspect))
     units = np.concatenate(blocks)
@@ -117,12 +124,12 @@ def _tried(
         rows = slice(row, row + len(block))
         row += len(block)
         if not bad[rows].any():
-            trials.append(_trial(stack, suspect, block, changes[rows], nuisance, left))
+            trials.append(_trial(suspect, block, changes[rows], nuisance))
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
-def _trial(stack: Stack, suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance, left: Array) -> Trial:
-    own = nuisance.rest(fields / stack.scale)
+def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
+    own, left = nuisance.rest(fields), nuisance.left
     amounts = _amounts(own, left, _limits(suspect, block), seen=SEEN * np.sqrt(len(left)))
     leaves = float(np.sum((left + amounts @ own) ** 2))
     return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), amounts, len(suspect.genes), leaves)

@@ -17,6 +17,8 @@ from records import Recording
 
 Array = npt.NDArray[np.float64]
 
+PIECES = 6.0  # independent pieces of what a model misses, per recording
+MOST_PIECES = 48.0
 TOLERANCE = 0.1  # of the noise: a model is not asked to be better, however long the recording
 
 
@@ -89,6 +91,28 @@ class Stack:
     def chi_squared(self, coefficients: Array) -> float:
         """Sum of squares of whitened coefficients [D]."""
         return float(np.sum((coefficients / self.scale) ** 2))
+
+    @cached_property
+    def pieces(self) -> float:
+        """Number of independent pieces that what a model misses has: a few for each recording, however long."""
+        return min(PIECES * len(self.recordings), MOST_PIECES)
+
+    def surprise(self, coefficients: Array) -> Array:
+        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise, and beyond it a misfit of unknown size.
+
+        A misfit far beyond the noise is a model's error, of which ``pieces`` are independent, and not that many samples
+        that each know the genes: sums of squares beyond the noise's count by their logarithm.
+        """
+        beyond = self._beyond(coefficients)
+        whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
+        return np.asarray(whole - beyond + self.pieces * np.log1p(beyond / self.pieces))
+
+    def trust(self, coefficients: Array) -> float:
+        """How much a unit of chi-squared counts beside these coefficients [D]: the slope of :meth:`surprise`."""
+        return float(1.0 / (1.0 + self._beyond(coefficients) / self.pieces))
+
+    def _beyond(self, coefficients: Array) -> Array:
+        return np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0)
 
     def excess(self, coefficients: Array) -> float:
         """Mean square beyond the noise of residuals with these coefficients [D], m^2 or N^2; noise may make it < 0."""

@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Airspeed error, tunnel blockage",
     family="aerodynamics",
     port="air",
-    size=(Parameter("part", "1", -0.3, 0.3, 0.05, "part by which the stream at the wing is faster than told"),),
+    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "part by which the stream at the wing is faster than told"),),
     source="U' = U (1 + part); solid and wake blockage speed a closed tunnel up so (Barlow, Rae and Pope 1999, ch. 10)",
     signature="an error that grows with airspeed and is absent without a stream",
     confused_with=("residual_air", "induced_inflow"),

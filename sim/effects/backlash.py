@@ -63,7 +63,7 @@ EFFECT = Effect(
     title="Backlash",
     family="actuation",
     port="connector",
-    size=(Parameter("b", "rad", 0.0, 0.06, 0.015, "whole angle about x by which the wing turns freely on its rods"),),
+    size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "whole angle about x by which the wing turns freely on its rods"),),
     power="conservative",
     source="dead band between two stops (Dubowsky and Freudenstein 1971, Journal of Engineering for Industry 93, 305; "
     "Nordin and Gutman 2002, Automatica 38, 1633, sect. 2), in series with the spring of Fasse (1997)",

@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Lumped mass",
     family="inertia",
     port="inertia",
-    size=(Parameter("mass", "kg", 0.0, 0.3, 0.05, "mass of the point", of="mass"),),
+    size=(Parameter("mass", "kg", 0.0, 0.5, 0.05, "mass of the point", of="mass"),),
     shape=(
         Parameter("station", "1", 0.0, 1.0, 0.8, "where it is, part of the span from root to tip", place=True),
         Parameter("chord", "1", 0.0, 1.0, 0.8, "where it is, part of the chord from the leading edge", place=True),

@@ -18,7 +18,7 @@ EFFECT = Effect(
     title="Phase lag error",
     family="actuation",
     port="drive",
-    size=(Parameter("angle", "rad", -0.15, 0.15, 0.02, "by which the rear rod is later than told, of drive phase"),),
+    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "by which the rear rod is later than told, of drive phase"),),
     source="flap angle of the rear rod at drive phase psi - lag - angle (van der Grinten, section III-F: lags of 0, 3 "
     "and 7 degrees); shift theorem of Fourier series (Bracewell 1965, ch. 6)",
     signature="twist in phase with the flap rate, most where the wing moves fastest, the same in every condition",

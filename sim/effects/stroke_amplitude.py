@@ -20,7 +20,7 @@ EFFECT = Effect(
     title="Stroke amplitude error",
     family="actuation",
     port="drive",
-    size=(Parameter("part", "1", -0.3, 0.3, 0.05, "part by which all harmonics of the stroke are larger than told"),),
+    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "part by which all harmonics of the stroke are larger than told"),),
     source=(
         "every harmonic k > 0 of the flap angle is multiplied by 1 + part, rates and accelerations with it; "
         "wing pitch that follows the stroke does so (Armanini et al. 2016, Eqs. 17, 20-21)"

@@ -1,0 +1,117 @@
+"""How long one diagnosis takes: twelve recordings, a wing of 24 pieces, a plant that is divided finer.
+
+``python -m benchmarks.diagnosis --json`` films the concealed trials' plant under twelve conditions, with one effect
+hidden, and diagnoses the files as a user does; the last line tells the time, the longest silence between two reports
+of progress, and how far the first estimates of the time that was left were from what came.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks import machine
+from benchmarks.concealed.bench import WingBench
+from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
+from calibration.spec import CalibrationSpec
+from diagnosis import DiagnosisSpec, Progress, diagnose
+from records import Dataset, load_dataset, save_dataset
+from service.commands.output import progress
+from workers import make_evaluator
+from workers.factory import EvaluatorKind
+
+HIDDEN: Concealed = {"added_mass": {"strength": 1.0}}
+FITTED = (
+    *(chamber(THIN_PA, LAGS[k % 3], FREQUENCIES[k]) for k in (0, 2, 4)),
+    *(chamber(THICK_PA, LAGS[k % 3], FREQUENCIES[k]) for k in (1, 3)),
+    *(tunnel(LAGS[k % 3], FREQUENCIES[k + 1], speed) for k, speed in enumerate((3.5, 5.0, 6.0, 7.5))),
+)
+HELD_OUT = (chamber(THIN_PA, LAGS[1], 2.5), chamber(THICK_PA, LAGS[2], 3.0), tunnel(LAGS[2], 3.5, 8.5))
+HALF = 0.5  # of the work: the time that is left is estimated there
+
+
+def recorded(division: str, plant: str, seed: int) -> Dataset:
+    """Twelve recordings of a plant with parameters that are drawn; the same seed, the same bits."""
+    bench = WingBench(Build("wing", division, plant))
+    genome = bench.genome(np.random.default_rng([seed, 1]))
+    filmset = bench.quality(np.random.default_rng([seed, 2]))
+    found = []
+    for number, condition in enumerate((*FITTED, *HELD_OUT)):
+        made = bench.recording(condition, genome, HIDDEN, filmset, np.random.default_rng([seed, 3, number]))
+        found.append(replace(made.recording, name=name_of(condition)))
+    return Dataset("twelve", bench.rig, tuple(found), tuple(name_of(condition) for condition in HELD_OUT))
+
+
+def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) -> dict[str, Any]:
+    """Diagnose the file at ``path``: the time it takes, and how it reports."""
+    spec, pool = DiagnosisSpec(CalibrationSpec(division=division)), make_evaluator(evaluator, workers)
+    reports: list[tuple[float, Progress]] = []
+    began = time.perf_counter()
+    try:
+        with progress("diagnosing") as tell:
+            for report in diagnose(load_dataset(path), spec, pool):
+                reports.append((time.perf_counter() - began, report))
+                tell(report.fraction, None, report.stage)
+    finally:
+        pool.close()
+    finding = reports[-1][1].finding
+    if finding is None:
+        raise RuntimeError("the diagnosis ended without a finding")
+    times = np.array([at for at, _ in reports])
+    half, then = next((at, one.fraction) for at, one in reports if one.fraction >= HALF)
+    return {
+        "seconds": float(times[-1]),
+        "evaluations": finding.evaluations,
+        "reports": len(reports),
+        "longest_silence_s": float(np.diff(times, prepend=0.0).max()),
+        "left_at_half_over_told": float((times[-1] - half) / (half * (1.0 - then) / then)),
+        "stages": _stages(reports),
+        "verdict": finding.verdict,
+        "named": list(finding.named),
+        "model": finding.model,
+        "held_out_over_floor": finding.proof and finding.proof.after.value,
+    }
+
+
+def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
+    """Seconds of each kind of stage, by its first words."""
+    spent: dict[str, float] = {}
+    for (at, one), (after, _) in zip(reports, reports[1:], strict=False):
+        name = " ".join(one.stage.split()[:2])
+        spent[name] = spent.get(name, 0.0) + after - at
+    return spent
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
+    parser.add_argument("--division", default="24", help="of the model")
+    parser.add_argument("--plant", default="8x4", help="division of the plant")
+    parser.add_argument("--evaluator", choices=("processes", "ray", "in_process"), default="ray")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "twelve.nc"
+        save_dataset(recorded(asked.division, asked.plant, asked.seed), path)
+        found = measured(path, asked.division, asked.evaluator, asked.workers)
+    told = {"cpu": machine.cpu(), "commit": machine.commit(), **found}
+    width = max(map(len, told))
+    for name, value in told.items():
+        print(f"{name:{width}} {value}")
+    if asked.json:
+        print(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main()
