@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.nominal import Nominal, first_fit, improves, matters, settled
-from diagnosis.refit import Refit, again, continued, pairs, partners, refitted, worth_a_refit
+from diagnosis.refit import Refit, again, continued, pairs, partners, refitted, resumed, worth_a_refit
 from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
 from diagnosis.stack import Stack
@@ -69,10 +69,15 @@ def assess(
     nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
     state.nominal, state.subject = nominal, nominal.subject
     suspects = suspected(state.subject, spec)
-    for k, (suspect, trials) in enumerate(screened(state.subject, stack, nominal.refit.fit, evaluator, suspects)):
-        state.trials.append(trials)
-        yield 0.25 + 0.35 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    yield from _refits(state, nominal, spec, evaluator)
+    for fraction, stage in _suspected(state, spec, suspects, evaluator):
+        yield 0.25 + 0.55 * fraction, stage
+    yield 0.8, "fitting the nominal model again"
+    better = _elsewhere(state, evaluator)
+    if better is not None:
+        state.nominal, state.trials, state.refits = replace(state.nominal, refit=better), [], []
+        for fraction, stage in _suspected(state, spec, suspects, evaluator):
+            yield 0.8 + 0.1 * fraction, stage
+    nominal = state.nominal
     yield 0.9, "comparing with a finer division"
     if spec.refine:
         _refined(state, nominal, evaluator)
@@ -108,19 +113,48 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     state.subject, state.refits = finer, [one for one in others if one is not None]
 
 
+def _suspected(
+    state: Assessment, spec: DiagnosisSpec, suspects: Sequence[Suspect], evaluator: Evaluator
+) -> Iterator[tuple[float, str]]:
+    """Score tests about the nominal fit, then refits; yields the part of that done."""
+    nominal = _known(state)
+    for k, (suspect, trials) in enumerate(screened(state.subject, state.stack, nominal.refit.fit, evaluator, suspects)):
+        state.trials.append(trials)
+        yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
+    if not beyond_doubt(state.stack, nominal.refit, len(suspects)):
+        yield from _refits(state, nominal, spec, evaluator)
+
+
+def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
+    """The nominal model fitted from where the best explanation ended, if it does much better there.
+
+    An explanation may lead out of a minimum in which the nominal fit was caught, and is not the cause then.
+    """
+    nominal = _known(state).refit
+    best = min(state.refits, key=lambda one: one.excess, default=nominal)
+    if best is nominal or not improves(best, nominal):
+        return None
+    found = resumed(state.subject, state.stack, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
+    return found if found is not None and improves(found, nominal) else None
+
+
+def _known(state: Assessment) -> Nominal:
+    if state.nominal is None:
+        raise ValueError("the nominal model has not been fitted")
+    return state.nominal
+
+
 def _refits(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     stack, fit = state.stack, nominal.refit.fit
-    if beyond_doubt(stack, nominal.refit, len(state.trials)):
-        return
     chosen = worth_a_refit(state.trials, spec.refits)
     for k, trial in enumerate(chosen):
         if _outdone(state, nominal, trial, chosen[0]):
             continue
-        yield 0.6 + 0.15 * k / len(chosen), f"refit with {trial.suspect.name}"
+        yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
-    yield 0.74, "continuing the best refits"
+    yield 0.8, "continuing the best refits"
     if _solved(state, nominal, evaluator):
         return
     tried: set[frozenset[str]] = set()
@@ -130,16 +164,16 @@ def _refits(
             names = frozenset((*one.names, trial.suspect.name))
             if names not in tried:
                 tried.add(names)
-                yield 0.76 + 0.03 * k, f"refit with {' and '.join(sorted(names))}"
+                yield 0.82 + 0.04 * k, f"refit with {' and '.join(sorted(names))}"
                 _add(state, refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
     least = min(stack.chi_squared(one.fit.coefficients) for one in state.refits)
     for two in pairs(stack, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)
-            yield 0.86, f"refit with {' and '.join(sorted(names))}"
+            yield 0.94, f"refit with {' and '.join(sorted(names))}"
             _add(state, refitted(state.subject, stack, fit, evaluator, two))
-    yield 0.88, "continuing the best refits"
+    yield 0.97, "continuing the best refits"
     _solved(state, nominal, evaluator)
 
 

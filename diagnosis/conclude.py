@@ -22,7 +22,6 @@ from diagnosis.unexplained import Unexplained, missing_forces, probed_recordings
 from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
 from diagnosis.where import where
 from records import Recording
-from sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
 Step = tuple[float, str, Finding | None]
@@ -68,13 +67,13 @@ def _lacking(state: Assessment, *, law: bool) -> Iterator[tuple[float, str, Unex
     if state.stack.recordings[0].kind == "forces":
         yield 1.0, "locating the missing force", Unexplained(missing_forces(state.subject, state.stack, nominal))
         return
-    probe, found = Probe(), []
-    for k, (r, one) in enumerate(probed_recordings(state.subject, state.stack, nominal, probe)):
+    found = []
+    for k, (r, one) in enumerate(probed_recordings(state.subject, state.stack, nominal)):
         if one is None:
             continue
         found.append((r, one))
         yield k / 8.0, f"probing the wing under {state.stack.recordings[r].name}", Unexplained()
-    yield 1.0, "locating the missing load", unexplained(state.stack, nominal, found, probe, law=law)
+    yield 1.0, "locating the missing load", unexplained(state.stack, nominal, found, law=law)
 
 
 def _nominal(state: Assessment) -> Refit:
@@ -93,7 +92,7 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
     return Where(
         found.words,
         _placed(best, "span") or lacking.span or found.span,
-        _placed(best, "chord") or found.chord,
+        _placed(best, "chord") or lacking.chord or found.chord,
         lacking.phase if lacking.phase and decision.verdict != "measurement fault" else found.phase,
         found.axis,
         found.harmonics,

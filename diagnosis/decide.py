@@ -28,7 +28,7 @@ from diagnosis.stack import Stack
 Array = npt.NDArray[np.float64]
 
 ADEQUATE = 0.3  # of the noise: a misfit beyond it that is no larger is none
-FORM = 0.1  # of the misfit of the nominal model: what a law right but for its form leaves
+FORM = 0.15  # of the misfit of the nominal model: what a law right but for its form leaves
 GENE = 2.0  # price of a gene in units of the logarithm of the evidence
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
@@ -58,8 +58,8 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float,
     """
     every = (nominal, *refits)
     unit = stack.noise**2
-    left = np.array([max(_misfit(one), 0.0) / unit for one in every])
-    tau = tolerated(stack, left[0] * unit, floor) / unit
+    tau = tolerated(stack, nominal.excess, floor) / unit
+    left = np.array([_misfit(one, tau * unit) / unit for one in every])
     genes = np.array([one.freedom for one in every], float)
     named = np.array([len(one.trials) for one in every], float)
     log = _evidence(stack, tau + left, genes, named, suspects)
@@ -77,8 +77,8 @@ def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: i
 
 def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
     """Whether the nominal model leaves so little that no explanation could be worth its price, were it perfect."""
-    left = max(_misfit(nominal), 0.0)
-    tau = tolerated(stack, left, 0.0)
+    tau = tolerated(stack, nominal.excess, 0.0)
+    left = _misfit(nominal, tau)
     ends = _evidence(stack, np.array([tau + left, tau]) / stack.noise**2, np.arange(2.0), np.arange(2.0), suspects)
     return bool(ends[1] < ends[0] - DOUBT)
 
@@ -88,8 +88,11 @@ def tolerated(stack: Stack, excess: float, floor: float) -> float:
     return (ADEQUATE * stack.noise) ** 2 + floor**2 + FORM**2 * max(excess, 0.0) + SLACK * stack.uncertainty
 
 
-def _misfit(refit: Refit) -> float:
-    """Mean square beyond the noise, as fitted and, to the part PREDICTED, as predicted."""
-    if refit.predicted is None:
-        return refit.excess
-    return (1.0 - PREDICTED) * refit.excess + PREDICTED * refit.predicted
+def _misfit(refit: Refit, tau: float) -> float:
+    """Mean square beyond the noise, as fitted and, to the part PREDICTED of its logarithm, as predicted.
+
+    What a linearised model foretells of a recording left out may be wrong by any factor.
+    """
+    fitted = max(refit.excess, 0.0)
+    predicted = fitted if refit.predicted is None else max(refit.predicted, 0.0)
+    return float((tau + fitted) ** (1.0 - PREDICTED) * (tau + predicted) ** PREDICTED - tau)

@@ -25,10 +25,11 @@ Flags = npt.NDArray[np.bool_]
 
 STEP = 0.003  # of the box, of finite differences
 PRIOR = 0.5  # standard deviation of a gene in parts of its box
-# Dampings tried at once, times the last good one: a group of lanes, or two. Close to it they lie densely, because
-# valleys of stiffnesses that make up for each other bend.
-FEW = 10.0 ** np.array([-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0])
-MANY = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
+# Steps tried at once: a group of lanes, or two. Damping by parts of each gene's own curvature (Marquardt 1963), about
+# the last good part, suits genes that are told one by one; damping by parts of the box (Levenberg 1944) leads along
+# the bent valleys of stiffnesses that make up for each other.
+FEW = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
+MANY = (10.0 ** np.array([-4, -2, -1, -0.5, 0, 0.5, 1, 2]), 10.0 ** np.array([0, 1, 2, 2.5, 3, 4, 5, 6]))
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
 SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
@@ -135,10 +136,9 @@ def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
     return before.cost - after.cost <= max(SMALLEST, SETTLED * whole) and gain > GOOD / 2
 
 
-def bounded(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
-    """Step [F] that minimises slope . d + d . curvature d / 2 inside the box, curvatures raised by ``damping``."""
-    diagonal = np.diag(curvature)
-    factor = np.linalg.cholesky(curvature + np.diag(damping * diagonal + 1e-12 * diagonal.max()))
+def bounded(curvature: Array, slope: Array, unit: Array, damping: Array) -> Array:
+    """Step [F] that minimises slope . d + d . curvature d / 2 inside the box, ``damping`` [F] added to curvatures."""
+    factor = np.linalg.cholesky(curvature + np.diag(damping + 1e-12 * np.diag(curvature).max()))
     aim = -np.linalg.solve(factor, slope)
     return np.asarray(lsq_linear(factor.T, aim, (-unit - 1e-12, 1.0 - unit + 1e-12), method="bvls").x)
 
@@ -194,14 +194,15 @@ def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
     return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
 
 
-def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
+def _step(look: _Look, fit: Fit, tried: tuple[Array, Array]) -> tuple[Fit | None, float]:
     """The best of several damped steps, its Jacobian improved by what they show, and gain over promise."""
     scale = look.stack.scale
     white, slopes = fit.coefficients / scale, fit.jacobian / scale[:, None]
     trust = look.stack.trust(fit.coefficients)
     curvature = trust * slopes.T @ slopes + np.eye(len(fit.unit)) / PRIOR**2
     slope = trust * slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
-    dampings = np.clip(fit.damping * relative, LEAST_DAMPING, LARGEST_DAMPING)
+    own = np.clip(fit.damping * tried[0], LEAST_DAMPING, LARGEST_DAMPING)
+    dampings = [*np.outer(own, np.diag(curvature)), *np.outer(tried[1] / PRIOR**2, np.ones(len(fit.unit)))]
     moves = np.array([bounded(curvature, slope, fit.unit, d) for d in dampings])
     units = np.clip(fit.unit + moves, 0.0, 1.0)
     promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T, units)
@@ -224,7 +225,7 @@ def _step(look: _Look, fit: Fit, relative: Array) -> tuple[Fit | None, float]:
         jacobian,
         tuple(r[k] for r in residuals),
         float(cost[k]),
-        float(dampings[k]),
+        float(own[k]) if k < len(own) else fit.damping,
     )
     return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))
 

@@ -117,7 +117,7 @@ def _sums(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictio
 
 def _products(case: Case, loads: Array) -> Array:
     """All products [M + F + 1, M + F + 1] of what a recording shows of the dictionary, of the genes, and lacks."""
-    both = np.concatenate([case.responses, case.sensitivities, case.lacking[:, None]], axis=1)
+    both = np.concatenate([case.responses[:, : len(loads)], case.sensitivities, case.lacking[:, None]], axis=1)
     others = both.shape[1] - len(loads)
     shown = np.zeros((both.shape[1], loads.shape[1] + others))
     shown[: len(loads), : loads.shape[1]] = loads
@@ -126,11 +126,11 @@ def _products(case: Case, loads: Array) -> Array:
 
 
 def _loads(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
-    """Sizes of the probe's unit loads [P, M] that make each of the dictionary's loads, as well as they can."""
+    """Sizes of the probe's unit forces [P, M] that make each of the dictionary's loads, as well as they can."""
     series = np.linalg.pinv(probe.terms(motion.phase + crossing))
     hats = np.linalg.pinv(probe.hats(motion.stations))
     fields = np.array([candidate.field(motion) for candidate in dictionary])
-    return np.asarray(np.einsum("sj,mjn,kn->skm", hats, fields, series, optimize=True).reshape(probe.size, -1))
+    return np.asarray(np.einsum("sj,mjn,kn->skm", hats, fields, series, optimize=True).reshape(probe.forces, -1))
 
 
 def _selected(sums: _Sums) -> Index:

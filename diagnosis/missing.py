@@ -11,9 +11,10 @@ Genes may be wrong by a good part of their box.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,10 +31,13 @@ TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is no
 _LENGTHS = (0.25, 0.5)  # of the span, over which smooth loads are alike
 _CENTRES = np.linspace(0.0, 1.0, 41)  # of loads of one place, parts of the span
 _WIDTHS = (0.07, 0.15, 0.3)  # their standard deviation
+_CHORDS = np.linspace(0.0, 1.0, 9)  # where along the chord they may act, parts of it
+_TURNING = 0.25  # of the chord: standard deviation of the lever of smooth loads about its middle
 _DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
 _LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
-_MOST = 24  # kinds to average over
+_MOST = 60  # kinds to average over
+_DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
 _SMOOTH = 0.1  # probability a priori of smooth loads; that of loads of one place is the rest
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
@@ -95,12 +99,14 @@ def _decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) ->
 class Kind:
     """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P], genes [F].
 
-    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span; None for smooth loads.
+    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span, and where along the chord
+    they act; None for smooth loads, and without a probe that turns.
     """
 
     probability: float
     centre: float | None
     width: float | None
+    chord: float | None
     sizes: Array
     covariance: Array
     genes: Array
@@ -127,12 +133,14 @@ class Inferred:
     floor: Array
 
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
-        """Loads and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
+        """Forces and their standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
         values, errors = [], []
         for r, crossing in enumerate(self.crossings):
             basis = np.kron(self.probe.hats(span), self.probe.terms(phase + crossing))
-            each = np.array([basis @ kind.sizes[r] for kind in self.kinds])
-            own = [np.einsum("np,pq,nq->n", basis, k.covariance[r], basis, optimize=True) for k in self.kinds]
+            forces = slice(0, self.probe.forces)
+            each = np.array([basis @ kind.sizes[r, forces] for kind in self.kinds])
+            covariances = [kind.covariance[r, forces, forces] for kind in self.kinds]
+            own = [np.einsum("np,pq,nq->n", basis, one, basis, optimize=True) for one in covariances]
             weight = np.array([kind.probability for kind in self.kinds])
             mean = weight @ each
             values.append(mean)
@@ -147,13 +155,15 @@ class LoadPlace:
 
     ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
     the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
-    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start).
+    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start); ``chord`` in parts of
+    it from the leading edge, None where the load is spread smoothly, or the probe does not turn.
     """
 
     span: Interval
     reach: tuple[float, float]
     phase: Interval | None
     lasts: tuple[float, float]
+    chord: Interval | None = None
 
 
 class _Normal:
@@ -173,32 +183,55 @@ class _Normal:
         self.alone = self.A - self.B @ genes @ self.B.T
         self.force = self.h - self.B @ genes @ self.s
 
-    def evidence(self, root: Array) -> Array:
-        """Logarithm of the evidence over that of no load, [strengths], of loads root x strength x unit normal."""
-        size, turn = np.linalg.eigh(root.T @ self.alone @ root)
-        told = np.maximum(size, 0.0) * _STRENGTHS[:, None] ** 2
-        along = (turn.T @ root.T @ self.force) * _STRENGTHS[:, None]
-        return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=1))
+    def evidence(self, shapes: Array, spread: Array) -> Array:
+        """Logarithm of the evidence over that of no load, [K, strengths].
+
+        Of loads that are independent normal numbers for every one of M terms, with standard deviations ``spread`` [M]
+        times the strength, times one of ``shapes`` [K, stations], or the sum of several of them [K, Z, stations].
+        """
+        M = len(spread)
+        Q = len(self.force) // M
+        inner = self.alone.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
+        shapes = shapes.reshape(len(shapes), -1, Q)
+        K, Z = shapes.shape[:2]
+        pairs = np.einsum("kyq,kzr->kyzqr", shapes, shapes).reshape(K * Z * Z, Q * Q)
+        blocks = (pairs @ inner).reshape(K, Z, Z, M, M).transpose(0, 1, 3, 2, 4)
+        whole = (blocks * spread[:, None, None] * spread).reshape(K, Z * M, Z * M)
+        along = ((shapes @ self.force.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
+        size, turn = np.linalg.eigh(whole)
+        told = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
+        along = (along @ turn) * _STRENGTHS[:, None]
+        return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
 
 
-def infer(cases: Sequence[Case], probe: Probe) -> Inferred:
-    """Invert ``cases``, which share the nominal genes; ValueError where there is none."""
+def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None) -> Inferred:
+    """Invert ``cases``, which share the nominal genes; ValueError where there is none.
+
+    ``chord`` [stations] of the wing at the probe's (m), for one that turns.
+    """
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
+    if probe.turning and (chord is None or len(chord) != len(probe.stations)):
+        raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
     normals = [_Normal(case) for case in cases]
-    roots = list(_roots(probe))
-    evidence = np.array([[normal.evidence(root) for normal in normals] for _, _, _, root in roots])  # [kinds, R, .]
+    families = [_smooth(probe, chord), _placed(probe, chord)]
+    forms = [_Form(family, k, spread) for family in families for spread in _spreads(probe) for k in range(len(family))]
+    evidence = np.array(
+        [
+            np.concatenate([normal.evidence(family.shapes, s) for family in families for s in _spreads(probe)])
+            for normal in normals
+        ]
+    ).transpose(1, 0, 2)  # [forms, R, strengths]
     best = evidence.max(axis=2)
-    prior = np.log([share for share, _, _, _ in roots])
-    total = best.sum(axis=1) + prior
-    weight = np.exp(total - total.max())
+    total = best.sum(axis=1) + np.log([form.family.share / len(_DECAYS) for form in forms])
+    weight = np.exp((total - total.max()) / max(_DOUBT * float(total.max()), 1.0))
     kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
     kinds = []
     for k in kept:
-        _, centre, width, root = roots[k]
+        family, number, _ = form = forms[k]
         strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
-        solved = _solved(normals, [strength * root for strength in strengths])
-        kinds.append(Kind(float(weight[k] / weight[kept].sum()), centre, width, *solved))
+        solved = _solved(normals, [strength * form.root for strength in strengths])
+        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], *solved))
     return Inferred(
         probe,
         tuple(case.name for case in cases),
@@ -209,25 +242,65 @@ def infer(cases: Sequence[Case], probe: Probe) -> Inferred:
     )
 
 
-def _roots(probe: Probe) -> Iterator[tuple[float, float | None, float | None, Array]]:
-    """Kinds of load: probability a priori, centre and width if it has a place, root [P, Z] of its covariance.
+class _Family(NamedTuple):
+    """Shapes [K, Z, stations] of loads, forces and moments; ``places``: centre, width and chord of each, if any.
 
-    That is at strength one.
+    ``share``: probability a priori of each of them.
     """
-    y, order = np.array(probe.stations), np.arange(1, probe.harmonics + 1)
+
+    shapes: Array
+    places: tuple[tuple[float | None, float | None, float | None], ...]
+    share: float
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+
+class _Form(NamedTuple):
+    """One shape of a family, with a spread [M] over the terms of the beat."""
+
+    family: _Family
+    number: int
+    spread: Array
+
+    @property
+    def root(self) -> Array:
+        """[P, Z M] of the covariance of loads at strength one."""
+        return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
+
+
+def _spreads(probe: Probe) -> list[Array]:
+    order = np.arange(1, probe.harmonics + 1)
+    return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
+
+
+def _smooth(probe: Probe, chord: Array | None) -> _Family:
+    """Loads that are alike over a length of the span, forces and moments by themselves."""
+    y, shapes = np.array(probe.stations), []
+    for length in _LENGTHS:
+        root = np.linalg.cholesky(np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))).T
+        if probe.turning and chord is not None:
+            nothing = np.zeros_like(root)
+            root = np.block([[root, nothing], [nothing, _TURNING * chord * root]])
+        shapes.append(root)
+    return _Family(np.array(shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
+
+
+def _placed(probe: Probe, chord: Array | None) -> _Family:
+    """Loads of one place: of the same force and moment about the root as bumps, and about the span as the chord says."""
     span = np.linspace(0.0, 1.0, 401)
-    hats = probe.hats(span)
-    spreads = [np.diag(np.concatenate([[1.0], np.tile(order**-decay, 2)])) for decay in _DECAYS]
-    for length, spread in product(_LENGTHS, spreads):
-        alike = np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))
-        root = np.asarray(np.kron(np.linalg.cholesky(alike), spread), float)
-        yield _SMOOTH / (len(_LENGTHS) * len(_DECAYS)), None, None, root
-    share = (1.0 - _SMOOTH) / (len(_CENTRES) * len(_WIDTHS) * len(_DECAYS))
+    hats, shapes, places = probe.hats(span), [], []
     for centre, width in product(_CENTRES, _WIDTHS):
         bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
-        shape = np.linalg.lstsq(hats, bump, rcond=None)[0][:, None]  # of the same force and moment
-        for spread in spreads:
-            yield share, float(centre), width, np.asarray(np.kron(shape, spread), float)
+        force = np.linalg.lstsq(hats, bump, rcond=None)[0]
+        if not probe.turning or chord is None:
+            shapes.append(force)
+            places.append((float(centre), width, None))
+            continue
+        for part in _CHORDS:
+            shapes.append(np.concatenate([force, (0.5 - part) * chord * force]))
+            places.append((float(centre), width, float(part)))
+    return _Family(np.array(shapes)[:, None, :], tuple(places), (1.0 - _SMOOTH) / len(shapes))
 
 
 def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -291,17 +364,20 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
     rng = np.random.default_rng(seed)
     phase = np.arange(2 * PHASES) / (2 * PHASES)
     draws = rng.multinomial(_DRAWS, [kind.probability for kind in inferred.kinds])
-    along, during = [], []
+    along, during, chords = [], [], list[float]()
     for kind, count in zip(inferred.kinds, draws, strict=True):
-        if count:
-            fields = _drawn(inferred, kind, shown, phase, int(count), rng)
-            if kind.centre is not None and kind.width is not None:
-                bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
-                along.append(np.tile(bump, (count, 1)))
-            else:
-                along.append(np.abs(fields).sum(axis=(0, 3)))
-            during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
-    return LoadPlace(*_along(np.concatenate(along)), *_during(phase, np.concatenate(during)))
+        if not count:
+            continue
+        fields = _drawn(inferred, kind, shown, phase, int(count), rng)
+        if kind.centre is not None and kind.width is not None:
+            bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
+            along.append(np.tile(bump, (count, 1)))
+        else:
+            along.append(np.abs(fields).sum(axis=(0, 3)))
+        during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
+        chords += [kind.chord] * int(count) if kind.chord is not None else []
+    chord = Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()) if len(chords) > _DRAWS / 2 else None
+    return LoadPlace(*_along(np.concatenate(along)), *_during(phase, np.concatenate(during)), chord)
 
 
 def _drawn(
@@ -317,7 +393,8 @@ def _drawn(
     for r in shown:
         size, turn = np.linalg.eigh(kind.covariance[r])
         off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
-        sizes = (kind.sizes[r] + off @ turn.T).reshape(count, len(inferred.probe.stations), -1)
+        sizes = (kind.sizes[r] + off @ turn.T)[:, : inferred.probe.forces]
+        sizes = sizes.reshape(count, len(inferred.probe.stations), -1)
         series = inferred.probe.terms(phase + inferred.crossings[r])
         field = np.einsum("sj,cjk,pk->csp", hats, sizes, series, optimize=True)
         found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))

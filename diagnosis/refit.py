@@ -171,6 +171,14 @@ def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit
     return judged(stack, fit, refit.trials)
 
 
+def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
+    """``refit`` fitted anew from other genes ``start`` [F]; None where these cannot be simulated."""
+    try:
+        return judged(stack, fitted(subject, stack, refit.fit.problem, evaluator, start, steps=STEPS), refit.trials)
+    except ValueError:
+        return None
+
+
 def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
     """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)

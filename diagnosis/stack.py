@@ -111,6 +111,11 @@ class Stack:
         """How much a unit of chi-squared counts beside these coefficients [D]: the slope of :meth:`surprise`."""
         return float(1.0 / (1.0 + self._beyond(coefficients) / self.pieces))
 
+    @cached_property
+    def most_trust(self) -> float:
+        """The same beside a misfit as large as the tolerance: no fit ends nearer to the best, and no model is exact."""
+        return float(1.0 / (1.0 + TOLERANCE**2 * len(self.scale) / self.pieces))
+
     def _beyond(self, coefficients: Array) -> Array:
         return np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0)
 

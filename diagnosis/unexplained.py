@@ -16,8 +16,9 @@ from diagnosis.subject import Subject
 from sim.effects.probe import Probe
 from sim.probing import Probed
 
+PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 6, turning=True)
 LARGEST = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
-MOST = 6  # recordings that are probed: those with the largest misfit
+MOST = 4  # recordings that are probed: those with the largest misfit
 
 
 @dataclass(frozen=True)
@@ -34,33 +35,34 @@ class Unexplained:
         return None if self.place is None else self.place.span
 
     @property
+    def chord(self) -> Interval | None:
+        """Where along the chord."""
+        return None if self.place is None else self.place.chord
+
+    @property
     def phase(self) -> Interval | None:
         """When in the beat it acts."""
         return None if self.place is None else self.place.phase
 
 
-def probed_recordings(
-    subject: Subject, stack: Stack, nominal: Refit, probe: Probe
-) -> Iterator[tuple[int, Probed | None]]:
+def probed_recordings(subject: Subject, stack: Stack, nominal: Refit) -> Iterator[tuple[int, Probed | None]]:
     """Responses about the nominal fit of the recordings with the largest misfit, one after the other."""
     fit = nominal.fit
     genome = fit.problem.genomes(np.array(list(fit.values.values())))[0]
     for r in np.argsort(-stack.excess_of(fit.coefficients))[:MOST]:
-        yield int(r), subject.probed(genome, stack.recordings[r], probe)
+        yield int(r), subject.probed(genome, stack.recordings[r], PROBE)
 
 
-def unexplained(
-    stack: Stack, nominal: Refit, found: list[tuple[int, Probed]], probe: Probe, *, law: bool
-) -> Unexplained:
+def unexplained(stack: Stack, nominal: Refit, found: list[tuple[int, Probed]], *, law: bool) -> Unexplained:
     """What is lacking, from the ``found`` responses of recordings; ``law`` asks for a law as well."""
     if not found:
         return Unexplained()
     cases = [_case(stack, nominal, r, one) for r, one in found]
-    inferred = infer(cases, probe)
+    inferred = infer(cases, PROBE, found[0][1].motion.chord)
     loads = missing_loads(inferred)
     if not _plausible(loads, [one for _, one in found]):
         return Unexplained()
-    told = free_law(cases, probe, [one.motion for _, one in found]) if law else None
+    told = free_law(cases, PROBE, [one.motion for _, one in found]) if law else None
     return Unexplained(loads, place(inferred), told)
 
 

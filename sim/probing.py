@@ -61,7 +61,7 @@ class StationMotion:
 
 @dataclass(frozen=True)
 class Probed:
-    """``responses`` [T, C, P] of a recording's channels to the P unit loads of a probe, m per N/m; NaN where one fails.
+    """``responses`` [T, C, P] of a recording's channels to the P unit loads of a probe, m per N/m or N; NaN if one fails.
 
     ``crossing``: drive phase (beats) at which the recorded beat starts; ``motion`` at the stations of the probe.
     """
@@ -86,7 +86,7 @@ def probed(
     aim = MOVES * _span(model)
     numerics = replace(model.numerics, steps=len(beat.tracks), periodic=CLOSE * aim, max_beats=_MOST_BEATS)
     probing = replace(model, numerics=numerics, probe=probe)
-    sizes = np.repeat(_sizes(model, probe), probe.size // len(probe.stations))
+    sizes = np.repeat(_sizes(model, probe), 1 + 2 * probe.harmonics)
     found = np.full((probe.size, *recording.values.shape), np.nan)
     tried = np.arange(probe.size)
     for _ in range(2):
@@ -109,9 +109,16 @@ def _span(model: FlexibleWing) -> float:
 
 
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
-    """Loads [stations] to begin with, N/m: a part of the wing's weight, more where they have little lever."""
+    """Loads [stations], or twice as many, to begin with, N/m and N: a part of the wing's weight.
+
+    More where forces have little lever; moments as of forces at a quarter of the chord.
+    """
     weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
-    return np.asarray(_PART_OF_WEIGHT * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1))
+    forces = _PART_OF_WEIGHT * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1)
+    edges = model.structure.planform.strips(model.structure.division)
+    chord = float(np.mean(model.structure.planform.chord(edges)))
+    turning = np.full(len(forces), forces.min() * chord)
+    return np.concatenate([forces, turning]) if probe.turning else np.asarray(forces)
 
 
 def _changes(

@@ -1,4 +1,4 @@
-"""A known load on the wing along the flap normal, given by its span and its place in the beat: a probe, no suspect.
+"""A known load on the wing, given by its place along the span and in the beat: a probe, no suspect.
 
 What the tracks answer to it tells which load is missing where a model and a recording differ. It is not in the
 registry: a search for what is missing must not name it.
@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from sim.effects.contract import Effect, Parameter, Values
 from sim.effects.wing import WingScene
-from sim.kernels.arrays import AREA, NOW, PUSH_N, SHARE, START
+from sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE, START
+from sim.kernels.jit import inlined
 from sim.kernels.lanewise import cosine_and_sine
 from sim.kernels.laws import AFTER, strip_port
 from sim.kernels.vector import load, load0, load1, store
@@ -25,7 +26,7 @@ Array = npt.NDArray[np.float64]
 
 LARGEST = 1000.0  # N/m, of a gene: far beyond what a wing bears
 _THINNEST = 1e-9  # kg/m^3: loads are told as parts of the air's, so that there must be some
-_CUTS = 400  # of the span, for the means of its hats
+_CUTS = 1200  # of the span, for the means of its hats
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,14 @@ class Probe:
     """A force per metre of span, N/m: hat functions over ``stations`` times a Fourier series of the drive phase.
 
     ``stations`` in parts of the span, rising from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency. It acts
-    along the normal of the wing where it is, upward, and is spread over the chord. The genes of the effect
-    (:meth:`effect`) are numbered station by station: constant, cosines, sines (:meth:`terms`).
+    along the normal of the wing where it is, upward, and is spread over the chord. With ``turning`` there is a moment
+    about the span as well, nose up, N m/m: a force before or behind the middle of the chord is both. The genes of the
+    effect (:meth:`effect`) are numbered station by station, forces first: constant, cosines, sines (:meth:`terms`).
     """
 
     stations: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
     harmonics: int = 8
+    turning: bool = False
 
     def __post_init__(self) -> None:
         y = np.array(self.stations)
@@ -49,7 +52,12 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of its genes, P = stations times (1 + 2 harmonics)."""
+        """Number of its genes, P = stations times (1 + 2 harmonics), and twice that with moments."""
+        return self.forces * (2 if self.turning else 1)
+
+    @property
+    def forces(self) -> int:
+        """Number of those that are forces; the others are moments."""
         return len(self.stations) * (1 + 2 * self.harmonics)
 
     def terms(self, phase: npt.ArrayLike) -> Array:
@@ -62,37 +70,43 @@ class Probe:
         y = np.asarray(span, float)
         return np.stack([np.interp(y, self.stations, row) for row in np.eye(len(self.stations))], axis=-1)
 
-    def on_strips(self, structure: Structure) -> Array:
-        """Force on each strip per size of each hat [S, stations], m.
+    def on_strips(self, structure: Structure) -> tuple[Array, Array]:
+        """Force on each strip per size of each hat [S, stations], m, and its moment about the strip's middle, m^2.
 
-        A load between the middles of two strips goes to both by the lever rule, and beyond the last by the same rule,
-        so that force and moment about the root are those of the load whatever the division.
+        The moment is about the chord, tip up: a load acts on the strip that it lies on, where it lies.
         """
         edges = structure.planform.strips(structure.division)
         span = (np.arange(_CUTS) + 0.5) / _CUTS
-        middles = strip_middles(structure)
-        inner = np.clip(np.searchsorted(middles, span) - 1, 0, len(middles) - 2)
-        part = (span - middles[inner]) / (middles[inner + 1] - middles[inner])
-        shares = np.zeros((len(middles), _CUTS))
-        shares[inner, np.arange(_CUTS)] = 1.0 - part
-        shares[inner + 1, np.arange(_CUTS)] = part
-        return np.asarray(shares @ self.hats(span) * (edges[-1] - edges[0]) / _CUTS)
+        length = edges[-1] - edges[0]
+        strip = np.clip(np.searchsorted(edges, edges[0] + span * length) - 1, 0, len(edges) - 2)
+        lies = (strip == np.arange(len(edges) - 1)[:, None]) * length / _CUTS
+        lever = (span - strip_middles(structure)[:, None]) * length
+        hats = self.hats(span)
+        return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
     def effect(self) -> Effect:
         """The load as an effect, for :class:`sim.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
         names = ["0", *(f"{kind}{k}" for kind in "cs" for k in range(1, self.harmonics + 1))]
-        text = "N/m of span at {:g} of it, {}"
         what = {"0": "constant", "c": "cosine", "s": "sine"}
+        loads = [("", "N/m", "force"), ("turn", "N", "moment nose up")][: 2 if self.turning else 1]
         return Effect(
             name="probe",
             title="Known load",
             family="aerodynamics",
             port="air",
             size=tuple(
-                Parameter(f"{j}_{name}", "N/m", -LARGEST, LARGEST, 1.0, text.format(y, what[name[0]]))
+                Parameter(
+                    f"{load}{j}_{name}",
+                    unit,
+                    -LARGEST,
+                    LARGEST,
+                    1.0,
+                    f"{told} per metre of span at {y:g} of it, {what[name[0]]}",
+                )
+                for load, unit, told in loads
                 for j, y in enumerate(self.stations)
                 for name in names
-            ),
+            ),  # fmt: skip
             source="sum of hats of the span times Fourier series of the drive phase: any load, as well as these can",
             signature="whatever one wishes",
             confused_with=(),
@@ -108,25 +122,47 @@ def strip_middles(structure: Structure) -> Array:
     return np.asarray((middle - edges[0]) / (edges[-1] - edges[0]))
 
 
-def _law(frame: Any, moment: int) -> None:
+def _push(frame: Any, moment: int) -> None:
     """F = sum of a_k cos k psi + b_k sin k psi per strip, with what the step's method asks of its rate of change."""
-    if moment != AFTER:
-        return
+    if moment == AFTER:
+        _series(frame, PUSH_N)
+
+
+def _roll(frame: Any, moment: int) -> None:
+    """The same of the moment by which forces act beside the middle of their strip."""
+    if moment == AFTER:
+        _series(frame, PUSH_L)
+
+
+def _turn(frame: Any, moment: int) -> None:
+    """The same of a moment about the span."""
+    if moment == AFTER:
+        _series(frame, PUSH_M)
+
+
+@inlined
+def _series(frame: Any, which: int) -> None:
     port = strip_port(frame)
     harmonics = len(port.parameters) // 2
     share = load1(port.clock, SHARE)
     for s in range(port.places):
-        force = load(port.parameters, 0, s)
+        size = load(port.parameters, 0, s)
         for k in range(1, harmonics + 1):
             a, b = load(port.parameters, k, s), load(port.parameters, harmonics + k, s)
             c, n = cosine_and_sine(float(k) * load1(port.clock, NOW))
             c0, n0 = cosine_and_sine(float(k) * load1(port.clock, START))
-            force += a * c + b * n + (float(k) * share) * (b * c0 - a * n0)
+            size += a * c + b * n + (float(k) * share) * (b * c0 - a * n0)
         scale = load0(port.density) * (0.5 * port.geometry[s, AREA])
-        store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + force / scale)
+        store(port.loads, s, which, load(port.loads, s, which) + size / scale)
 
 
 def _wing(probe: Probe, scene: WingScene, values: Values) -> None:
-    sizes = np.array(list(values.values())).reshape(len(probe.stations), 1 + 2 * probe.harmonics, -1)
+    kinds = probe.size // probe.forces
+    sizes = np.array(list(values.values())).reshape(kinds, len(probe.stations), 1 + 2 * probe.harmonics, -1)
     scene.density = np.maximum(scene.density, _THINNEST)
-    scene.add_strip_law(_law, list(np.einsum("sj,jkw->ksw", probe.on_strips(scene.structure), sizes)))
+    strips, levers = probe.on_strips(scene.structure)
+    laws = [(_push, strips, sizes[0]), (_roll, levers, sizes[0])]
+    if probe.turning:
+        laws.append((_turn, strips, sizes[1]))
+    for law, shares, loads in laws:
+        scene.add_strip_law(law, list(np.einsum("sj,jkw->ksw", shares, loads)))

@@ -28,6 +28,7 @@ from sim.kernels.arrays import (
     PITCH_RATE,
     PLACE_X,
     PUSH_C,
+    PUSH_L,
     PUSH_M,
     PUSH_N,
     SPEED,
@@ -110,7 +111,7 @@ def strip_flow(
         store(loads, s, DRAG, q * cd)
         store(loads, s, LIFT_SLOPE, q * load1(coefficients, 0))
         store(loads, s, DRAG_SLOPE, q * (cd + load1(coefficients, 2)))
-        for i in (PUSH_N, PUSH_C, PUSH_M):
+        for i in (PUSH_N, PUSH_C, PUSH_M, PUSH_L):
             store(loads, s, i, 0.0)
 
 
@@ -157,7 +158,7 @@ def strip_forces(
     linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
     """
     lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
-    push = np.empty((4, LANES))
+    push = np.empty((5, LANES))
     for s in range(len(start) - 1):
         scale = load0(density) * (0.5 * geometry[s, AREA])
         uc, un = load(flow, s, STREAM_C), load(flow, s, STREAM_N)
@@ -174,6 +175,7 @@ def strip_forces(
         store1(drag, 3, scale * load(loads, s, DRAG_SLOPE))
         if spread:
             store1(push, 3, scale * load(loads, s, PUSH_M))
+            store1(push, 4, scale * load(loads, s, PUSH_L))
         for n in range(start[s], start[s + 1]):
             y = centroid[n, 1]
             a, b = load1(lift_share, n), load1(drag_share, n)
@@ -191,7 +193,7 @@ def strip_forces(
                 px = load(R, n, 0) * load1(push, 0) + load(R, n, 3) * load1(push, 1) + load(R, n, 6) * load1(push, 2)
                 py = load(R, n, 1) * load1(push, 0) + load(R, n, 4) * load1(push, 1) + load(R, n, 7) * load1(push, 2)
                 pz = load(R, n, 2) * load1(push, 0) + load(R, n, 5) * load1(push, 1) + load(R, n, 8) * load1(push, 2)
-                tx, ty = tx + (g * y) * pz, ty - (g * x) * pz + g * load1(push, 3)
+                tx, ty = tx + (g * y) * pz + g * load1(push, 4), ty - (g * x) * pz + g * load1(push, 3)
                 tz = tz + g * (x * py - y * px)
                 fx, fy, fz = fx + g * px, fy + g * py, fz + g * pz
             store(wrench, n, 0, load(wrench, n, 0) + tx)

@@ -32,9 +32,9 @@ DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
     DRAG,  # speed times drag coefficient, m/s: a force along the stream, shared out as drag
     LIFT_SLOPE, DRAG_SLOPE,  # their changes with the angle of attack, for the linearisation
     PUSH_N, PUSH_C,  # m^2/s^2: force along normal and chord, spread evenly over the strip
-    PUSH_M,  # m^3/s^2: moment about the span, nose up, spread evenly
+    PUSH_M, PUSH_L,  # m^3/s^2: moment about the span, nose up, and about the chord, tip up, spread evenly
     LOADS,
-) = range(8)  # fmt: skip
+) = range(9)  # fmt: skip
 # Derivatives that the step needs of each state of an effect (sim.kernels.laws).
 DECAY, DRIVE, PULL = range(3)
 FRAME = 17  # numbers in a law's frame: places, parameters and states per place, then addresses

@@ -53,12 +53,15 @@ def test_is_no_suspect_and_goes_with_the_model() -> None:
 @pytest.mark.parametrize("division", ["2x1", "4", "11", "24"])
 def test_force_and_moment_are_those_of_the_load_whatever_the_division(division: str) -> None:
     structure, probe = build(WING, Division.parse(division)), Probe()
-    on_strips, middles = probe.on_strips(structure), strip_middles(structure)
+    (on_strips, levers), middles = probe.on_strips(structure), strip_middles(structure)
     span = np.linspace(0.0, 1.0, 4001)
     hats = probe.hats(span)
     np.testing.assert_allclose(on_strips.sum(axis=0), np.trapezoid(hats, span, axis=0) * SPAN, rtol=1e-4)
     np.testing.assert_allclose(
-        middles @ on_strips, np.trapezoid(hats * span[:, None], span, axis=0) * SPAN, rtol=1e-3, atol=1e-5
+        middles @ on_strips + levers.sum(axis=0) / SPAN,
+        np.trapezoid(hats * span[:, None], span, axis=0) * SPAN,
+        rtol=1e-3,
+        atol=1e-5,
     )
 
 
@@ -67,7 +70,7 @@ def test_every_strip_is_pushed_along_its_normal_as_the_series_says() -> None:
     model, genome = with_load(SMALL, {"0_0": 0.3, "1_c1": -0.5, "2_s2": 0.4, "2_c2": 0.1})
     found = simulate_outputs(model, genome.tolist(), blank_recording(WING, Condition(3.0, 0.05, 0.0, 293.15)))
     sizes = genome[-SMALL.size :].reshape(3, -1)
-    expected = SMALL.on_strips(model.structure) @ sizes @ SMALL.terms(found.phase).T
+    expected = SMALL.on_strips(model.structure)[0] @ sizes @ SMALL.terms(found.phase).T
     forces = np.array([np.linalg.norm(strip.force, axis=1) for strip in found.strips])
     np.testing.assert_allclose(forces, np.abs(expected), rtol=1e-6, atol=1e-9)
     upward = found.strips[0].force[0, 2]
