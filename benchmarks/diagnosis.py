@@ -13,6 +13,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
 def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
     """Seconds of each kind of stage, by its first words."""
     spent: dict[str, float] = {}
-    for (at, one), (after, _) in zip(reports, reports[1:], strict=False):
+    for (at, one), (after, _) in pairwise(reports):
         name = " ".join(one.stage.split()[:2])
         spent[name] = spent.get(name, 0.0) + after - at
     return spent

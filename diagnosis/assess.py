@@ -11,7 +11,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
-from diagnosis.nominal import Nominal, first_fit, improves, matters, settled
+from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
 from diagnosis.refit import Refit, again, continued, pairs, partners, refitted, resumed, worth_a_refit
 from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
@@ -97,7 +97,10 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
         return
     innocent, better, first = False, None, None
     for finer in nominal.subject.finer():
-        better = again(finer, stack, evaluator, best)
+        changes, takes = leaves(finer, stack, evaluator, best)
+        if not changes:
+            continue
+        better = again(finer, stack, evaluator, best) if takes > PROMISING else best
         if better is not None and improves(better, best):
             first = again(finer, stack, evaluator, nominal.refit)
             break

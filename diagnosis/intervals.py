@@ -22,8 +22,8 @@ def covariance(stack: Stack, fit: Fit) -> Array:
     """[F, F] of the genes in parts of their boxes.
 
     By noise, by what the model misses in a few independent pieces (:meth:`diagnosis.stack.Stack.trust`), which is taken
-    to be no less than the tolerance, and the box as a weak prior. Of forces also the scatter of what each recording by itself asks for (a sandwich with recordings as
-    clusters: Liang and Zeger 1986).
+    to be no less than the tolerance, and the box as a weak prior. Of forces also the scatter of what each recording by
+    itself asks for (a sandwich with recordings as clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
     trust, recordings = min(stack.trust(fit.coefficients), stack.most_trust), len(stack.recordings)

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.finding import Interval, MissingLoad
+from diagnosis.load_kinds import Form, placed, smooth, spreads
 from sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
@@ -28,17 +27,10 @@ PHASES = 36  # instants of a beat that loads are told at
 GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
 LINEAR = 0.03  # of a response: what is not proportional to the load
 TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is none
-_LENGTHS = (0.25, 0.5)  # of the span, over which smooth loads are alike
-_CENTRES = np.linspace(0.0, 1.0, 41)  # of loads of one place, parts of the span
-_WIDTHS = (0.07, 0.15, 0.3)  # their standard deviation
-_CHORDS = np.linspace(0.0, 1.0, 9)  # where along the chord they may act, parts of it
-_TURNING = 0.25  # of the chord: standard deviation of the lever of smooth loads about its middle
-_DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
 _LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
 _MOST = 60  # kinds to average over
-_DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
-_SMOOTH = 0.1  # probability a priori of smooth loads; that of loads of one place is the rest
+DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
 SPREAD = 0.3  # mean direction of the phase: less, and the load is spread over the beat
@@ -132,8 +124,13 @@ class Inferred:
     evidence: Array
     floor: Array
 
+    @property
+    def placed(self) -> float:
+        """Probability of loads of one place."""
+        return sum(kind.probability for kind in self.kinds if kind.centre is not None)
+
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
-        """Forces and their standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
+        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
         values, errors = [], []
         for r, crossing in enumerate(self.crossings):
             basis = np.kron(self.probe.hats(span), self.probe.terms(phase + crossing))
@@ -204,27 +201,28 @@ class _Normal:
         return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
 
 
-def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None) -> Inferred:
+def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt: float = DOUBT) -> Inferred:
     """Invert ``cases``, which share the nominal genes; ValueError where there is none.
 
-    ``chord`` [stations] of the wing at the probe's (m), for one that turns.
+    ``chord`` [stations] of the wing at the probe's (m), for one that turns; ``doubt`` about the model's responses, as a
+    part of the evidence.
     """
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
     if probe.turning and (chord is None or len(chord) != len(probe.stations)):
         raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
     normals = [_Normal(case) for case in cases]
-    families = [_smooth(probe, chord), _placed(probe, chord)]
-    forms = [_Form(family, k, spread) for family in families for spread in _spreads(probe) for k in range(len(family))]
+    families = [smooth(probe, chord), placed(probe, chord)]
+    forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
     evidence = np.array(
         [
-            np.concatenate([normal.evidence(family.shapes, s) for family in families for s in _spreads(probe)])
+            np.concatenate([normal.evidence(family.shapes, s) for family in families for s in spreads(probe)])
             for normal in normals
         ]
     ).transpose(1, 0, 2)  # [forms, R, strengths]
     best = evidence.max(axis=2)
-    total = best.sum(axis=1) + np.log([form.family.share / len(_DECAYS) for form in forms])
-    weight = np.exp((total - total.max()) / max(_DOUBT * float(total.max()), 1.0))
+    total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
+    weight = np.exp((total - total.max()) / max(doubt * float(total.max()), 1.0))
     kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
     kinds = []
     for k in kept:
@@ -240,67 +238,6 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None) -> In
         best[kept[0]],
         np.array([normal.floor for normal in normals]),
     )
-
-
-class _Family(NamedTuple):
-    """Shapes [K, Z, stations] of loads, forces and moments; ``places``: centre, width and chord of each, if any.
-
-    ``share``: probability a priori of each of them.
-    """
-
-    shapes: Array
-    places: tuple[tuple[float | None, float | None, float | None], ...]
-    share: float
-
-    def __len__(self) -> int:
-        return len(self.shapes)
-
-
-class _Form(NamedTuple):
-    """One shape of a family, with a spread [M] over the terms of the beat."""
-
-    family: _Family
-    number: int
-    spread: Array
-
-    @property
-    def root(self) -> Array:
-        """[P, Z M] of the covariance of loads at strength one."""
-        return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
-
-
-def _spreads(probe: Probe) -> list[Array]:
-    order = np.arange(1, probe.harmonics + 1)
-    return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
-
-
-def _smooth(probe: Probe, chord: Array | None) -> _Family:
-    """Loads that are alike over a length of the span, forces and moments by themselves."""
-    y, shapes = np.array(probe.stations), []
-    for length in _LENGTHS:
-        root = np.linalg.cholesky(np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))).T
-        if probe.turning and chord is not None:
-            nothing = np.zeros_like(root)
-            root = np.block([[root, nothing], [nothing, _TURNING * chord * root]])
-        shapes.append(root)
-    return _Family(np.array(shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
-
-
-def _placed(probe: Probe, chord: Array | None) -> _Family:
-    """Loads of one place: of the same force and moment about the root as bumps, and about the span as the chord says."""
-    span = np.linspace(0.0, 1.0, 401)
-    hats, shapes, places = probe.hats(span), [], []
-    for centre, width in product(_CENTRES, _WIDTHS):
-        bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
-        force = np.linalg.lstsq(hats, bump, rcond=None)[0]
-        if not probe.turning or chord is None:
-            shapes.append(force)
-            places.append((float(centre), width, None))
-            continue
-        for part in _CHORDS:
-            shapes.append(np.concatenate([force, (0.5 - part) * chord * force]))
-            places.append((float(centre), width, float(part)))
-    return _Family(np.array(shapes)[:, None, :], tuple(places), (1.0 - _SMOOTH) / len(shapes))
 
 
 def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array, Array]:
@@ -376,8 +313,20 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
             along.append(np.abs(fields).sum(axis=(0, 3)))
         during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
-    chord = Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()) if len(chords) > _DRAWS / 2 else None
-    return LoadPlace(*_along(np.concatenate(along)), *_during(phase, np.concatenate(during)), chord)
+    span, reach = _along(np.concatenate(along))
+    placed = next((kind for kind in inferred.kinds if kind.centre is not None), None)
+    chord = None
+    if placed is not None and inferred.placed > 0.5:  # the likeliest place: their mean lies between root and tip
+        span = _told(placed.centre, span)
+        chord = _told(placed.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
+    return LoadPlace(span, reach, *_during(phase, np.concatenate(during)), chord)
+
+
+def _told(value: float | None, draws: Interval) -> Interval:
+    """``value`` with the interval of draws, which it may lie at an end of."""
+    if value is None or draws.low is None or draws.high is None:
+        return draws
+    return Interval(value, min(draws.low, value), max(draws.high, value))
 
 
 def _drawn(

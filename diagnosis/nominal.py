@@ -71,7 +71,7 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
     for _ in range(ROUNDS):
         left, finest, better, tried = 0.0, "", None, False
         for finer in subject.finer():
-            changes, takes = _leaves(finer, stack, evaluator, now.fit)
+            changes, takes = leaves(finer, stack, evaluator, now)
             if changes <= left:
                 continue
             left, finest = changes, finer.told
@@ -100,12 +100,13 @@ def _better(finer: Subject, stack: Stack, evaluator: Evaluator, now: Refit) -> R
     return found if found is not None and improves(found, now) else None
 
 
-def _leaves(finer: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> tuple[float, float]:
+def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
     """What the finer model says differently and the genes cannot make up for: root mean square (m or N).
 
     And which part of the misfit that would take away, as far as the linearised model knows; zeros if it fails.
     """
-    problem = Problem(finer.model, stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
+    fit = refit.fit
+    problem = Problem(finer.extended(refit.names), stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
     found, reasons, _ = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
     if reasons[0] is not None:
         return 0.0, 0.0

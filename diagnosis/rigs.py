@@ -83,8 +83,7 @@ class WingSubject:
 
     def beside(self, model: Model, genome: Array) -> Model:
         """The wing begins its search for the periodic motion at that of ``genome``, without its effects."""
-        own = len(self.model.genes) - sum(len(effect.parameters) for effect in self.model.chosen)
-        return replace(model, near=tuple(genome[:own].tolist())) if isinstance(model, FlexibleWing) else model
+        return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
     def finer(self) -> tuple[WingSubject, ...]:
         """More strips with as many bodies along the chord; then more strips with the next even number of these.

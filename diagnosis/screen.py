@@ -23,8 +23,7 @@ from diagnosis.subject import Subject, Suspect
 
 Array = npt.NDArray[np.float64]
 
-PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
-SHAPES = 7  # of one with other shape genes
+SHAPES = 7  # places, and other shapes, that a suspect is tried at beside the typical ones: a group of lanes
 SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
 
 
@@ -63,7 +62,7 @@ class Trial:
 class Nuisance:
     """What the nominal genes can do about a fit: projections of whitened vectors [..., D] on what they cannot.
 
-    Their prior counts as F further samples, as much as it counts beside the misfit (:meth:`diagnosis.stack.Stack.trust`).
+    Their prior counts as F further samples, as much as it does beside the misfit (:meth:`diagnosis.stack.Stack.trust`).
     """
 
     def __init__(self, stack: Stack, fit: Fit) -> None:
@@ -174,8 +173,7 @@ def _blocks(suspect: Suspect) -> Iterator[Array]:
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]
-    wide = len(suspect.places) > 0
-    count = (PLACES if wide else SHAPES) if shape else 0
+    count = SHAPES if shape else 0
     spots = [typical[shape], *qmc.Halton(max(len(shape), 1), scramble=False).random(count + 1)[1:, : len(shape)]]
     for spot in spots if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):

@@ -117,7 +117,7 @@ class Stack:
         return float(1.0 / (1.0 + TOLERANCE**2 * len(self.scale) / self.pieces))
 
     def _beyond(self, coefficients: Array) -> Array:
-        return np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0)
+        return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Array) -> float:
         """Mean square beyond the noise of residuals with these coefficients [D], m^2 or N^2; noise may make it < 0."""

@@ -61,15 +61,19 @@ def _along(pieces: Sequence[Piece], name: str) -> Interval | None:
 
 
 def _phase(pieces: Sequence[Piece]) -> Interval | None:
-    """Middle and extent of the misfit in the beat; None where it is spread over all of it."""
+    """Middle and extent of the misfit in the beat; None where it is spread over all of it.
+
+    The middle is that of what is larger than half of the most: a fit smears a misfit over the beat.
+    """
     mass = np.sum([(piece.beat**2).mean(axis=1) for piece in pieces], axis=0)
+    peak = np.where(mass > 0.5 * mass.max(), mass, 0.0)
     mass = np.maximum(mass - mass.min(), 0.0)
     if mass.sum() <= 0:
         return None
     turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
-    mean = complex((mass * turn).sum() / mass.sum())
-    if abs(mean) < GATHERED:
+    if abs(complex((mass * turn).sum() / mass.sum())) < GATHERED:
         return None
+    mean = complex((peak * turn).sum())
     middle = float(np.angle(mean) / (2 * np.pi)) % 1.0
     start = round(middle * PHASES) - PHASES // 2
     rolled = np.roll(mass, -start)

@@ -85,7 +85,19 @@ class FlexibleWing:
 
     def with_effects(self, *names: str) -> FlexibleWing:
         """The same wing with more effects; their genes are appended, switched off."""
-        return replace(self, effects=(*self.effects, *names))
+        return self._cut_alike(replace(self, effects=(*self.effects, *names)))
+
+    def beside(self, genome: npt.ArrayLike) -> FlexibleWing:
+        """The same wing, which begins its search for a periodic motion at that of ``genome`` [G], without effects."""
+        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
+        return self._cut_alike(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
+
+    def _cut_alike(self, other: FlexibleWing) -> FlexibleWing:
+        """``other``, of the same wing and division, with the bodies that were cut already."""
+        for name in ("structure", "_immersed"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
 
     @property
     def searched(self) -> tuple[str, ...]:

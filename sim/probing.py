@@ -61,7 +61,7 @@ class StationMotion:
 
 @dataclass(frozen=True)
 class Probed:
-    """``responses`` [T, C, P] of a recording's channels to the P unit loads of a probe, m per N/m or N; NaN if one fails.
+    """``responses`` [T, C, P] of a recording to the P unit loads of a probe, m per N/m or N; NaN where one fails.
 
     ``crossing``: drive phase (beats) at which the recorded beat starts; ``motion`` at the stations of the probe.
     """

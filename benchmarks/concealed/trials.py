@@ -53,7 +53,7 @@ WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
 VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
-WINGS = (FINER, EQUAL, FINER, EQUAL, FINER, ELEVEN, FINER, EQUAL, FINER, EQUAL, ELEVEN_FINER)
+WINGS = (FINER, EQUAL, FINER, FINER, EQUAL, FINER, ELEVEN, FINER, FINER, EQUAL, FINER, ELEVEN_FINER, FINER)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,6 @@ class Trial:
 # can tell from something else: docs/concealed.md.
 LISTED_WING = (
     "hinge_offset",
-    "hinge_tilt",
     "phase_lag_error",
     "drive_harmonics",
     "stroke_amplitude",
@@ -94,7 +93,7 @@ LISTED_WING = (
     "leading_edge_vortex",
 )
 LISTED_VEHICLE = ("clap_and_peel", "induced_inflow", "circulation_lag", "stroke_amplitude")
-UNLISTED_WING = ("band", "stop", "appendage", "tooth", "jet", "glare")
+UNLISTED_WING = ("stop", "appendage", "tooth")
 UNLISTED_VEHICLE = ("stop_knock", "tail_in_wake")
 FAULTS_WING = (
     "camera_shift",
@@ -121,7 +120,7 @@ PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "filt
 OPEN_WING = ("added_mass", "hinge_offset", "drive_harmonics", "stroke_amplitude", "leading_edge_vortex")
 OPEN_VEHICLE = ("induced_inflow", "stroke_amplitude")
 
-COUNTS: dict[str, int] = {"null": 152, "listed": 15, "unlisted": 20, "measurement": 64, "pairs": 42, "advice": 30}
+COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 40, "advice": 30}
 QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
 QUICK_KINDS = 3  # every third kind of the listed and the unlisted ones is in the sample
 
@@ -139,7 +138,7 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """Drafts of a group: ``n`` in all, or of each ``thinned``-th kind of the listed and the unlisted."""
     if group == "null":
-        builds = (EQUAL, FINER, VEHICLE, FINER, ELEVEN, EQUAL, FINER, BARE, ELEVEN_FINER, FINER)
+        builds = (FINER, VEHICLE, BARE, EQUAL, VEHICLE, BARE, ELEVEN_FINER, VEHICLE, BARE)
         large = (WHOLE, WHOLE_FINER)[: n // 50]
         yield from (_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large))))
     elif group == "listed":
@@ -150,7 +149,7 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
         yield from _each(group, UNLISTED_WING[::thinned], WINGS, n)
         yield from _each(group, UNLISTED_VEHICLE[::thinned], VEHICLES, n)
     elif group == "measurement":
-        wing, vehicle = FAULTS_WING + LOOKALIKES_WING, FAULTS_VEHICLE + LOOKALIKES_VEHICLE
+        wing, vehicle = FAULTS_WING + LOOKALIKES_WING, 2 * (FAULTS_VEHICLE + LOOKALIKES_VEHICLE)
         yield from _mixed(group, [(name,) for name in wing], [(name,) for name in vehicle], n)
     elif group == "pairs":
         yield from _mixed(group, PAIRS_WING, PAIRS_VEHICLE, n)

@@ -106,7 +106,7 @@ class Probe:
                 for load, unit, told in loads
                 for j, y in enumerate(self.stations)
                 for name in names
-            ),  # fmt: skip
+            ),
             source="sum of hats of the span times Fourier series of the drive phase: any load, as well as these can",
             signature="whatever one wishes",
             confused_with=(),

@@ -37,8 +37,19 @@ def bump(span: Array, phase: Array, place: float, when: float, width: float = 0.
     return np.asarray(np.exp(-0.5 * ((span[:, None] - place) / width) ** 2 - 0.5 * (during / lasting) ** 2))
 
 
-def pushed(wing: FlexibleWing, condition: Condition, place: float, when: float, size: float) -> Array:
-    """Genome of ``wing``, which has a fine probe, pushed with ``size`` (N/m), ``when`` (beats) after its crossing."""
+def chord_at(wing: FlexibleWing, span: npt.ArrayLike) -> Array:
+    """Chord (m) at parts of the ``span``."""
+    edges = wing.structure.planform.strips(wing.structure.division)
+    return wing.structure.planform.chord(edges[0] + np.asarray(span, float) * (edges[-1] - edges[0]))
+
+
+def pushed(
+    wing: FlexibleWing, condition: Condition, place: float, when: float, size: float, part: float = 0.5
+) -> Array:
+    """Genome of ``wing``, which has a fine probe, pushed with ``size`` (N/m), ``when`` (beats) after its crossing.
+
+    At ``part`` of the chord, if the probe turns.
+    """
     probe, blank, genome = wing.probe, blank_recording(wing.wing, condition), nominal(wing)
     assert probe is not None
     phase = np.arange(256) / 256
@@ -46,7 +57,9 @@ def pushed(wing: FlexibleWing, condition: Condition, place: float, when: float, 
     for _ in range(2):  # the push moves the crossing a little
         start = crossing(wing, blank, wing.beat(genome, blank).tracks)
         field = size * bump(np.array(probe.stations), phase, place, when + start)
-        genome[-probe.size :] = (field @ series.T).ravel()
+        forces = field @ series.T
+        lever = (0.5 - part) * chord_at(wing, probe.stations)[:, None]
+        genome[-probe.size :] = np.concatenate([forces, lever * forces]).ravel()[: probe.size]
     return genome
 
 

@@ -23,7 +23,7 @@ def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str 
 
 
 def stack(recordings: int = 6) -> Stack:
-    return cast("Stack", SimpleNamespace(noise=1.0, recordings=(None,) * recordings, uncertainty=0.0))
+    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=0.0))
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:

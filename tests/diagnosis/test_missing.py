@@ -12,7 +12,7 @@ import pytest
 from diagnosis.missing import PHASES, Case, infer, missing_force, missing_loads, place
 from sim.effects.probe import Probe
 from sim.probing import Probed
-from tests.diagnosis.loaded import CONDITIONS, MEMORY, NOISE, case, filmed, model, noise, nominal, pushed
+from tests.diagnosis.loaded import CONDITIONS, MEMORY, NOISE, case, chord_at, filmed, model, noise, nominal, pushed
 
 Array = npt.NDArray[np.float64]
 
@@ -39,10 +39,11 @@ def quiet(one: Case, rng: np.random.Generator, size: Array | None = None) -> Cas
 
 
 def test_a_push_is_found_with_all_genes_free() -> None:
-    inferred = infer([one for one, _ in cases()], PROBE)
+    inferred = infer([one for one, _ in cases()], PROBE, doubt=0.0)
     found = place(inferred)
     assert found is not None
     assert found.phase is not None
+    assert found.chord is None
     assert abs(found.phase.value - WHEN) < 10.0 / 360.0
     assert abs(found.span.value - PLACE) < 0.05
     assert found.span.low is not None
@@ -58,6 +59,36 @@ def test_a_push_is_found_with_all_genes_free() -> None:
         assert load.stations[station] in (0.5, 0.75)
         assert abs(load.phase[instant] - WHEN) < 10.0 / 360.0
         assert values[station, instant] > 5 * np.array(load.errors)[:, (instant + PHASES // 2) % PHASES].min()
+
+
+def test_doubt_about_the_model_widens_the_place() -> None:
+    sure, doubtful = (place(infer([one for one, _ in cases()], PROBE, doubt=doubt)) for doubt in (0.0, 0.002))
+    assert sure is not None
+    assert doubtful is not None
+    assert abs(doubtful.span.value - PLACE) < 0.05
+    ends = [one.span.high - one.span.low for one in (sure, doubtful) if one.span.high and one.span.low]
+    assert ends[1] > 2 * ends[0]
+
+
+@pytest.mark.parametrize("part", [0.2, 0.9])
+def test_where_along_the_chord_it_is_pushed(part: float) -> None:
+    plant = replace(model("6x1"), probe=Probe(tuple(np.linspace(0.0, 1.0, 21).tolist()), 4, turning=True))
+    probe = Probe(harmonics=4, turning=True)
+    found = []
+    for k, condition in enumerate(CONDITIONS[:2]):
+        genome = pushed(plant, condition, PLACE, WHEN, SIZE, part)
+        recording = filmed(plant, genome, condition, np.random.default_rng(k))
+        found.append(case(model("6x1"), recording, probe)[0])
+    told = place(infer(found, probe, chord_at(plant, probe.stations)))
+    assert told is not None
+    assert told.chord is not None
+    assert abs(told.chord.value - part) < 0.1
+    assert abs(told.span.value - PLACE) < 0.15
+
+
+def test_a_probe_that_turns_needs_the_chord() -> None:
+    with pytest.raises(ValueError, match="chord at each of its 5 stations"):
+        infer([cases()[0][0]], replace(PROBE, turning=True))
 
 
 def test_noise_alone_is_no_load() -> None:
@@ -78,7 +109,7 @@ def test_errors_are_what_estimates_are_off_by() -> None:
         sizes = [np.outer(shape, fall * rng.standard_normal(len(fall))).ravel() for _ in cases()]
         drawn = [quiet(one, rng, 2.0 * size) for (one, _), size in zip(cases(), sizes, strict=True)]
         phase = np.arange(12) / 12
-        values, errors = infer(drawn, PROBE).fields(span, phase)
+        values, errors = infer(drawn, PROBE, doubt=0.0).fields(span, phase)
         for r, size in enumerate(sizes):
             truth = np.kron(PROBE.hats(span), PROBE.terms(phase + drawn[r].crossing)) @ (2.0 * size)
             scores.append((values[r].ravel() - truth) / errors[r].ravel())

@@ -29,7 +29,7 @@ class Kind:
         source: where the law is from, and in which form.
         put: changes a draft for a strength and the parameters; called once the wing is cut unless ``before`` is set.
         genes: true values of the library's genes, of those that mean the same.
-        at_top: whether it acts where the place is at the top of its way.
+        acts_above: height (m) above which it acts on its place, of those that act at the top of its way.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Kind:
     shape: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     genes: Callable[[Wing, float, Values], dict[str, float]] | None = None
     before: bool = False
-    at_top: bool = False
+    acts_above: Callable[[Draft, Values], float] | None = None
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,8 @@ class Beat:
 
     Attributes:
         tracks: [n, M, 3] of all markers in the order of the wing's, at n equal steps of the drive phase from 0, m.
-        hidden: what is hidden in it; ``turns``: drive phases (rad) of those effects that act at the top of their way.
+        hidden: what is hidden in it; ``turns``: drive phases (rad) about which those act that do so at the top of their
+            way.
         error: estimated distance from the periodic motion, m.
         beats: beats that were marched through on the way.
         crossing: drive phase (rad) at which the reference markers rise through the height of the hinge: the start of
@@ -89,15 +90,25 @@ def simulate(
     tracks = p[:, carrier] + np.einsum("tmij,mj->tmi", R[:, carrier], arms)
     if len(tracks) < SAMPLES:
         tracks = np.asarray(resample(tracks, SAMPLES, axis=0))
-    turns = {e.name: _top(draft, e, R, p) for e in concealed.effects if e.kind.at_top}
+    turns = {
+        e.name: _middle(draft, e, above(draft, e.values), R, p)
+        for e in concealed.effects
+        if (above := e.kind.acts_above)
+    }
     return Beat(wing, tracks, concealed, turns, error, beats)
 
 
-def _top(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
-    """Drive phase (rad) at which an effect's place is highest."""
+def _middle(draft: Draft, effect: Effect, above: float, R: Array, p: Array) -> float:
+    """Drive phase (rad) about which an effect acts that acts ``above`` a height (m) on its place.
+
+    The middle of where it is deeper than half of the deepest in what it acts in; a wing leaves a stop more slowly than
+    it comes.
+    """
     body, arm, _ = draft.at(effect.values["span"], effect.values.get("chord", 0.5))
-    height = p[:, body, 2] + R[:, body, 2] @ arm
-    return float(2 * np.pi * np.argmax(height) / len(height))
+    depth = p[:, body, 2] + R[:, body, 2] @ arm - above
+    deep = np.where(depth > 0.5 * depth.max(), depth, 0.0)
+    turn = np.exp(2j * np.pi * np.arange(len(depth)) / len(depth))
+    return float(np.angle((deep * turn).sum()) % (2 * np.pi))
 
 
 def at_rest(rig: Rig) -> State:

@@ -78,7 +78,7 @@ UNLISTED = (
     Kind(
         "stop", "structure", False, "N/m^1.5", 60.0, 5e3,
         "contact after Hunt and Crossley (1975) with something above the wing", _stop,
-        shape={**_PLACE, "stroke": (0.85, 0.75, 0.9)}, at_top=True,
+        shape={**_PLACE, "stroke": (0.85, 0.75, 0.9)}, acts_above=_height,
     ),
     Kind(
         "brake", "structure", False, "N s^3/m^3", 0.005, 0.2,
@@ -92,7 +92,8 @@ UNLISTED = (
     Kind(
         "jet", "aerodynamics", False, "m/s", 6.0, 30.0,
         "a stream downwards through which one stretch of the wing passes at the top of its stroke", _jet,
-        shape={"span": (0.7, 0.4, 0.9), "stroke": (0.95, 0.9, 1.0), "half": (0.04, 0.03, 0.05)}, at_top=True,
+        shape={"span": (0.7, 0.4, 0.9), "stroke": (0.95, 0.9, 1.0), "half": (0.04, 0.03, 0.05)},
+        acts_above=lambda draft, at: _height(draft, at) - at["half"],
     ),
     Kind(
         "tooth", "actuation", False, "rad", 0.02, 0.1,
