@@ -64,21 +64,21 @@ def assess(
     yield 0.0, "fitting the nominal model"
     steps = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
     for k, fit in enumerate(steps):  # noqa: B007  # the last one counts
-        yield 0.15 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
-    yield 0.15, "comparing with a finer division"
+        yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
+    yield 0.25, "comparing with a finer division"
     nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
     state.nominal, state.subject = nominal, nominal.subject
     suspects = suspected(state.subject, spec)
     for fraction, stage in _suspected(state, spec, suspects, evaluator):
-        yield 0.25 + 0.55 * fraction, stage
-    yield 0.8, "fitting the nominal model again"
+        yield 0.4 + 0.45 * fraction, stage
+    yield 0.85, "fitting the nominal model again"
     better = _elsewhere(state, evaluator)
     if better is not None:
         state.nominal, state.trials, state.refits = replace(state.nominal, refit=better), [], []
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
-            yield 0.8 + 0.1 * fraction, stage
+            yield 0.85 + 0.07 * fraction, stage
     nominal = state.nominal
-    yield 0.9, "comparing with a finer division"
+    yield 0.92, "comparing with a finer division"
     if spec.refine:
         _refined(state, nominal, evaluator)
     floor = 0.0 if spec.refine else nominal.division or 0.0

@@ -18,7 +18,7 @@ from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
-from diagnosis.unexplained import Unexplained, missing_forces, probed_recordings, unexplained
+from diagnosis.unexplained import MOST, Unexplained, missing_forces, probed_recordings, unexplained
 from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
 from diagnosis.where import where
 from records import Recording
@@ -33,7 +33,7 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
         raise ValueError("a finding needs an assessment that has ended")
     decision = decided(state.weighed)
     best = state.nominal.refit if decision.verdict == "adequate" else decision.best
-    yield 0.92, "predicting the held-out recordings", None
+    yield 0.0, "predicting the held-out recordings", None
     seen = None
     if held_out:
         seen = predicted(Stack.of(held_out, state.stack.axes), evaluator, state.nominal.refit.fit, best.fit)
@@ -41,13 +41,13 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
     if decision.verdict == "unnamed" or _is_load(decision, best):
         for fraction, stage, told in _lacking(state, law=decision.verdict == "unnamed"):
             lacking = told
-            yield 0.93 + 0.03 * fraction, stage, None
+            yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
     if decision.verdict != "adequate":
         apart = []
         for part, one in separations(state.subject, state.stack, state.weighed, evaluator):
             apart += [one] if one else []
-            yield 0.96 + 0.03 * part, "comparing conditions to record next", None
+            yield 0.75 + 0.2 * part, "comparing conditions to record next", None
         advice = advised(state.stack, state.weighed, apart)
     found = _finding(
         state, name, decision, best, seen, lacking, advice, _where(state, decision, best, lacking, evaluator)
@@ -72,7 +72,7 @@ def _lacking(state: Assessment, *, law: bool) -> Iterator[tuple[float, str, Unex
         if one is None:
             continue
         found.append((r, one))
-        yield k / 8.0, f"probing the wing under {state.stack.recordings[r].name}", Unexplained()
+        yield (k + 1) / (MOST + 1.0), f"probing the wing under {state.stack.recordings[r].name}", Unexplained()
     yield 1.0, "locating the missing load", unexplained(state.stack, nominal, found, law=law)
 
 

@@ -17,6 +17,8 @@ from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 from records import Dataset, Recording
 
+ASSESSED = 0.7  # of the work: after that there is a verdict, and its place and its proof are looked for
+
 
 def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
     """ValueError, for the user, where ``spec`` does not fit ``dataset``; nothing is simulated."""
@@ -50,11 +52,11 @@ def diagnose_subject(
     state = Assessment(subject, Stack.of(fitted, axes))
     counted = Counted(evaluator, state)
     for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), counted):
-        yield Progress(fraction, stage, state.evaluations)
+        yield Progress(ASSESSED * fraction, stage, state.evaluations)
     finding: Finding | None = None
     for fraction, stage, found in concluded(state, name, held_out, counted):
         finding = found
-        yield Progress(fraction, stage, state.evaluations)
+        yield Progress(ASSESSED + (1.0 - ASSESSED) * fraction, stage, state.evaluations)
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     finding = replace(finding, seconds=time.monotonic() - began, evaluations=state.evaluations)

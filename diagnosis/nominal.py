@@ -121,7 +121,7 @@ def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> 
 
 def improves(finer: Refit, coarse: Refit) -> bool:
     """Whether a finer division takes away so much of the excess that it is worth its cost."""
-    return finer.excess < (1.0 - BETTER) * coarse.excess
+    return finer.excess < (1.0 - BETTER) * coarse.excess and coarse.excess > 0.0
 
 
 def _percent(part: float, whole: float) -> str:

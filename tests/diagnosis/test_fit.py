@@ -1,0 +1,169 @@
+"""What a fit minimises, how much it trusts it, where it ends, and what it foretells of recordings left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from calibration.linearised import free_genes, unit_at
+from calibration.problem import Problem, base_genome
+from diagnosis.assess import Assessment, _elsewhere
+from diagnosis.fit import Fit, _Look, _measured, thoroughly
+from diagnosis.intervals import covariance
+from diagnosis.nominal import Nominal
+from diagnosis.refit import judged, left_out
+from diagnosis.screen import Nuisance
+from diagnosis.stack import PIECES, TOLERANCE, Stack
+from tests.diagnosis.pendulum_rig import PendulumRig, recorded
+from workers.in_process import InProcessEvaluator
+
+Array = npt.NDArray[np.float64]
+
+TRUTH = {"stiffness": 0.25, "damping": 3e-3, "inertia": 1.2e-3}
+RIG, EVALUATOR = PendulumRig(), InProcessEvaluator()
+
+
+def stacked(noise: float = 5e-4, seed: int = 1, **hidden: float) -> Stack:
+    return Stack.of(
+        recorded({**TRUTH, **{k.replace("_", ".", 1): v for k, v in hidden.items()}}, noise=noise, seed=seed)
+    )
+
+
+def problem(stack: Stack, values: Mapping[str, float] | None = None) -> Problem:
+    return Problem(RIG.model, stack.recordings, RIG.model.searched, base_genome(RIG.model, values or {}), stack.axes)
+
+
+def start(asked: Problem) -> Array:
+    genes = free_genes(asked)
+    return unit_at(genes, np.array([asked.base[gene.name] for gene in genes]))
+
+
+def fit(stack: Stack, values: Mapping[str, float] | None = None) -> Fit:
+    asked = problem(stack, values)
+    *_, found = thoroughly(RIG, stack, asked, EVALUATOR, start(asked), 20)
+    return found
+
+
+@cache
+def one() -> Stack:
+    return stacked()
+
+
+def test_noise_counts_as_noise_and_a_misfit_beyond_it_by_its_logarithm() -> None:
+    stack = one()
+    D, nu = len(stack.scale), stack.pieces
+    assert nu == PIECES * len(stack.recordings)
+    direction = stack.scale / np.sqrt(D)  # of chi-squared one
+    for chi in (0.5 * D, D, D + 0.1 * nu, D + nu, 50.0 * D):
+        beyond = max(chi - D, 0.0)
+        coefficients = np.sqrt(chi) * direction
+        assert float(stack.surprise(coefficients)) == pytest.approx(min(chi, D) + nu * np.log1p(beyond / nu))
+        assert stack.trust(coefficients) == pytest.approx(1.0 / (1.0 + beyond / nu))
+
+
+def test_trust_is_the_slope_of_the_surprise() -> None:
+    stack = one()
+    direction = stack.scale / np.sqrt(len(stack.scale))
+    for chi in (3.0 * len(stack.scale), 40.0 * len(stack.scale)):
+        ends = [float(stack.surprise(np.sqrt(chi + step) * direction)) for step in (-1.0, 1.0)]
+        assert (ends[1] - ends[0]) / 2.0 == pytest.approx(stack.trust(np.sqrt(chi) * direction), rel=1e-6)
+
+
+@pytest.mark.parametrize("corner", [0.02, 0.98])
+def test_a_fit_finds_the_truth_from_the_corners_of_the_box(corner: float) -> None:
+    stack = one()
+    genes = [gene for gene in RIG.model.genes if gene.name in RIG.model.searched]
+    found = fit(stack, {gene.name: float(gene.from_unit(corner)) for gene in genes})
+    assert found.converged
+    assert stack.chi_squared(found.coefficients) < 1.2 * len(stack.scale)
+    errors = np.sqrt(np.diag(covariance(stack, found)))
+    off = found.unit - unit_at(genes, np.array([TRUTH[gene.name] for gene in genes]))
+    assert np.all(np.abs(off) < 4 * errors)
+
+
+def test_a_model_that_lacks_something_keeps_its_genes_within_the_box() -> None:
+    """A spring that hardens, recorded almost without noise: chi-squared is in the thousands for each coefficient."""
+    stack = stacked(noise=1e-5, cubic_k3=0.6)
+    found = fit(stack)
+    assert stack.chi_squared(found.coefficients) > 1000 * len(stack.scale)
+    assert found.unit.min() > 0.01
+    assert found.unit.max() < 0.99
+
+
+def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the_tolerance_allows() -> None:
+    stack = one()
+    found = fit(stack)
+    floor = TOLERANCE**2 * len(stack.scale) / stack.pieces
+    assert stack.most_trust == pytest.approx(1.0 / (1.0 + floor))
+    slopes = found.jacobian / stack.scale[:, None]
+    gram = slopes.T @ slopes
+    prior = 4.0 * np.eye(len(gram))
+    np.testing.assert_allclose(covariance(stack, found), np.linalg.inv(stack.most_trust * gram + prior), rtol=1e-6)
+    worse = replace(found, coefficients=10.0 * stack.scale)
+    trust = stack.trust(worse.coefficients)
+    np.testing.assert_allclose(covariance(stack, worse), np.linalg.inv(trust * gram + prior), rtol=1e-6)
+
+
+def test_slopes_to_one_side_and_to_both_and_at_the_end_of_the_box() -> None:
+    stack = one()
+    asked = problem(stack)
+    look, every = _Look(RIG, stack, asked, EVALUATOR), np.ones(len(asked.free), bool)
+    middle = fit(stack)
+    one_sided, central = (_measured(look, middle, every, sides).jacobian for sides in (1, 2))
+    assert np.linalg.norm(one_sided - central) < 0.05 * np.linalg.norm(central)
+    unit = middle.unit.copy()
+    unit[0] = 1.0
+    at_end = replace(middle, unit=unit, coefficients=look.at(unit[None], unit)[0][0])
+    one_sided, central = (_measured(look, at_end, every, sides).jacobian for sides in (1, 2))
+    assert np.isfinite(one_sided).all()
+    assert np.linalg.norm(one_sided[:, 0] - central[:, 0]) < 0.05 * np.linalg.norm(central[:, 0])
+
+
+def test_what_the_nominal_genes_can_do_is_taken_out_and_no_more_than_their_prior_lets_them() -> None:
+    stack = one()
+    found = fit(stack)
+    nuisance, F = Nuisance(stack, found), len(found.unit)
+    moved = found.jacobian @ np.ones(F)
+    whole = float(np.sum((moved / stack.scale) ** 2))
+    assert float(np.sum(nuisance.rest(moved) ** 2)) <= 1.01 * 4.0 * F  # what the move costs by the prior
+    assert whole > 100 * 4.0 * F
+    doubted = Nuisance(stack, replace(found, coefficients=30.0 * stack.scale))
+    assert np.sum(doubted.rest(moved) ** 2) > 2 * np.sum(nuisance.rest(moved) ** 2)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_alone_predicts_recordings_left_out_to_the_noise(seed: int) -> None:
+    stack = stacked(seed=seed)
+    found = fit(stack)
+    told = left_out(stack, found)
+    assert told is not None
+    assert told - stack.excess(found.coefficients) < 0.02 * stack.noise**2
+
+
+def test_what_is_lacking_predicts_worse_than_it_fits() -> None:
+    stack = stacked(cubic_k3=0.6)
+    found = fit(stack)
+    told = left_out(stack, found)
+    assert told is not None
+    assert told > 1.02 * stack.excess(found.coefficients)
+
+
+def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
+    """The explanation's own genes do nothing: it ended in the better minimum, and is not the cause."""
+    stack = one()
+    good = fit(stack)
+    bad = replace(good, unit=np.full(len(good.unit), 0.9))
+    look = _Look(RIG, stack, good.problem, EVALUATOR)
+    bad = replace(bad, coefficients=look.at(bad.unit[None], bad.unit)[0][0])
+    caught = Nominal(RIG, judged(stack, bad), None, "", ())
+    state = Assessment(RIG, stack, caught, refits=[judged(stack, good)])
+    found = _elsewhere(state, EVALUATOR)
+    assert found is not None
+    assert found.excess < 0.1 * caught.refit.excess
+    state = Assessment(RIG, stack, Nominal(RIG, judged(stack, good), None, "", ()), refits=[judged(stack, good)])
+    assert _elsewhere(state, EVALUATOR) is None
