@@ -108,7 +108,8 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     if better is None or first is None:
         state.nominal = replace(nominal, innocent=innocent)
         return
-    near = [one for one in state.refits if one.excess <= RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)]
+    most = RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)
+    near = [one for one in state.refits if one.excess <= most or set(one.names) < set(best.names)]
     others = [better if one is best else again(finer, stack, evaluator, one) for one in near]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
     remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known

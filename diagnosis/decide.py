@@ -32,10 +32,12 @@ FORM = 0.15  # of the misfit of the nominal model: what a law right but for its 
 GENE = 2.0  # price of a gene in units of the logarithm of the evidence
 UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
 UNKNOWN_GENES = 6.0
+REFUTED = 4.0  # standard errors of it, which refute the nominal model by themselves
 SLACK = 2.0  # standard errors of a mean square beyond the noise, which noise alone may make
 PREDICTED = 0.25  # of the weight, for recordings left out
 DOUBT = 2.0  # in the logarithm of the evidence: below, an explanation is not looked for
-SURE = 0.75  # probability from which a single explanation is named
+SURE = 0.85  # probability from which a single explanation is named
+KNOWN = 0.75  # of the probability of all that is lacking: effects of the library with less leave it unnamed
 ALIKE = 0.05  # probability from which another explanation is said to be possible
 
 
@@ -66,8 +68,19 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float,
     unknown = -0.5 * stack.pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)
+    if refuted(stack, nominal.excess, floor):
+        weight[0] = 0.0
     total = weight.sum() + other
     return Weighed(every, log - log[0], weight / total, float(other / total), left)
+
+
+def refuted(stack: Stack, excess: float, floor: float) -> bool:
+    """Whether the nominal model leaves so much that neither noise nor a division (m or N) can be what makes it.
+
+    However few the pieces of it are: it is not known what is lacking then, but that something is.
+    """
+    made = (ADEQUATE * stack.noise) ** 2 + floor**2
+    return excess - made > REFUTED * stack.uncertainty
 
 
 def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: int) -> Array:

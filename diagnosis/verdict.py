@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.decide import ALIKE, SURE, Weighed
+from diagnosis.decide import ALIKE, KNOWN, SURE, Weighed
 from diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from diagnosis.intervals import gene_values
 from diagnosis.refit import Refit
@@ -47,12 +47,12 @@ def decided(weighed: Weighed) -> Decision:
             probability["ambiguous"] = total - float(effects[top])
         else:
             probability["ambiguous"] = total
-    if total > max(nominal, weighed.unknown):
+    if total > nominal and total >= KNOWN * (total + weighed.unknown):
         sure = effects[top] >= SURE * total
         verdict: Verdict = one if sure else "ambiguous"
         best = refits[top]
     else:
-        verdict = "adequate" if nominal >= weighed.unknown else "unnamed"
+        verdict = "adequate" if nominal >= weighed.unknown + total else "unnamed"
         if verdict == "unnamed" and len(effects):
             best = refits[top]
     alike = tuple(refit.names for refit in possible) if len(possible) > 1 else ()

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from diagnosis.decide import weighed
+from diagnosis.decide import KNOWN, weighed
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.verdict import decided
@@ -22,8 +22,8 @@ def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str 
     return Refit(cast("Any", trials), cast("Any", None), left**2, left**2)
 
 
-def stack(recordings: int = 6) -> Stack:
-    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=0.0))
+def stack(recordings: int = 6, uncertainty: float = 0.0) -> Stack:
+    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=uncertainty))
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
@@ -58,6 +58,26 @@ def test_a_second_effect_must_earn_its_place() -> None:
     found = verdict(3.0, refit(1.4, ("a",)), refit(0.2, ("a", "b"), 1))
     assert found[0] == "named"
     assert set(found[1]) == {"a", "b"}
+
+
+@pytest.mark.parametrize(("uncertainty", "expected"), [(0.4, "named"), (1.2, "adequate")])
+def test_few_recordings_do_not_make_a_misfit_none_that_is_far_beyond_what_noise_makes(
+    uncertainty: float, expected: str
+) -> None:
+    """Two recordings are too few pieces for a law of four genes to beat nothing; but nothing it is not."""
+    found = decided(weighed(stack(2, uncertainty), refit(2.1), [refit(0.1, ("a",), 4)], 0.0, 40))
+    assert found.verdict == expected
+
+
+def test_an_effect_that_something_unknown_rivals_is_not_named() -> None:
+    shares = []
+    for left in np.linspace(0.5, 0.9, 41):
+        every = weighed(stack(), refit(2.0), [refit(left, ("a",))], 0.0, 40)
+        share = every.probabilities[1] / (every.probabilities[1] + every.unknown)
+        assert decided(every).verdict == ("named" if share >= KNOWN else "unnamed")
+        shares.append(share)
+    assert min(shares) < 0.5 < KNOWN < max(shares)
+    assert any(0.5 < share < KNOWN for share in shares)
 
 
 def test_more_genes_must_earn_theirs() -> None:
