@@ -119,7 +119,7 @@ PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "filt
 # Hidden in few conditions that are alike, so that another explanation may be as good: delays look like lags, tilted
 # hinges like turned cameras.
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
-OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt")
+OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
 COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 40, "advice": 30}
 QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
