@@ -110,11 +110,19 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
         return
     most = RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= most or set(one.names) < set(best.names)]
-    others = [better if one is best else again(finer, stack, evaluator, one) for one in near]
+    others = [better if one is best else _followed(finer, stack, evaluator, one, best) for one in near]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
     remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
     state.nominal = Nominal(finer, first, None, "", remarks)
     state.subject, state.refits = finer, [one for one in others if one is not None]
+
+
+def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
+    """``refit`` at a finer division, to its end where it is part of the ``best``: it must not lose for want of steps."""
+    found = again(finer, stack, evaluator, refit)
+    if found is None or found.fit.converged or not set(refit.names) < set(best.names):
+        return found
+    return continued(finer, stack, evaluator, found)
 
 
 def _suspected(
