@@ -118,7 +118,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
 
 
 def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
-    """``refit`` at a finer division, to its end where it is part of the ``best``: it must not lose for want of steps."""
+    """``refit`` at a finer division; to its end where it is part of the ``best``, lest it lose for want of steps."""
     found = again(finer, stack, evaluator, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
