@@ -12,7 +12,17 @@ from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
-from diagnosis.refit import Refit, again, continued, pairs, partners, refitted, resumed, worth_a_refit
+from diagnosis.refit import (
+    Refit,
+    again,
+    continued,
+    elsewhere,
+    pairs,
+    partners,
+    refitted,
+    resumed,
+    worth_a_refit,
+)
 from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
 from diagnosis.stack import Stack
@@ -159,6 +169,19 @@ def _known(state: Assessment) -> Nominal:
 def _refits(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
+    """Suspects one by one, then together as long as none explains enough."""
+    yield from _alone(state, nominal, spec, evaluator)
+    yield 0.8, "continuing the best refits"
+    if _solved(state, nominal, evaluator):
+        return
+    yield from _together(state, nominal, evaluator)
+    yield 0.97, "continuing the best refits"
+    _solved(state, nominal, evaluator)
+
+
+def _alone(
+    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
+) -> Iterator[tuple[float, str]]:
     stack, fit = state.stack, nominal.refit.fit
     chosen = worth_a_refit(state.trials, spec.refits)
     for k, trial in enumerate(chosen):
@@ -166,9 +189,14 @@ def _refits(
             continue
         yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
-    yield 0.8, "continuing the best refits"
-    if _solved(state, nominal, evaluator):
-        return
+    if not _enough(state, nominal):
+        for trial in elsewhere(state.trials, chosen):
+            yield 0.78, f"refit with {trial.suspect.name} at another place"
+            _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
+
+
+def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+    stack, fit = state.stack, nominal.refit.fit
     tried: set[frozenset[str]] = set()
     best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
     for k, one in enumerate(best):
@@ -185,18 +213,25 @@ def _refits(
             tried.add(names)
             yield 0.94, f"refit with {' and '.join(sorted(names))}"
             _add(state, refitted(state.subject, stack, fit, evaluator, two))
-    yield 0.97, "continuing the best refits"
-    _solved(state, nominal, evaluator)
 
 
 def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:
     """Whether an explanation leaves so little that none needs a partner; the best are continued until one does."""
-    enough = tolerated(state.stack, PART * nominal.refit.excess, 0.0)
+    enough = _tolerable(state, nominal)
     for k in np.argsort([one.excess for one in state.refits])[:CONTINUED]:
         one = state.refits[k]
         if not one.fit.converged and enough < one.excess < HOPEFUL * nominal.refit.excess:
             state.refits[k] = continued(state.subject, state.stack, evaluator, one)
-    return not state.refits or min(one.excess for one in state.refits) <= enough
+    return _enough(state, nominal)
+
+
+def _enough(state: Assessment, nominal: Nominal) -> bool:
+    """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
+    return not state.refits or min(one.excess for one in state.refits) <= _tolerable(state, nominal)
+
+
+def _tolerable(state: Assessment, nominal: Nominal) -> float:
+    return tolerated(state.stack, PART * nominal.refit.excess, 0.0)
 
 
 def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:
@@ -208,8 +243,14 @@ def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> 
 
 
 def _add(state: Assessment, refit: Refit | None) -> None:
-    if refit is not None:
-        state.refits.append(refit)
+    """Keep ``refit``, or the better of two with the same suspects."""
+    if refit is None:
+        return
+    for k, known in enumerate(state.refits):
+        if set(known.names) == set(refit.names):
+            state.refits[k] = min(known, refit, key=lambda one: one.fit.cost)
+            return
+    state.refits.append(refit)
 
 
 def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from diagnosis import maps
 from diagnosis.advise import advised, separations
 from diagnosis.assess import Assessment
 from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
+from diagnosis.fit import measured
 from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
 from diagnosis.refit import Refit
@@ -33,7 +35,9 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
         raise ValueError("a finding needs an assessment that has ended")
     decision = decided(state.weighed)
     best = state.nominal.refit if decision.verdict == "adequate" else decision.best
-    yield 0.0, "predicting the held-out recordings", None
+    yield 0.0, "measuring how well genes are told", None
+    best = replace(best, fit=measured(state.subject, state.stack, evaluator, best.fit))
+    yield 0.05, "predicting the held-out recordings", None
     seen = None
     if held_out:
         seen = predicted(Stack.of(held_out, state.stack.axes), evaluator, state.nominal.refit.fit, best.fit)

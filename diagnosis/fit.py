@@ -130,6 +130,13 @@ def thoroughly(
     yield now if sides == 2 else _measured(look, now, every)
 
 
+def measured(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> Fit:
+    """``fit`` with all slopes measured where it ended: those that steps have learnt lead on, and make no intervals."""
+    if fit.fresh:
+        return fit
+    return _measured(_Look(subject, stack, fit.problem, evaluator), fit, np.ones(len(fit.unit), bool))
+
+
 def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
     """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
     whole = stack.trust(before.coefficients) * stack.chi_squared(before.coefficients)

@@ -21,6 +21,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
+LOCAL, SPOTS = 2, 3  # suspects that act at a place, and places of each, that are tried where nothing explains enough
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
@@ -183,6 +184,14 @@ def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
     """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
     return [trial for trial in best[:most] if trial.gain >= WORTH * best[0].gain and trial.gain > 0.0]
+
+
+def elsewhere(found: Sequence[list[Trial]], tried: Sequence[Trial]) -> Iterator[Trial]:
+    """The next best places of the strongest suspects of those ``tried`` that act at one: a place may be a wrong one."""
+    every = {trials[0].suspect.name: trials for trials in found if trials}
+    local = [trial for trial in tried if trial.suspect.places]
+    for trial in local[:LOCAL]:
+        yield from every[trial.suspect.name][1:SPOTS]
 
 
 def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:

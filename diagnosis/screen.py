@@ -23,7 +23,8 @@ from diagnosis.subject import Subject, Suspect
 
 Array = npt.NDArray[np.float64]
 
-SHAPES = 7  # places, and other shapes, that a suspect is tried at beside the typical ones: a group of lanes
+PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
+SHAPES = 7  # of one with other shape genes
 SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
 
 
@@ -173,7 +174,7 @@ def _blocks(suspect: Suspect) -> Iterator[Array]:
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]
-    count = SHAPES if shape else 0
+    count = (PLACES if suspect.places else SHAPES) if shape else 0
     spots = [typical[shape], *qmc.Halton(max(len(shape), 1), scramble=False).random(count + 1)[1:, : len(shape)]]
     for spot in spots if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from benchmarks.concealed.plant.build import Draft
 from records import Wing
 
+Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics"]
 Values = Mapping[str, float]
 
@@ -29,7 +31,8 @@ class Kind:
         source: where the law is from, and in which form.
         put: changes a draft for a strength and the parameters; called once the wing is cut unless ``before`` is set.
         genes: true values of the library's genes, of those that mean the same.
-        acts_above: height (m) above which it acts on its place, of those that act at the top of its way.
+        acting: how large it is [n] while its place is at heights [n] (m) and rises at rates [n] (m/s); only of effects
+            of which nothing but the motion tells when they act.
     """
 
     name: str
@@ -43,7 +46,7 @@ class Kind:
     shape: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     genes: Callable[[Wing, float, Values], dict[str, float]] | None = None
     before: bool = False
-    acts_above: Callable[[Draft, Values], float] | None = None
+    acting: Callable[[Draft, Values, Array, Array], Array] | None = None
 
 
 @dataclass(frozen=True)

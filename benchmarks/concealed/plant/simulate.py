@@ -90,25 +90,20 @@ def simulate(
     tracks = p[:, carrier] + np.einsum("tmij,mj->tmi", R[:, carrier], arms)
     if len(tracks) < SAMPLES:
         tracks = np.asarray(resample(tracks, SAMPLES, axis=0))
-    turns = {
-        e.name: _middle(draft, e, above(draft, e.values), R, p)
-        for e in concealed.effects
-        if (above := e.kind.acts_above)
-    }
+    turns = {e.name: _middle(draft, e, R, p) for e in concealed.effects if e.kind.acting}
     return Beat(wing, tracks, concealed, turns, error, beats)
 
 
-def _middle(draft: Draft, effect: Effect, above: float, R: Array, p: Array) -> float:
-    """Drive phase (rad) about which an effect acts that acts ``above`` a height (m) on its place.
-
-    The middle of where it is deeper than half of the deepest in what it acts in; a wing leaves a stop more slowly than
-    it comes.
-    """
+def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
+    """Drive phase (rad) about which an effect acts: the middle of what is larger than half of its most."""
+    if effect.kind.acting is None:
+        raise ValueError(f"of {effect.name} the motion does not tell when it acts")
     body, arm, _ = draft.at(effect.values["span"], effect.values.get("chord", 0.5))
-    depth = p[:, body, 2] + R[:, body, 2] @ arm - above
-    deep = np.where(depth > 0.5 * depth.max(), depth, 0.0)
-    turn = np.exp(2j * np.pi * np.arange(len(depth)) / len(depth))
-    return float(np.angle((deep * turn).sum()) % (2 * np.pi))
+    height = p[:, body, 2] + R[:, body, 2] @ arm
+    rate = np.gradient(np.concatenate([height[-1:], height, height[:1]]))[1:-1] * len(height)
+    size = effect.kind.acting(draft, effect.values, height, rate * draft.condition.flap_frequency)
+    turn = np.exp(2j * np.pi * np.arange(len(size)) / len(size))
+    return float(np.angle((np.where(size > 0.5 * size.max(), size, 0.0) * turn).sum()) % (2 * np.pi))
 
 
 def at_rest(rig: Rig) -> State:

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from benchmarks.concealed.plant.build import Draft
 from benchmarks.concealed.plant.hidden import Kind, Values
 from benchmarks.concealed.plant.linkage import angles
 from benchmarks.concealed.plant.rig import APPENDAGE, BAND, BRAKE, POINTS, STOP
 
+Array = npt.NDArray[np.float64]
+
 _SEA_LEVEL = 101_325.0  # Pa
 _TOOTH = 60.0  # sharpness of a tooth: it lasts for about a fiftieth of a turn
+_LOSS = 0.5  # s/m, of a stop: by how much harder it pushes where the wing comes than where it is at rest
 _DROP = 0.12  # m from the wing at rest down to where a band is tied
 
 
@@ -36,7 +40,12 @@ def _band(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _stop(draft: Draft, strength: float, at: Values) -> None:
-    _point(draft, STOP, at, _height(draft, at), 1.0, strength, 0.5)
+    _point(draft, STOP, at, _height(draft, at), 1.0, strength, _LOSS)
+
+
+def _pressing(draft: Draft, at: Values, height: Array, rate: Array) -> Array:
+    depth = np.maximum(height - _height(draft, at), 0.0)
+    return np.asarray(depth**1.5 * np.maximum(1.0 + _LOSS * rate, 0.0))
 
 
 def _brake(draft: Draft, strength: float, at: Values) -> None:
@@ -50,6 +59,10 @@ def _appendage(draft: Draft, strength: float, at: Values) -> None:
 def _jet(draft: Draft, strength: float, at: Values) -> None:
     strip = int(draft.cut.strip[draft.at(at["span"], 0.5)[0]])
     draft.jets.append([float(strip), 0.0, 0.0, -strength, _height(draft, at), at["half"]])
+
+
+def _blowing(draft: Draft, at: Values, height: Array, _: Array) -> Array:
+    return np.asarray(np.exp(-(((height - _height(draft, at)) / at["half"]) ** 2)))
 
 
 def _tooth(draft: Draft, strength: float, at: Values) -> None:
@@ -78,7 +91,7 @@ UNLISTED = (
     Kind(
         "stop", "structure", False, "N/m^1.5", 60.0, 5e3,
         "contact after Hunt and Crossley (1975) with something above the wing", _stop,
-        shape={**_PLACE, "stroke": (0.85, 0.75, 0.9)}, acts_above=_height,
+        shape={**_PLACE, "stroke": (0.85, 0.75, 0.9)}, acting=_pressing,
     ),
     Kind(
         "brake", "structure", False, "N s^3/m^3", 0.005, 0.2,
@@ -93,7 +106,7 @@ UNLISTED = (
         "jet", "aerodynamics", False, "m/s", 6.0, 30.0,
         "a stream downwards through which one stretch of the wing passes at the top of its stroke", _jet,
         shape={"span": (0.7, 0.4, 0.9), "stroke": (0.95, 0.9, 1.0), "half": (0.04, 0.03, 0.05)},
-        acts_above=lambda draft, at: _height(draft, at) - at["half"],
+        acting=_blowing,
     ),
     Kind(
         "tooth", "actuation", False, "rad", 0.02, 0.1,
