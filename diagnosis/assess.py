@@ -14,9 +14,9 @@ from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
 from diagnosis.refit import (
     Refit,
+    afresh,
     again,
     continued,
-    elsewhere,
     pairs,
     partners,
     refitted,
@@ -31,7 +31,7 @@ from diagnosis.subject import Subject, Suspect
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
 PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
-CONTINUED = 2  # refits that have not converged, of the best
+CONTINUED = 2  # of the best refits: begun again elsewhere, and continued if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RIVALS = 3  # explanations to which a partner is sought
@@ -103,28 +103,39 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     """
     stack = state.stack
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
-    if best is nominal.refit or nominal.division is None or not matters(stack, nominal.division, best):
+    if best is nominal.refit:
         return
-    innocent, better, first = False, None, None
+    innocent, leading = nominal.innocent, sorted(state.refits, key=lambda one: one.excess)[:CONTINUED]
     for finer in nominal.subject.finer():
-        changes, takes = leaves(finer, stack, evaluator, best)
-        if not changes:
-            continue
-        better = again(finer, stack, evaluator, best) if takes > PROMISING else best
-        if better is not None and improves(better, best):
-            first = again(finer, stack, evaluator, nominal.refit)
+        tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
+        innocent = innocent or any(found is not None for _, found in tried)
+        known = [found for one, found in tried if found is not None and found is not one]
+        better = min(known, key=lambda one: one.excess, default=best)
+        if improves(better, best):
             break
-        innocent |= better is not None
-    if better is None or first is None:
+    else:
         state.nominal = replace(nominal, innocent=innocent)
         return
-    most = RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)
-    near = [one for one in state.refits if one.excess <= most or set(one.names) < set(best.names)]
-    others = [better if one is best else _followed(finer, stack, evaluator, one, best) for one in near]
+    first = again(finer, stack, evaluator, nominal.refit)
+    if first is None:
+        return
+    most = RIVALRY * better.excess + tolerated(stack, 0.0, 0.0)
+    near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
+    others = [one for one in near if one.names not in {found.names for found in known}]
+    followed = [_followed(finer, stack, evaluator, one, better) for one in others]
     remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
     remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
     state.nominal = Nominal(finer, first, None, "", remarks)
-    state.subject, state.refits = finer, [one for one in others if one is not None]
+    state.subject, state.refits = finer, [one for one in (*known, *followed) if one is not None]
+
+
+def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:
+    """``refit`` at a finer division, fitted where that promises to do better; None where it cannot be simulated."""
+    changes, takes = leaves(finer, stack, evaluator, refit)
+    if not changes:
+        return None
+    promising = takes > PROMISING and matters(stack, changes, refit)
+    return again(finer, stack, evaluator, refit) if promising else refit
 
 
 def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
@@ -190,9 +201,9 @@ def _alone(
         yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
     if not _enough(state, nominal):
-        for trial in elsewhere(state.trials, chosen):
-            yield 0.78, f"refit with {trial.suspect.name} at another place"
-            _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
+        for one in sorted(state.refits, key=lambda one: one.excess)[:CONTINUED]:
+            yield 0.76, f"refit with {one.names[0]} from the estimates"
+            _add(state, afresh(state.subject, stack, evaluator, fit, one.trials[0]))
 
 
 def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
-from calibration.linearised import free_genes, values_at
+from calibration.linearised import free_genes, unit_at, values_at
 from calibration.problem import Problem, base_genome
 from diagnosis.fit import PRIOR, Fit, fitted, thoroughly
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns
@@ -20,8 +20,8 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
+AFRESH = 10  # of one from the estimates
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
-LOCAL, SPOTS = 2, 3  # suspects that act at a place, and places of each, that are tried where nothing explains enough
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
@@ -180,18 +180,33 @@ def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
         return None
 
 
+def afresh(subject: Subject, stack: Stack, evaluator: Evaluator, nominal: Fit, trial: Trial) -> Refit | None:
+    """The nominal model with a suspect of typical size, fitted from the estimates; None where that cannot be simulated.
+
+    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back.
+    """
+    suspect, base = trial.suspect, nominal.problem.base
+    model = subject.extended([suspect.name])
+    free = (*nominal.problem.free, *(gene.name for gene in suspect.genes))
+    problem = Problem(model, stack.recordings, free, base_genome(model, base.as_dict()), stack.axes)
+    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    size = size_columns(suspect)
+    own = trial.unit[0].copy()
+    own[size] = typical[size]
+    genes = free_genes(nominal.problem)
+    start = np.concatenate([unit_at(genes, np.array([base[gene.name] for gene in genes])), own])
+    try:
+        for fit in thoroughly(subject, stack, problem, evaluator, start, AFRESH):  # noqa: B007  # the last one counts
+            pass
+    except ValueError:
+        return None
+    return judged(stack, fit, [trial])
+
+
 def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
     """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
     return [trial for trial in best[:most] if trial.gain >= WORTH * best[0].gain and trial.gain > 0.0]
-
-
-def elsewhere(found: Sequence[list[Trial]], tried: Sequence[Trial]) -> Iterator[Trial]:
-    """The next best places of the strongest suspects of those ``tried`` that act at one: a place may be a wrong one."""
-    every = {trials[0].suspect.name: trials for trials in found if trials}
-    local = [trial for trial in tried if trial.suspect.places]
-    for trial in local[:LOCAL]:
-        yield from every[trial.suspect.name][1:SPOTS]
 
 
 def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
