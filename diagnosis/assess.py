@@ -31,7 +31,7 @@ from diagnosis.subject import Subject, Suspect
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
 PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
-CONTINUED = 2  # of the best refits: begun again elsewhere, and continued if they have not converged
+CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RIVALS = 3  # explanations to which a partner is sought
@@ -201,7 +201,8 @@ def _alone(
         yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
     if not _enough(state, nominal):
-        for one in sorted(state.refits, key=lambda one: one.excess)[:CONTINUED]:
+        local = [one for one in state.refits if one.trials[0].suspect.places]
+        for one in sorted(local, key=lambda one: one.excess)[:1]:  # a place has minima that lead nowhere
             yield 0.76, f"refit with {one.names[0]} from the estimates"
             _add(state, afresh(state.subject, stack, evaluator, fit, one.trials[0]))
 

@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
-AFRESH = 10  # of one from the estimates
+AFRESH = 20  # of one from the estimates
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
