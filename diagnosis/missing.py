@@ -314,11 +314,11 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
         during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
     span, reach = _along(np.concatenate(along))
-    placed = next((kind for kind in inferred.kinds if kind.centre is not None), None)
+    likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
-    if placed is not None and inferred.placed > 0.5:  # the likeliest place: their mean lies between root and tip
-        span = _told(placed.centre, span)
-        chord = _told(placed.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
+    if likeliest is not None and inferred.placed > 0.5:  # the mean of all places lies between root and tip
+        span = _told(likeliest.centre, span)
+        chord = _told(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
     return LoadPlace(span, reach, *_during(phase, np.concatenate(during)), chord)
 
 
