@@ -7,6 +7,8 @@ markers, and the crossing is found in that series; recording and simulation go t
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 import numpy.typing as npt
 
@@ -17,6 +19,8 @@ Complex = npt.NDArray[np.complex128]
 
 REFERENCE_HARMONICS = 4
 _NEWTON_STEPS = 30
+_CROSSINGS = WeakKeyDictionary[Recording, dict[tuple[tuple[str, ...], float], float]]()
+"""Of recordings, by what of a wing they depend on: every evaluation asks."""
 
 
 def reference_columns(wing: Wing, recording: Recording) -> list[int]:
@@ -44,8 +48,13 @@ def recorded_crossing(wing: Wing, recording: Recording) -> float:
 
     A recording without any data, made to see what it would show, begins there.
     """
-    if not recording.valid.any():
-        return 0.0
+    known, key = _CROSSINGS.setdefault(recording, {}), (wing.reference_markers, wing.hinge.z)
+    if key not in known:
+        known[key] = _crossing(wing, recording) if recording.valid.any() else 0.0
+    return known[key]
+
+
+def _crossing(wing: Wing, recording: Recording) -> float:
     psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
     k = np.arange(1, REFERENCE_HARMONICS + 1)
     basis = np.hstack([np.ones((len(psi), 1)), np.cos(psi[:, None] * k), -np.sin(psi[:, None] * k)])

@@ -181,7 +181,7 @@ class FlexibleWing:
 
     @cached_property
     def _bare(self) -> FlexibleWing:
-        return replace(self, effects=(), probe=None)
+        return self._cut_alike(replace(self, effects=(), probe=None))
 
     @cached_property
     def _bare_key(self) -> bytes:

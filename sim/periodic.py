@@ -12,20 +12,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from sim.kernels.arrays import State
+from sim.kernels.chart import coordinates, displaced
 
 Array = npt.NDArray[np.float64]
 
-_LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
 # A leap after which a beat changes this many times as much as before is taken back. Not less: a mode n times as fast as
 # the beat changes by up to n times as much where it is caught moving as where it is caught bent.
 WORSE = 10.0
 LONGEST = 20.0  # admits leaps along modes that keep up to 0.95 of their amplitude over a beat
 _RANK = 1e-8  # of the largest singular value: less is the integrator's noise
 
-_FAR = 2.0  # rad
 _TOLD = 1e-2  # of the largest direction: less is too much mixed to tell a multiplier
 
 
@@ -114,46 +112,12 @@ class Secants:
         return np.asarray((moved / size) @ weights)
 
     def _coordinates(self, state: State) -> Array:
-        n = len(state.V) - 2
-        R0, R = self.about.R[:n].reshape(n, 3, 3), state.R[:n].reshape(n, 3, 3)
-        if not np.all(np.isfinite(R)):
-            return np.full(12 * n + len(self.sizes), np.nan)
-        turn = _vectors(np.swapaxes(R0, 1, 2) @ R) * _LENGTH
-        twist = state.V[:n] / self.angular_rate
-        parts = [turn, state.p[:n] - self.about.p[:n], twist[:, :3] * _LENGTH, twist[:, 3:]]
-        return np.concatenate([np.concatenate(parts, axis=1).ravel(), state.z * self.sizes])
-
-    def _state(self, coordinates: Array, rods: State) -> State:
-        """The state at ``coordinates``, the driving rods as in ``rods``."""
-        n = len(rods.V) - 2
-        x = coordinates[: 12 * n].reshape(n, 12)
-        found = State(*(array.copy() for array in rods))
-        R0 = self.about.R[:n].reshape(n, 3, 3)
-        found.R[:n] = (R0 @ _matrices(x[:, :3] / _LENGTH)).reshape(n, 9)
-        found.p[:n] = self.about.p[:n] + x[:, 3:6]
-        found.V[:n, :3] = x[:, 6:9] / _LENGTH * self.angular_rate
-        found.V[:n, 3:] = x[:, 9:12] * self.angular_rate
-        found.z[:] = coordinates[12 * n :] / self.sizes
+        found = np.empty(12 * (len(state.V) - 2) + len(self.sizes))
+        coordinates(self.about, state, self.angular_rate, self.sizes, found)
         return found
 
-
-def _vectors(R: Array) -> Array:
-    """Rotation vectors [N, 3] of matrices [N, 3, 3]: axis times angle, from the antisymmetric part and the trace.
-
-    Of turns beyond _FAR the antisymmetric part tells the axis badly; they take the slow way.
-    """
-    axis = 0.5 * (R[:, [2, 0, 1], [1, 2, 0]] - R[:, [1, 2, 0], [2, 0, 1]])
-    sine, cosine = np.sqrt((axis * axis).sum(axis=1)), 0.5 * (R[:, 0, 0] + R[:, 1, 1] + R[:, 2, 2] - 1.0)
-    angle = np.arctan2(sine, cosine)
-    if angle.max(initial=0.0) > _FAR:
-        return np.asarray(Rotation.from_matrix(R).as_rotvec())
-    return np.asarray(axis / np.sinc(angle / np.pi)[:, None])
-
-
-def _matrices(turn: Array) -> Array:
-    """Inverse of :func:`_vectors` (Rodrigues 1840)."""
-    half = 0.5 * np.sqrt((turn * turn).sum(axis=1))
-    cross = np.zeros((len(turn), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]], cross[:, [1, 2, 0], [2, 0, 1]] = turn, -turn
-    once, twice = np.sinc(2.0 * half / np.pi), 0.5 * np.sinc(half / np.pi) ** 2
-    return np.asarray(np.eye(3) + once[:, None, None] * cross + twice[:, None, None] * (cross @ cross))
+    def _state(self, x: Array, rods: State) -> State:
+        """The state at the coordinates ``x``, the driving rods as in ``rods``."""
+        found = State(*(array.copy() for array in rods))
+        displaced(self.about, x, self.angular_rate, self.sizes, found)
+        return found

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +23,7 @@ Array = npt.NDArray[np.float64]
 YOUNG, SHEAR = 0, 1
 SPANWISE_MODULUS = (YOUNG, SHEAR, YOUNG, SHEAR, YOUNG, SHEAR)
 CHORDWISE_MODULUS = (SHEAR, YOUNG, YOUNG, YOUNG, SHEAR, SHEAR)
+QUARTERS = 4  # of the chord, to which shares of lift and induced drag belong
 _DRIVEN_GAP = 0.02  # m between the root and the start of a driven rod, at most
 
 
@@ -72,6 +75,20 @@ class Structure:
     connectors: tuple[Connector, ...]
     wiring: Wiring
     position: dict[tuple[int, int], int]
+
+    @cached_property
+    def stretches(self) -> tuple[tuple[int, int, float, float], ...]:
+        """Which bodies lie under which quarters of the chord.
+
+        Each as body, quarter, part of the chord that they share, and x (m) of its middle in the body's frame.
+        """
+        edges = np.linspace(0, 1, QUARTERS + 1).tolist()
+        return tuple(
+            (n, q, s1 - s0, self.planform.x(0.5 * (s0 + s1), 0.5 * (panel.y0 + panel.y1)) - self.bodies[n].centre[0])
+            for n, panel in enumerate(self.panels)
+            for q, (low, high) in enumerate(pairwise(edges))
+            if (s1 := min(panel.s1, high)) > (s0 := max(panel.s0, low))
+        )
 
 
 def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Structure:

@@ -12,12 +12,11 @@ from records import EstimateError, Gene
 from sim.kernels import LANES
 from sim.kernels.arrays import Lanes, Laws
 from sim.kernels.memory import aligned
-from sim.structure import Structure, spring_constants
+from sim.structure import QUARTERS, Structure, spring_constants
 
 Array = npt.NDArray[np.float64]
 Group = Literal["structure", "aerodynamics"]
 
-QUARTERS = 4
 UNIT_SLIP = 1e4  # an estimate further than this from the typical value is taken for a wrong unit
 FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
 
@@ -123,16 +122,9 @@ def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
     The shares belong to the quarters of the chord, whatever the division: a body takes what its stretch of chord
     covers, at the centroid of what it takes.
     """
-    edges = np.linspace(0, 1, QUARTERS + 1)
     share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
-    for n, panel in enumerate(structure.panels):
-        for q in range(QUARTERS):
-            s0, s1 = max(panel.s0, edges[q]), min(panel.s1, edges[q + 1])
-            if s1 <= s0:
-                continue
-            part = quarters[q] * (s1 - s0) * QUARTERS
-            y = 0.5 * (panel.y0 + panel.y1)
-            x = structure.planform.x(0.5 * (s0 + s1), y) - structure.bodies[n].centre[0]
-            share[n] += part
-            moment[n] += part * x
+    for body, quarter, width, x in structure.stretches:
+        part = quarters[quarter] * width * QUARTERS
+        share[body] += part
+        moment[body] += part * x
     return share, moment / share

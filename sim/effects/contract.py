@@ -143,10 +143,11 @@ def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
     """A length (m) or mass (kg) of ``rig``; 1 for None."""
     if of is None:
         return 1.0
+    if of == "mass":
+        return rig.wing_mass if isinstance(rig, Vehicle) else wing_mass(rig)
     if isinstance(rig, Vehicle):
-        r, chords = [s.r for s in rig.stations], [s.chord for s in rig.stations]
-        span, area, mass = rig.span, float(np.trapezoid(chords, r)), rig.wing_mass
+        places, chords, span = [s.r for s in rig.stations], [s.chord for s in rig.stations], rig.span
     else:
-        y, chords = [s.y for s in rig.stations], [s.chord for s in rig.stations]
-        span, area, mass = y[-1] - y[0], float(np.trapezoid(chords, y)), wing_mass(rig)
-    return {"span": span, "chord": area / span, "mass": mass}[of]
+        places, chords = [s.y for s in rig.stations], [s.chord for s in rig.stations]
+        span = places[-1] - places[0]
+    return span if of == "span" else float(np.trapezoid(chords, places)) / span

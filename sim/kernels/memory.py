@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -14,9 +16,9 @@ _LINE = 8 * LANES
 
 def zeros(shape: tuple[int, ...]) -> Array:
     """Zeros [..., LANES] that start on a cache line."""
-    count = int(np.prod(shape))
+    count = math.prod(shape)
     whole = np.zeros(count + LANES)
-    start = -whole.ctypes.data % _LINE // 8
+    start = -whole.__array_interface__["data"][0] % _LINE // 8
     return whole[start : start + count].reshape(shape)
 
 

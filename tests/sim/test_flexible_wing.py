@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
-from scipy.spatial.transform import Rotation
 
 from records import FourierDrive, Recording
 from sim import flexible_wing, simulate
@@ -14,7 +13,6 @@ from sim.alignment import recorded_crossing, upstroke_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.arrays import AREA
 from sim.numerics import Numerics
-from sim.periodic import _matrices, _vectors
 from sim.rig import Tracking, blank_recording, record, robird_wing, true_genome, tunnel, vacuum
 from sim.wing_genes import AERODYNAMIC, STRUCTURAL
 from tests.sim.marching import driven
@@ -262,12 +260,3 @@ def test_a_recording_without_data_begins_at_the_crossing(model: FlexibleWing) ->
     series = np.fft.rfft(height, axis=1)[:, :5] / 60
     series[:, 1:] *= 2
     np.testing.assert_allclose(upstroke_crossing(series, model.wing.hinge.z), 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("largest", [1e-9, 0.3, 1.9, 3.1, 3.1415926])
-def test_turns_between_beats_are_rotation_vectors(largest: float) -> None:
-    vectors = np.random.default_rng(2).uniform(-1, 1, (20, 3))
-    vectors *= np.linspace(0, largest, 20)[:, None] / np.linalg.norm(vectors, axis=1)[:, None]
-    expected = Rotation.from_rotvec(vectors).as_matrix()
-    np.testing.assert_allclose(_matrices(vectors), expected, atol=1e-15)
-    np.testing.assert_allclose(_vectors(expected), vectors, rtol=0, atol=1e-13)

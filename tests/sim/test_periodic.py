@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from sim.flexible_wing import FlexibleWing
 from sim.kernels.arrays import State
+from sim.kernels.chart import LENGTH, coordinates, displaced
 from sim.numerics import Numerics
 from sim.periodic import Secants
 from sim.rig import blank_recording, robird_wing, vacuum
@@ -199,3 +200,31 @@ def test_growth_is_that_of_transients_and_not_of_round_off() -> None:
     assert _mean_growth(1e-9 * np.power(1.1, beats)) == pytest.approx(1.1)
     assert _mean_growth(1e-6 * np.power(0.9, beats)) == pytest.approx(0.9)
     assert _mean_growth(dead) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("largest", [0.0, 1e-9, 0.3, 1.9, 3.1, 3.1415926])
+def test_coordinates_are_turns_displacements_and_twists_and_lead_back(largest: float) -> None:
+    rng, rate, sizes = np.random.default_rng(2), 11.0, np.array([0.2, 3.0])
+    bodies, n = 20, 22
+    frames = Rotation.random(n, random_state=3)
+    vectors = rng.uniform(-1, 1, (n, 3))
+    vectors *= np.linspace(0, largest, n)[:, None] / np.linalg.norm(vectors, axis=1)[:, None]
+    about = State(frames.as_matrix().reshape(n, 9), rng.normal(size=(n, 3)), rng.normal(size=(n, 6)), np.ones(2))
+    turned = (frames * Rotation.from_rotvec(vectors)).as_matrix().reshape(n, 9)
+    state = State(turned, rng.normal(size=(n, 3)), rng.normal(size=(n, 6)), np.array([0.5, -2.0]))
+
+    found = np.empty(12 * bodies + 2)
+    coordinates(about, state, rate, sizes, found)
+    body = found[:-2].reshape(bodies, 12)
+    np.testing.assert_allclose(body[:, :3], LENGTH * vectors[:bodies], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(body[:, 3:6], (state.p - about.p)[:bodies])
+    np.testing.assert_allclose(body[:, 6:9], state.V[:bodies, :3] / rate * LENGTH)
+    np.testing.assert_allclose(body[:, 9:], state.V[:bodies, 3:] / rate)
+    np.testing.assert_allclose(found[-2:], [0.1, -6.0])
+
+    back = State(*(array.copy() for array in about))
+    displaced(about, found, rate, sizes, back)
+    for own, other, rods in zip(back, state, about, strict=True):
+        kept = bodies if len(own) == n else len(own)
+        np.testing.assert_allclose(own[:kept], other[:kept], rtol=1e-13, atol=1e-13)
+        np.testing.assert_array_equal(own[kept:], rods[kept:])

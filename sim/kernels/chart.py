@@ -1,0 +1,101 @@
+"""Coordinates of one individual's pose about another pose, and back: what the search for a periodic motion compares."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.kernels.arrays import State
+from sim.kernels.jit import inlined, kernel
+
+Array = npt.NDArray[np.float64]
+
+LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
+
+
+@kernel
+def coordinates(about: State, state: State, rate: float, sizes: Array, out: Array) -> None:
+    """Fill ``out`` [12 N + Z] with coordinates (m) of ``state`` about the pose ``about``, driving rods left out.
+
+    Of each body: turn times LENGTH, displacement, angular velocity times LENGTH over ``rate`` (rad/s), velocity over
+    ``rate``; then the effects' states times ``sizes`` [Z]. The arrays of both states have no lanes.
+    """
+    bodies = len(state.V) - 2
+    for n in range(bodies):
+        k = 12 * n
+        x, y, z = rotation_vector(about.R[n], state.R[n])
+        out[k], out[k + 1], out[k + 2] = LENGTH * x, LENGTH * y, LENGTH * z
+        for i in range(3):
+            out[k + 3 + i] = state.p[n, i] - about.p[n, i]
+            out[k + 6 + i] = state.V[n, i] / rate * LENGTH
+            out[k + 9 + i] = state.V[n, 3 + i] / rate
+    for i in range(len(sizes)):
+        out[12 * bodies + i] = state.z[i] * sizes[i]
+
+
+@kernel
+def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -> None:
+    """Write into ``state`` what lies at the coordinates ``x`` [12 N + Z]; its driving rods stay as they are."""
+    bodies = len(state.V) - 2
+    for n in range(bodies):
+        k = 12 * n
+        turn(about.R[n], x[k] / LENGTH, x[k + 1] / LENGTH, x[k + 2] / LENGTH, state.R[n])
+        for i in range(3):
+            state.p[n, i] = about.p[n, i] + x[k + 3 + i]
+            state.V[n, i] = x[k + 6 + i] / LENGTH * rate
+            state.V[n, 3 + i] = x[k + 9 + i] * rate
+    for i in range(len(sizes)):
+        state.z[i] = x[12 * bodies + i] / sizes[i]
+
+
+@inlined
+def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
+    """Axis times angle (rad) of the turn first^T second of two matrices [9]: by the unit quaternion of that turn.
+
+    Its largest component is taken by a square root and the others by division, so that any angle is as good (Shepperd,
+    J. Guidance and Control 1, 1978).
+    """
+    a, b, c = _column(first, second, 0)
+    d, e, f = _column(first, second, 1)
+    g, h, i = _column(first, second, 2)
+    trace = a + e + i
+    if trace >= max(a, e, i):
+        w, x, y, z = 1 + trace, f - h, g - c, b - d
+    elif a >= e and a >= i:
+        w, x, y, z = f - h, 1 + a - e - i, b + d, c + g
+    elif e >= i:
+        w, x, y, z = g - c, b + d, 1 + e - i - a, f + h
+    else:
+        w, x, y, z = b - d, c + g, f + h, 1 + i - a - e
+    sine = math.sqrt(x * x + y * y + z * z)  # that of half the angle, times what w is too large by
+    factor = 2 * math.atan(sine / w) / sine if sine != 0 else 0.0
+    return factor * x, factor * y, factor * z
+
+
+@inlined
+def _column(first: Array, second: Array, k: int) -> tuple[float, float, float]:
+    """Column k of first^T second, for matrices [9] row by row."""
+    u, v, w = second[k], second[3 + k], second[6 + k]
+    return (
+        first[0] * u + first[3] * v + first[6] * w,
+        first[1] * u + first[4] * v + first[7] * w,
+        first[2] * u + first[5] * v + first[8] * w,
+    )
+
+
+@inlined
+def turn(first: Array, x: float, y: float, z: float, out: Array) -> None:
+    """first exp([x, y, z]~) into ``out`` [9] (Rodrigues 1840)."""
+    angle = math.sqrt(x * x + y * y + z * z)
+    half = 0.5 * angle
+    once = math.sin(angle) / angle if angle > 0 else 1.0
+    twice = 0.5 * (math.sin(half) / half) ** 2 if half > 0 else 0.5
+    for i in range(3):
+        p, q, r = first[3 * i], first[3 * i + 1], first[3 * i + 2]
+        # a row times the matrix of the cross product, once and twice
+        u, v, w = q * z - r * y, r * x - p * z, p * y - q * x
+        out[3 * i] = p + once * u + twice * (v * z - w * y)
+        out[3 * i + 1] = q + once * v + twice * (w * x - u * z)
+        out[3 * i + 2] = r + once * w + twice * (u * y - v * x)
