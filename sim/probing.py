@@ -80,12 +80,13 @@ def probed(
     that moves the wing far more or less than MOVES is tried once more in proportion.
     """
     base = genome_batch(model.genes, genome)
-    beat = model.beat(base[0], recording, with_motion=True)
+    near = model.beside(base[0])
+    beat = near.beat(base[0], recording, with_motion=True)
     if beat.reason is not None or beat.motion is None:
         raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
     aim = MOVES * _span(model)
     numerics = replace(model.numerics, steps=len(beat.tracks), periodic=CLOSE * aim, max_beats=_MOST_BEATS)
-    probing = replace(model, numerics=numerics, probe=probe)
+    probing = replace(near, numerics=numerics, probe=probe)
     sizes = np.repeat(_sizes(model, probe), 1 + 2 * probe.harmonics)
     found = np.full((probe.size, *recording.values.shape), np.nan)
     tried = np.arange(probe.size)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -24,16 +26,23 @@ def drive_table(
     """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
 
     The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
-    A drive that gives way asks for two more derivatives, and for that share by itself, in the last row.
+    A drive that gives way asks for two more derivatives, and for that share by itself, in the last row. The table is
+    shared by all that are driven alike, and only read.
     """
+    ramp = numerics.ramp_beats
+    return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), giving_way)
+
+
+@lru_cache(maxsize=16)
+def _table(
+    series: bytes, shape: tuple[int, ...], frequency: float, ramp_beats: int, n: int, beat: int, giving_way: bool
+) -> Array:
+    rods = RodDrive(np.frombuffer(series, np.complex128).reshape(shape))
     omega = 2 * np.pi * frequency
     phases = (np.arange(n)[:, None] + NODES) / n
-    beats = beat + phases
     angle = rods.angles(2 * np.pi * phases) * omega ** np.arange(5.0)[:, None]
-    if beat < numerics.ramp_beats:
-        angle[..., :4, :] = _ramped(
-            angle, beats[..., None, None] / numerics.ramp_beats, frequency / numerics.ramp_beats
-        )
+    if beat < ramp_beats:
+        angle[..., :4, :] = _ramped(angle, (beat + phases)[..., None, None] / ramp_beats, frequency / ramp_beats)
         angle[..., 4, :] = 0.0
     slope = SLOPES[:, None, None] / (n * frequency)
     share = slope * angle[:, :1, :, 3]  # of the change at the start of the step

@@ -45,6 +45,7 @@ class Course:
         growth: of a disturbance of the periodic motion in a beat.
         error: estimated, m.
         done: accurate, or given up.
+        before: as it was on the rung before.
     """
 
     genome: Array
@@ -60,6 +61,12 @@ class Course:
     growth: float = 0.0
     error: float = np.nan
     done: bool = False
+    before: Course | None = None
+
+    def copy(self) -> Course:
+        """As it is now, whatever becomes of it; arrays are never written into, and are shared."""
+        known = self.secants and replace(self.secants, columns=list(self.secants.columns), target=None)
+        return replace(self, secants=known, changes=list(self.changes), before=None)
 
 
 class Subject(NamedTuple):

@@ -65,10 +65,20 @@ def periodic_beats(
 
 
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
-    """One individual settled, for others to begin beside; None where it fails."""
+    """One individual settled, for others to begin beside; None where it fails.
+
+    Not with the steps that it took to know its error, but with those before, where it turns out that these would do.
+    """
     course = Course(genome)
     _settled(subject, [course], numerics, with_motion=False)
-    return course if course.trace is not None and course.reason is None else None
+    if course.trace is None or course.reason is not None:
+        return None
+    before = course.before
+    if before is not None and course.changes:
+        before.error = course.changes[-1] + course.error
+        if before.error <= numerics.accuracy:
+            return before
+    return course
 
 
 def _beats_beside(
@@ -130,6 +140,8 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
         course.changes.append(float(np.sqrt((apart**2).sum(axis=-1)).max()))
         course.error = estimated_error(course.changes) + course.distance
         course.done = course.error <= numerics.accuracy
+    if not course.done:
+        course.before = course.copy()
     if last and not course.done:
         course.done = True
         estimate = (

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.kernels import LANES
-from sim.kernels.memory import aligned, zeros
+from sim.kernels.memory import aligned, several
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -212,53 +212,58 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
     """Scratch arrays for a group of lanes."""
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
-    motion, stages = (n + 2, 6, LANES), (STAGES, n + 2, 6, LANES)
-    joints = (c if len(laws.connector) else 0, 6, LANES)
+    motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
+    joints = (c if len(laws.connector) else 0, 6)
     blocks = n + 2 * len(wiring.below) + c - wiring.driven
+    scratch = several(
+        {
+            "R": (n + 2, 9),
+            "p": (n + 2, 3),
+            "V": motion,
+            "z": (z,),
+            "xi": motion,
+            "r_xi": motion,
+            "known": motion,
+            "U_xi": stages,
+            "U_V": stages,
+            "U_z": (STAGES, z),
+            "wrench": motion,
+            "lead": motion,
+            "Q": (c, 9),
+            "d": (c, 3),
+            "Q0": (c, 9),
+            "d0": (c, 3),
+            "blocks": (blocks, 36),
+            "flow": (s, FLOW),
+            "loads": (s, LOADS),
+            "induced": (s if len(laws.strip) else 0, 3),
+            "normal_damping": (n,),
+            "drag0": (n,),
+            "V0": motion,
+            "R0": (n + 2, 9),
+            "lost": (),
+            "stored": (),
+            "air_power": (),
+            "air_force": (3,),
+            "z_rate": (z,),
+            "z_tangent": (3, z),
+            "z_tangent0": (3, z),
+            "z_known": (z,),
+            "twist": joints,
+            "more": joints,
+            "more0": joints,
+            "more_k": joints,
+            "more_d": joints,
+            "more_k0": joints,
+            "more_d0": joints,
+            "push": joints,
+            "rods": (2, 3),
+            "clock": (CLOCK,),
+        }
+    )
     work = Work(
-        R=zeros((n + 2, 9, LANES)),
-        p=zeros((n + 2, 3, LANES)),
-        V=zeros(motion),
-        z=zeros((z, LANES)),
-        xi=zeros(motion),
-        r_xi=zeros(motion),
-        known=zeros(motion),
-        U_xi=zeros(stages),
-        U_V=zeros(stages),
-        U_z=zeros((STAGES, z, LANES)),
-        wrench=zeros(motion),
-        lead=zeros(motion),
-        Q=zeros((c, 9, LANES)),
-        d=zeros((c, 3, LANES)),
-        Q0=zeros((c, 9, LANES)),
-        d0=zeros((c, 3, LANES)),
+        **scratch,
         against=aligned(-lanes.damping),
-        blocks=zeros((blocks, 36, LANES)),
-        flow=zeros((s, FLOW, LANES)),
-        loads=zeros((s, LOADS, LANES)),
-        induced=zeros((s if len(laws.strip) else 0, 3, LANES)),
-        normal_damping=zeros((n, LANES)),
-        drag0=zeros((n, LANES)),
-        V0=zeros(motion),
-        R0=zeros((n + 2, 9, LANES)),
-        lost=zeros((LANES,)),
-        stored=zeros((LANES,)),
-        air_power=zeros((LANES,)),
-        air_force=zeros((3, LANES)),
-        z_rate=zeros((z, LANES)),
-        z_tangent=zeros((3, z, LANES)),
-        z_tangent0=zeros((3, z, LANES)),
-        z_known=zeros((z, LANES)),
-        twist=zeros(joints),
-        more=zeros(joints),
-        more0=zeros(joints),
-        more_k=zeros(joints),
-        more_d=zeros(joints),
-        more_k0=zeros(joints),
-        more_d0=zeros(joints),
-        push=zeros(joints),
-        rods=zeros((2, 3, LANES)),
-        clock=zeros((CLOCK, LANES)),
         strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
         connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
         # whose addresses are in the frames, so that they live as long

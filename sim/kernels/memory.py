@@ -28,3 +28,13 @@ def aligned(array: npt.ArrayLike) -> Array:
     out = zeros(values.shape)
     out[...] = values
     return out
+
+
+def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
+    """Zeros [..., LANES] of many shapes [...] by name, cut from one piece: a group of lanes asks for dozens."""
+    sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
+    whole, start, found = zeros((sum(sizes.values()),)), 0, {}
+    for name, size in sizes.items():
+        found[name] = whole[start : start + size].reshape(*shapes[name], LANES)
+        start += size
+    return found
