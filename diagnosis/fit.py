@@ -34,6 +34,7 @@ FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene'
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
 SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
 SMALLEST = 0.3  # decrease of the cost that is worth another step
+BESIDE = 0.05  # of a box: a motion as near as this is near enough to begin beside
 FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
 
 
@@ -48,6 +49,7 @@ class Fit:
         jacobian: [D, F] of the coefficients, per part of the box.
         residuals: per recording [T, C].
         cost: surprise at what is left (:meth:`diagnosis.stack.Stack.surprise`), and at the genes by their prior.
+        near: [F] whose motion individuals about this fit begin beside: its own, or that of one shortly before.
         damping: last good one.
         fresh: whether the Jacobian was measured there.
         converged: whether it ended because nothing was to be gained.
@@ -59,6 +61,7 @@ class Fit:
     jacobian: Array
     residuals: tuple[Array, ...]
     cost: float
+    near: Array
     damping: float = FIRST_DAMPING
     fresh: bool = False
     converged: bool = False
@@ -178,7 +181,7 @@ def _at(look: _Look, unit: Array) -> Fit:
         raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
     cost = float(_cost(look.stack, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
-    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost)
+    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, unit)
 
 
 def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
@@ -189,7 +192,7 @@ def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
     moves = STEP * np.eye(len(fit.unit))[columns]
     moves[fit.unit[columns] > 1.0 - STEP] *= -1.0
     around = np.clip(np.vstack([fit.unit + moves, *([fit.unit - moves] if sides == 2 else [])]), 0.0, 1.0)
-    found, reasons, _ = look.at(around, fit.unit)
+    found, reasons, _ = look.at(around, fit.near)
     bad = np.array([reason is not None for reason in reasons])
     found[bad] = fit.coefficients
     around[bad] = fit.unit
@@ -215,7 +218,7 @@ def _step(look: _Look, fit: Fit, tried: tuple[Array, Array]) -> tuple[Fit | None
     promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T, units)
     if promised.max() <= 1e-9 * fit.cost:
         return None, 0.0
-    found, reasons, residuals = look.at(units, fit.unit)
+    found, reasons, residuals = look.at(units, fit.near)
     bad = np.array([reason is not None for reason in reasons])
     cost = np.where(bad, np.inf, _cost(look.stack, np.where(bad[:, None], FAILED, found), units))
     k = int(np.argmin(cost))
@@ -232,6 +235,7 @@ def _step(look: _Look, fit: Fit, tried: tuple[Array, Array]) -> tuple[Fit | None
         jacobian,
         tuple(r[k] for r in residuals),
         float(cost[k]),
+        fit.near if np.abs(units[k] - fit.near).max() <= BESIDE else units[k],
         float(own[k]) if k < len(own) else fit.damping,
     )
     return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from sim.structure import Structure
 Array = npt.NDArray[np.float64]
 
 FLUTTER = 1.02  # growth of a disturbance in a beat beyond which a periodic motion is none that a wing keeps
+MORE = 1.5  # times as many steps, for individuals that fail beside another and from rest
 _TRIES = 4  # rungs on which an individual may fail before it is given up
 
 
@@ -90,13 +91,23 @@ def _beats_beside(
     for group in _groups(courses):
         settle(subject, group, numerics, steps, with_motion)
     failed = [k for k, course in enumerate(courses) if course.reason is not None or course.growth > FLUTTER]
-    again = iter(_settled(subject, [Course(genomes[k]) for k in failed], numerics, with_motion))
+    for k, course in zip(failed, _from_rest(subject, genomes[failed], numerics, steps, with_motion), strict=True):
+        courses[k] = course
     for course in courses:
         course.error = near.error + course.distance
-    return tuple(
-        next(again) if k in failed else _beat(subject.structure, course, with_motion)
-        for k, course in enumerate(courses)
-    )
+    return tuple(_beat(subject.structure, course, with_motion) for course in courses)
+
+
+def _from_rest(subject: Subject, genomes: Array, numerics: Numerics, steps: int, with_motion: bool) -> list[Course]:
+    """Individuals that begin at rest with ``steps`` a beat; those that fail so once more with more steps."""
+    courses = [Course(genome) for genome in genomes]
+    for tried in (steps, round(MORE * steps)):
+        again = [k for k, course in enumerate(courses) if not course.done or course.reason is not None]
+        fresh = [Course(genomes[k]) for k in again]
+        _settled(subject, fresh, replace(numerics, steps=tried), with_motion)
+        for k, course in zip(again, fresh, strict=True):
+            courses[k] = course
+    return courses
 
 
 def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_motion: bool) -> tuple[Beat, ...]:

@@ -145,15 +145,25 @@ def _series(frame: Any, which: int) -> None:
     port = strip_port(frame)
     harmonics = len(port.parameters) // 2
     share = load1(port.clock, SHARE)
+    now, start = cosine_and_sine(load1(port.clock, NOW)), cosine_and_sine(load1(port.clock, START))
+    once, first = now, start
     for s in range(port.places):
-        size = load(port.parameters, 0, s)
-        for k in range(1, harmonics + 1):
-            a, b = load(port.parameters, k, s), load(port.parameters, harmonics + k, s)
-            c, n = cosine_and_sine(float(k) * load1(port.clock, NOW))
-            c0, n0 = cosine_and_sine(float(k) * load1(port.clock, START))
-            size += a * c + b * n + (float(k) * share) * (b * c0 - a * n0)
         scale = load0(port.density) * (0.5 * port.geometry[s, AREA])
-        store(port.loads, s, which, load(port.loads, s, which) + size / scale)
+        store(port.loads, s, which, load(port.loads, s, which) + load(port.parameters, 0, s) / scale)
+    for k in range(1, harmonics + 1):
+        drift = float(k) * share
+        cosine, sine = now[0] - drift * start[1], now[1] + drift * start[0]
+        for s in range(port.places):
+            size = load(port.parameters, k, s) * cosine + load(port.parameters, harmonics + k, s) * sine
+            scale = load0(port.density) * (0.5 * port.geometry[s, AREA])
+            store(port.loads, s, which, load(port.loads, s, which) + size / scale)
+        now, start = _further(now, once), _further(start, first)
+
+
+@inlined
+def _further(turned: Any, by: Any) -> Any:
+    """Cosine and sine of the sum of two angles."""
+    return turned[0] * by[0] - turned[1] * by[1], turned[1] * by[0] + turned[0] * by[1]
 
 
 def _wing(probe: Probe, scene: WingScene, values: Values) -> None:
