@@ -85,6 +85,12 @@ class Refit:
         width = np.diag(around[:n] - around[n:])
         return np.asarray(((seen[:n] - seen[n:]) / width[:, None]).T)
 
+    def _slopes(self, unit: Array, recordings: Sequence[Recording], seen: Array) -> Array:
+        """The same by differences to one side from what is ``seen`` [D] at ``unit``: enough to be led by."""
+        sign = np.where(unit > 1.0 - STEP, -1.0, 1.0)
+        around = self.observed(unit + STEP * np.diag(sign), recordings)
+        return np.asarray(((_whole(around) - seen) * sign[:, None] / STEP).T)
+
     def linear(self, change: Array) -> float:
         """Root mean square that is left of a change [D] of the recordings, as far as the genes answer linearly.
 
@@ -123,7 +129,7 @@ class Refit:
         for turn in range(rounds):
             before = rms(residual)
             try:
-                slopes = self.tangent if turn == 0 and best == 0 else self.tangent_at(unit, recordings)
+                slopes = self.tangent if turn == 0 and best == 0 else self._slopes(unit, recordings, residual + target)
             except RuntimeError:
                 break
             unit, residual = self._descended(recordings, target, unit, residual, slopes[np.isfinite(target)])

@@ -53,7 +53,8 @@ WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
 VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
-WINGS = (FINER, EQUAL, FINER, FINER, EQUAL, FINER, ELEVEN, FINER, FINER, EQUAL, FINER, ELEVEN_FINER, FINER)
+SMALL = (FINER, EQUAL, FINER, FINER, EQUAL, FINER, FINER, FINER, EQUAL, FINER, EQUAL, FINER)
+WINGS = (*SMALL[:6], ELEVEN, *SMALL, ELEVEN_FINER, *SMALL[6:])
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,6 @@ LISTED_WING = (
     "hinge_offset",
     "phase_lag_error",
     "drive_harmonics",
-    "stroke_amplitude",
     "backlash",
     "lumped_mass",
     "damage",
@@ -139,7 +139,9 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """Drafts of a group: ``n`` in all, or of each ``thinned``-th kind of the listed and the unlisted."""
     if group == "null":
-        builds = (FINER, VEHICLE, BARE, EQUAL, VEHICLE, BARE, ELEVEN_FINER, VEHICLE, BARE)
+        vehicles = (VEHICLE, BARE)
+        wings = (FINER, EQUAL, FINER, EQUAL, FINER, ELEVEN_FINER)
+        builds = [one for wing in wings for one in (wing, *vehicles)]
         large = (WHOLE, WHOLE_FINER)[: n // 50]
         yield from (_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large))))
     elif group == "listed":
