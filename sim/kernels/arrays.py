@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels import LANES
 from sim.kernels.memory import aligned, several
 
 Array = npt.NDArray[np.float64]
