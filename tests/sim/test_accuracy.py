@@ -63,6 +63,33 @@ def test_what_one_needs_does_not_depend_on_its_neighbours() -> None:
             assert beat.beats == alone[k].beats
 
 
+@pytest.mark.parametrize("condition", [vacuum(10.0, 0.05, 3.0), tunnel(0.12, 4.0, 6.0)], ids=["vacuum", "tunnel"])
+@pytest.mark.parametrize("division", ["4", "11"])
+def test_those_that_begin_beside_another_are_as_accurate_and_cost_less(division: str, condition: Condition) -> None:
+    model = FlexibleWing(robird_wing(), division)
+    base, blank = random_genomes(model, 1)[0], blank_recording(model.wing, condition)
+    genomes = base * np.exp(np.random.default_rng(4).uniform(-0.15, 0.15, (8, len(base))))
+    found = model.beside(base).beats(genomes, blank)
+    exact = replace(model, numerics=FINE).beats(genomes, blank)
+    assert max(error(a, b) for a, b in zip(found, exact, strict=True)) < model.numerics.accuracy
+    assert max(beat.error for beat in found) < 1.5 * model.numerics.accuracy
+    alone = model.beats(genomes, blank)
+    cost = [sum(len(beat.tracks) * beat.beats for beat in beats) for beats in (found, alone)]
+    assert cost[0] < 0.65 * cost[1]
+    assert max(len(beat.tracks) for beat in found) <= max(len(beat.tracks) for beat in alone)
+
+
+def test_one_that_fails_beside_another_begins_from_rest() -> None:
+    """A stroke that is larger at once throws the wing over in its first beat; from rest it goes."""
+    wing = FlexibleWing(robird_wing(), "4")
+    nominal, blank = np.array([g.nominal for g in wing.genes]), blank_recording(wing.wing, vacuum(10.0, 0.05, 3.0))
+    model = wing.with_effects("stroke_amplitude")
+    genomes = np.append(nominal, 0.0) + np.eye(len(nominal) + 1)[-1] * np.array([[0.01], [0.4]])
+    found, exact = (one.beats(genomes, blank) for one in (model.beside(genomes[0]), replace(model, numerics=FINE)))
+    assert [beat.reason for beat in found] == [None, None]
+    assert max(error(a, b) for a, b in zip(found, exact, strict=True)) < model.numerics.accuracy
+
+
 def test_accuracy_out_of_reach_is_said() -> None:
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(accuracy=1e-12, periodic=1e-6))
     beat = model.beat([g.nominal for g in model.genes], blank_recording(model.wing, vacuum(10.0, 0.05, 4.0)))
