@@ -22,7 +22,7 @@ from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.unexplained import MOST, Unexplained, missing_forces, probed_recordings, unexplained
 from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
-from diagnosis.where import where
+from diagnosis.where import acting, where
 from records import Recording
 
 Array = npt.NDArray[np.float64]
@@ -93,11 +93,13 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
         action = _action(state, best, evaluator)
         coefficients = coefficients if action is None else action
     found = where(state.stack, maps.pieces(state.subject, state.stack, coefficients), coefficients)
+    span, chord = (_placed(best, "span") or lacking.span, _placed(best, "chord") or lacking.chord)
+    phase = lacking.phase if decision.verdict != "measurement fault" else None
     return Where(
-        found.words,
-        _placed(best, "span") or lacking.span or found.span,
-        _placed(best, "chord") or lacking.chord or found.chord,
-        lacking.phase if lacking.phase and decision.verdict != "measurement fault" else found.phase,
+        found.words + acting(span, chord, phase),
+        span or found.span,
+        chord or found.chord,
+        phase or found.phase,
         found.axis,
         found.harmonics,
         found.exponents,

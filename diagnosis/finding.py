@@ -271,7 +271,7 @@ class Finding:
         strength: misfit after the best nominal refit over the noise, d.
         floors: how small a misfit can be.
         hypotheses: most probable first; the nominal model is among them.
-        alike: sets of effects that these recordings cannot tell apart.
+        alike: explanations, each of one or several effects, that these recordings cannot tell apart.
         where: place, phase, axis, scaling.
         markers, phase_map, missing: the maps.
         recordings: misfit to each.

@@ -55,7 +55,8 @@ def decided(weighed: Weighed) -> Decision:
         verdict = "adequate" if nominal >= weighed.unknown + total else "unnamed"
         if verdict == "unnamed" and len(effects):
             best = refits[top]
-    alike = tuple(refit.names for refit in possible) if len(possible) > 1 else ()
+    weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
+    alike = tuple(refit.names for refit in possible) if weighing else ()
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
@@ -141,14 +142,16 @@ def _measured(refit: Refit) -> bool:
 
 def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
     """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
-    names = " and ".join(suspects[name].title.lower() for name in decision.named if name in suspects)
+    names, nearest = (
+        " and ".join(suspects[name].title.lower() for name in found if name in suspects)
+        for found in (decision.named, decision.best.names)
+    )
     start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
     if decision.verdict == "adequate":
         return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
     if decision.verdict == "unnamed":
-        return (
-            f"Something is lacking that nothing in the library explains: {told['where']}. {start} "
-            f"The nearest effect, {' and '.join(decision.best.names) or 'none'}, leaves {told['after']}."
+        return f"Something is lacking that nothing in the library explains: {told['where']}. {start} " + (
+            f"The nearest that there is, {nearest}, leaves {told['after']}." if nearest else "No effect takes anything."
         )
     if decision.verdict == "ambiguous":
         return (

@@ -146,6 +146,24 @@ def _words(
     return f"{place}, {when}, along {axis}, {line}{scaling}"
 
 
+def acting(span: Interval | None, chord: Interval | None, phase: Interval | None) -> str:
+    """Where the cause of a misfit acts, in words that follow those of the misfit; "" where that is not known."""
+    told = [
+        f"{100 * one.value:.0f} % of the {name}{_between(one, 100, 0, ' %')}"
+        for name, one in (("span", span), ("chord", chord))
+        if one is not None
+    ]
+    if phase is not None:
+        told.append(f"{phase.value % 1.0:.2f} of the beat{_between(phase, 1, 2, '', -(phase.value // 1.0))}")
+    return f"; its cause acts at {', '.join(told)}" if told else ""
+
+
+def _between(one: Interval, factor: float, digits: int, unit: str, shift: float = 0.0) -> str:
+    if one.low is None or one.high is None:
+        return ""
+    return f" ({factor * one.low + shift:.{digits}f} to {factor * one.high + shift:.{digits}f}{unit})"
+
+
 def _place(span: Interval | None, chord: Interval | None) -> str:
     if span is None or span.low is None or span.high is None:
         return "in the forces"

@@ -42,7 +42,7 @@ def _strips(where: Where) -> Markup | None:
         turns = interval is where.phase
         centre = with_unit(number(interval.value * factor), unit)
         at = along.at(interval.value % 1 if turns else interval.value)
-        extent = f"{name}: {centre}, extent {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
+        extent = f"{name}: {centre}, 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
         parts += [
             text(LEFT, y - 6, extent, class_="said"),
             tag("rect", x=LEFT, y=y, width=RIGHT - LEFT, height=12.0, class_="trough"),

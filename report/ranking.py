@@ -118,7 +118,7 @@ def _alike(finding: Finding) -> Markup | None:
     if not finding.alike:
         return None
     known = titles(finding)
-    sets = [tag("li", listed((title_of(name, known) for name in names), "or")) for names in finding.alike]
+    sets = [tag("li", listed((title_of(name, known) for name in names), "and")) for names in finding.alike]
     return joined(tag("h3", "These recordings cannot tell apart"), tag("ul", *sets, class_="plain"))
 
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from diagnosis.decide import KNOWN, weighed
+from diagnosis.finding import Interval
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.verdict import decided
+from diagnosis.where import acting
 
 
 def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure") -> Refit:
@@ -47,6 +49,20 @@ def test_a_fault_of_the_measurement_is_called_one() -> None:
 
 def test_what_explains_as_well_is_not_told_apart() -> None:
     assert verdict(2.0, refit(0.30, ("a",)), refit(0.31, ("b",)))[0] == "ambiguous"
+
+
+def test_explanations_are_alike_where_one_of_them_is_right_and_only_there() -> None:
+    open_ = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
+    assert set(open_.alike) == {("a",), ("b",)}
+    assert decided(weighed(stack(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alike == ()
+
+
+def test_where_a_cause_acts_is_told_with_its_interval() -> None:
+    span, phase = Interval(0.85, 0.37, 0.9), Interval(1.25, 1.2, 1.3)
+    assert acting(span, Interval(0.5, None, None), phase) == (
+        "; its cause acts at 85 % of the span (37 to 90 %), 50 % of the chord, 0.25 of the beat (0.20 to 0.30)"
+    )
+    assert acting(None, None, None) == ""
 
 
 def test_what_leaves_most_is_no_name() -> None:

@@ -190,7 +190,7 @@ def wing_finding() -> Finding:
         strength=5.12,
         floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083, ("Noise rests on 6 beats only.",)),
         hypotheses=hypotheses,
-        alike=(OPEN, ("added_mass", "residual_air", "mass_offset")),
+        alike=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
         where=Where(
             "Outer 30 % of the span, during the first third of the downstroke, along the flap normal; grows with the "
             "flap frequency squared.",

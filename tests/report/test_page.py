@@ -127,8 +127,8 @@ def test_the_numbers_shown_are_those_given() -> None:
         "nominal model, refitted: 4.1",
         "division, compared with 48 bodies (12 x 4): 0.21",
         "5 (4.6 to 5.4)",  # before, mm, of tunnel-3hz-5
-        "span: 85 %, extent 70 to 100 %",
-        "phase of the beat: 0.02, extent 0.93 to 1.11",
+        "span: 85 %, 90 % within 70 to 100 %",
+        "phase of the beat: 0.02, 90 % within 0.93 to 1.11",
         "61 %",  # first harmonic
         "flap frequency: 1.9 (2 to 5 Hz)",
         "12.3 mm",
@@ -143,7 +143,7 @@ def test_the_numbers_shown_are_those_given() -> None:
         "96.1 %",
         "−11 %",
         "+409",  # evidence of the first
-        "Displaced hinge or Stroke amplitude",
+        "Displaced hinge and Harmonics of the drive",
         "Record at 5 Hz in vacuum, with a lag of 14°.",
         "Source of displaced hinge (1935), Eq. 3",
         "Noise rests on 6 beats only.",

@@ -61,7 +61,7 @@ def test_a_path_is_uploaded_and_what_was_found_is_printed(wingfit: Wingfit, arch
     assert [part for part in row.split("  ") if part.strip()][1].strip() == "90 %"
     assert "0.500" in row
     assert any(line.startswith("nothing more (nominal model)") for line in lines)
-    assert "these recordings cannot tell apart: hinge_offset, camera_shift" in lines
+    assert "these recordings cannot tell apart: hinge_offset; camera_shift" in lines
     assert any(line.startswith("hinge_offset.z") and "[0.0038, 0.0042]" in line for line in lines)
     assert "held out: held-out misfit falls to the floor" in lines
     assert "diagnosing" in err
