@@ -26,10 +26,10 @@ FEW = 8
 
 
 def rivals(weighed: Weighed) -> list[Refit]:
-    """The explanations that are still alive, most probable first; at least two where there are two."""
+    """The explanations that are still alive, most probable first; a single one with the next. None where none is."""
     order = np.argsort(-weighed.probabilities, kind="stable")
     alive = [k for k in order if weighed.probabilities[k] >= ALIVE]
-    return [weighed.refits[k] for k in (alive if len(alive) > 1 else order[:2])[:RIVALS]]
+    return [weighed.refits[k] for k in (order[:2] if len(alive) == 1 else alive)[:RIVALS]]
 
 
 def separations(
@@ -93,8 +93,9 @@ def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
     names = tuple(" and ".join(one.names) or "nothing lacking" for one in alive)
+    told = [" and ".join(trial.suspect.title.lower() for trial in one.trials) or "nothing lacking" for one in alive]
     return Advice(
-        f"record at {where}: {', '.join(names)} would differ by {apart:.2g} times the noise",
+        f"record at {where}: {' or '.join(told)} would differ by {apart:.2g} times the noise",
         condition.flap_frequency,
         lag,
         condition.pressure / 100.0,

@@ -8,7 +8,18 @@ from report.layout import figure, panels, section
 from report.markup import Markup, joined, tag
 from report.style import style_sheet
 from report.svg import Axis, bar, drawing, text, x_axis
-from report.words import Scale, best_of, channel_scale, listed, number, percent, stages, title_of, titles
+from report.words import (
+    Scale,
+    best_of,
+    channel_scale,
+    listed,
+    number,
+    percent,
+    stages,
+    title_of,
+    titles,
+    what_was_put_in,
+)
 
 _PROVED = "Is the fit better on recordings it has not seen?"
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
@@ -103,7 +114,7 @@ def _tiles(finding: Finding) -> Markup:
     ]
     if finding.proof is not None and "after" in stages(finding):
         change = f"{number(finding.proof.before.value)} → {number(finding.proof.after.value)}"
-        tiles.append(("Held-out misfit, over the floor", change, "nominal model → with what was found"))
+        tiles.append(("Held-out misfit, over the floor", change, f"nominal model → with {what_was_put_in(finding)}"))
     best = best_of(finding)
     if best is not None and finding.verdict != "adequate":
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {best.title}"))
@@ -121,7 +132,7 @@ def _floors(finding: Finding) -> Markup:
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
     if floors.division is not None:
-        rows.insert(1, (f"division, compared with {floors.finer}", floors.division, "pale"))
+        rows.insert(1, ("division, against a finer one", floors.division, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
     along = Axis(0, 1.1 * most, 12, 348)
     bottom = 8 + 34.0 * len(rows)
@@ -131,7 +142,8 @@ def _floors(finding: Finding) -> Markup:
         wide = along.at(value * scale.factor) - along.at(0)
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="said"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
-    return figure(_floors_told(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)))
+    note = f"The division was compared with: {floors.finer}." if floors.division is not None else None
+    return figure(_floors_told(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note)
 
 
 def _floors_told(finding: Finding, floors: Floors, scale: Scale) -> str:

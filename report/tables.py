@@ -5,7 +5,7 @@ from __future__ import annotations
 from diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Interval
 from report.layout import folded, section, table
 from report.markup import Markup, joined, tag
-from report.words import bounds, number, percent, scale_for, title_of, titles, with_unit
+from report.words import bounds, capital, number, percent, scale_for, title_of, titles, what_was_put_in, with_unit
 
 MOST_GENES = 12
 _ADVICE = (
@@ -30,7 +30,7 @@ def genes(finding: Finding) -> Markup | None:
     many = folded(f"{len(nominal)} genes of the nominal model", _genes(nominal)) if not shown and nominal else None
     return section(
         "Values of the genes, with 90 % intervals",
-        joined(tag("h3", "What was put in"), _genes(effects)) if effects else None,
+        joined(tag("h3", capital(what_was_put_in(finding))), _genes(effects)) if effects else None,
         joined(tag("h3", "The nominal model's own"), _genes(shown)) if shown else None,
         many,
     )

@@ -131,9 +131,12 @@ def stages(finding: Finding) -> dict[str, str]:
     """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
     if finding.verdict == "adequate":
         return {"before": "nominal model, refitted"}
-    law = finding.law is not None and not finding.named
-    after = "after: with a law for what is left" if law else "after: with what was found"
-    return {"before": "before: nominal model, refitted", "after": after}
+    return {"before": "before: nominal model, refitted", "after": f"after: with {what_was_put_in(finding)}"}
+
+
+def what_was_put_in(finding: Finding) -> str:
+    """Of a finding that is not adequate, what its "after" has: in one without a name, what comes nearest."""
+    return "what was found" if finding.named else "the nearest in the library, which it is not"
 
 
 def change(finding: Finding, before: str, after: str) -> str:

@@ -125,7 +125,8 @@ def test_the_numbers_shown_are_those_given() -> None:
         "4.43 → 1.04",
         "before: 4.43 (90 %: 4.11 to 4.75)",
         "nominal model, refitted: 4.1",
-        "division, compared with 48 bodies (12 x 4): 0.21",
+        "division, against a finer one: 0.21",
+        "The division was compared with: 48 bodies (12 x 4)",
         "5 (4.6 to 5.4)",  # before, mm, of tunnel-3hz-5
         "span: 85 %, 90 % within 70 to 100 %",
         "phase of the beat: 0.02, 90 % within 0.93 to 1.11",
