@@ -11,12 +11,14 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
+from diagnosis.fit import Fit
 from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
 from diagnosis.refit import (
     Refit,
     afresh,
     again,
     continued,
+    judged,
     pairs,
     partners,
     refitted,
@@ -34,12 +36,13 @@ PART = 0.25  # of what the form of a law is allowed to leave: more, and a partne
 CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
+RUNNERS = 3  # suspects that are fitted from the estimates
 RIVALS = 3  # explanations to which a partner is sought
 
 
 @dataclass
 class Assessment:
-    """What is known so far; ``evaluations`` counts individuals."""
+    """What is known so far; ``evaluations`` counts individuals. ``begun`` is the nominal model at the estimates."""
 
     subject: Subject
     stack: Stack
@@ -48,6 +51,7 @@ class Assessment:
     refits: list[Refit] = field(default_factory=list)
     weighed: Weighed | None = None
     evaluations: int = 0
+    begun: tuple[Subject, Fit] | None = None
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,8 @@ def assess(
     stack = state.stack
     yield 0.0, "fitting the nominal model"
     steps = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
-    for k, fit in enumerate(steps):  # noqa: B007  # the last one counts
+    for k, fit in enumerate(steps):
+        state.begun = state.begun or (state.subject, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.25, "comparing with a finer division"
     nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
@@ -201,10 +206,26 @@ def _alone(
         yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
     if not _enough(state, nominal):
-        local = [one for one in state.refits if one.trials[0].suspect.places]
-        for one in sorted(local, key=lambda one: one.excess)[:1]:  # a place has minima that lead nowhere
-            yield 0.76, f"refit with {one.names[0]} from the estimates"
-            _add(state, afresh(state.subject, stack, evaluator, fit, one.trials[0]))
+        yield from _afresh(state, spec, evaluator)
+
+
+def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+    """Suspects that explain most about the estimates, from there.
+
+    About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
+    """
+    if state.begun is None:
+        raise ValueError("the nominal model has not been fitted")
+    subject, begun = state.begun
+    found = []
+    for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
+        found.append(trials)
+        yield 0.74, f"score test of {suspect.name} about the estimates"
+    best: tuple[Trial, Fit] | None = None
+    for best in afresh(state.subject, state.stack, evaluator, begun, worth_a_refit(found, RUNNERS)):
+        yield 0.77, f"refit with {best[0].suspect.name} from the estimates"
+    if best is not None:
+        _add(state, judged(state.stack, best[1], [best[0]]))
 
 
 def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
 AFRESH = 20  # of one from the estimates
+RACE = 6  # of several from there, before the best goes on alone
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
@@ -180,27 +182,39 @@ def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
         return None
 
 
-def afresh(subject: Subject, stack: Stack, evaluator: Evaluator, nominal: Fit, trial: Trial) -> Refit | None:
-    """The nominal model with a suspect of typical size, fitted from the estimates; None where that cannot be simulated.
+def afresh(
+    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trials: Sequence[Trial]
+) -> Iterator[tuple[Trial, Fit]]:
+    """The nominal model with the suspect of one of ``trials``, fitted from the estimates, where ``begun`` is.
 
-    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back.
+    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back. All run
+    for RACE steps and the best of them to its end; yields that after every step. Nothing where none can be simulated.
     """
-    suspect, base = trial.suspect, nominal.problem.base
+    runners = list[tuple[Trial, Fit, Iterator[Fit]]]()
+    for trial in trials:
+        steps = _from_estimates(subject, stack, evaluator, begun, trial)
+        try:
+            for fit in islice(steps, RACE):
+                yield min([(trial, fit), *((t, f) for t, f, _ in runners)], key=lambda one: one[1].cost)
+        except ValueError:
+            continue
+        runners.append((trial, fit, steps))
+    if runners:
+        trial, _, steps = min(runners, key=lambda one: one[1].cost)
+        yield from ((trial, fit) for fit in steps)
+
+
+def _from_estimates(subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trial: Trial) -> Iterator[Fit]:
+    """Fits of the nominal model with a suspect of typical size; ValueError where the first cannot be simulated."""
+    suspect, base = trial.suspect, begun.problem.base
     model = subject.extended([suspect.name])
-    free = (*nominal.problem.free, *(gene.name for gene in suspect.genes))
+    free = (*begun.problem.free, *(gene.name for gene in suspect.genes))
     problem = Problem(model, stack.recordings, free, base_genome(model, base.as_dict()), stack.axes)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     size = size_columns(suspect)
     own = trial.unit[0].copy()
     own[size] = typical[size]
-    genes = free_genes(nominal.problem)
-    start = np.concatenate([unit_at(genes, np.array([base[gene.name] for gene in genes])), own])
-    try:
-        for fit in thoroughly(subject, stack, problem, evaluator, start, AFRESH):  # noqa: B007  # the last one counts
-            pass
-    except ValueError:
-        return None
-    return judged(stack, fit, [trial])
+    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, own]), AFRESH)
 
 
 def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:

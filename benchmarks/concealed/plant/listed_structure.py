@@ -87,7 +87,7 @@ _PLACE = {"span": (0.75, 0.3, 0.95), "chord": (0.7, 0.1, 0.9)}
 
 LISTED_STRUCTURE = (
     Kind(
-        "lumped_mass", "inertia", True, "kg", 0.003, 0.03,
+        "lumped_mass", "inertia", True, "kg", 0.003, 0.012,
         "a point in the mass integrals of the wing itself; Steiner's theorem for the whole body", _lump,
         shape=_PLACE, genes=_lump_genes, before=True,
     ),
