@@ -93,7 +93,8 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
         action = _action(state, best, evaluator)
         coefficients = coefficients if action is None else action
     found = where(state.stack, maps.pieces(state.subject, state.stack, coefficients), coefficients)
-    span, chord = (_placed(best, "span") or lacking.span, _placed(best, "chord") or lacking.chord)
+    held = _nominal(state) if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
+    span, chord = (_placed(held, "span") or lacking.span, _placed(held, "chord") or lacking.chord)
     phase = lacking.phase if decision.verdict != "measurement fault" else None
     return Where(
         found.words + acting(span, chord, phase),

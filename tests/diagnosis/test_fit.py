@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +18,7 @@ from diagnosis.assess import Assessment, _elsewhere
 from diagnosis.fit import Fit, _Look, _measured, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal
-from diagnosis.refit import judged, left_out
+from diagnosis.refit import RACE, afresh, judged, left_out
 from diagnosis.screen import Nuisance
 from diagnosis.stack import PIECES, TOLERANCE, Stack
 from tests.diagnosis.pendulum_rig import PendulumRig, recorded
@@ -167,3 +169,28 @@ def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
     assert found.excess < 0.1 * caught.refit.excess
     state = Assessment(RIG, stack, Nominal(RIG, judged(stack, good), None, "", ()), refits=[judged(stack, good)])
     assert _elsewhere(state, EVALUATOR) is None
+
+
+def test_of_several_suspects_the_best_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One cannot be simulated, one ends early, one falls behind, one wins."""
+    falling = [20.0 - k for k in range(20)]
+    costs: dict[str, list[float]] = {"never": [], "early": [9.0], "slow": [c + 10 for c in falling], "wins": falling}
+    asked, nothing = dict.fromkeys(costs, 0), cast("Any", None)
+
+    def steps(*arguments: Any) -> Iterator[Any]:
+        name = arguments[-1]
+        if not costs[name]:
+            raise ValueError("it cannot be simulated")
+        for cost in costs[name]:
+            asked[name] += 1
+            yield SimpleNamespace(cost=cost)
+
+    def race(*names: str) -> tuple[Any, Any]:
+        (*_, last) = afresh(nothing, nothing, nothing, nothing, cast("Any", names))
+        return last[0], last[1].cost
+
+    monkeypatch.setattr("diagnosis.refit._from_estimates", steps)
+    assert race("never", "slow", "wins") == ("wins", 1.0)
+    assert asked == {"never": 0, "early": 0, "slow": RACE, "wins": 20}
+    assert race("early", "slow") == ("early", 9.0)
+    assert list(afresh(nothing, nothing, nothing, nothing, cast("Any", ("never",)))) == []
