@@ -34,6 +34,8 @@ FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene'
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
 SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
 SMALLEST = 0.3  # decrease of the cost that is worth another step
+CRAWLING = 5.0  # times that, below which a step is a small one: the valley is bent, or its slopes are not known well
+PROBE = 0.02  # of the box: how far along a step its bend is measured
 BESIDE = 0.05  # of a box: a motion as near as this is near enough to begin beside
 FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
 
@@ -117,20 +119,21 @@ def thoroughly(
 ) -> Iterator[Fit]:
     """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last.
 
-    One-sided differences point the way until they lead no further; then they are central.
+    One-sided differences point the way until they lead no further, or hardly. Then they are central, and steps follow
+    the bend of the valley as well (geodesic acceleration: Transtrum and Sethna 2012, Sec. 3).
     """
-    look, every, sides = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool), 1
-    now = _measured(look, _at(look, start), every, sides)
+    look, every, bent = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool), False
+    now = _measured(look, _at(look, start), every, 1)
     for _ in range(steps):
         yield now
-        better, gain = _step(look, now, MANY)
-        ends = better is None or _settles(stack, now, better, 1.0 if sides == 2 else gain)
-        if ends and sides == 2:
+        better, gain = _step(look, now, MANY, bent=bent)
+        ends = better is None or _settles(stack, now, better, 1.0 if bent else gain)
+        if ends and bent:
             yield replace(_measured(look, better, every), converged=True) if better else replace(now, converged=True)
             return
-        sides = 2 if ends else sides
-        now = _measured(look, better or now, every, sides)
-    yield now if sides == 2 else _measured(look, now, every)
+        bent = bent or better is None or _gained_little(stack, now, better, CRAWLING)
+        now = _measured(look, better or now, every, 2 if bent else 1)
+    yield now if bent else _measured(look, now, every)
 
 
 def measured(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> Fit:
@@ -142,8 +145,12 @@ def measured(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> 
 
 def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
     """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
+    return _gained_little(stack, before, after) and gain > GOOD / 2
+
+
+def _gained_little(stack: Stack, before: Fit, after: Fit, times: float = 1.0) -> bool:
     whole = stack.trust(before.coefficients) * stack.chi_squared(before.coefficients)
-    return before.cost - after.cost <= max(SMALLEST, SETTLED * whole) and gain > GOOD / 2
+    return before.cost - after.cost <= times * max(SMALLEST, SETTLED * whole)
 
 
 def bounded(curvature: Array, slope: Array, unit: Array, damping: Array) -> Array:
@@ -204,18 +211,20 @@ def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
     return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
 
 
-def _step(look: _Look, fit: Fit, tried: tuple[Array, Array]) -> tuple[Fit | None, float]:
-    """The best of several damped steps, its Jacobian improved by what they show, and gain over promise."""
-    scale = look.stack.scale
-    white, slopes = fit.coefficients / scale, fit.jacobian / scale[:, None]
-    trust = look.stack.trust(fit.coefficients)
-    curvature = trust * slopes.T @ slopes + np.eye(len(fit.unit)) / PRIOR**2
-    slope = trust * slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
-    own = np.clip(fit.damping * tried[0], LEAST_DAMPING, LARGEST_DAMPING)
-    dampings = [*np.outer(own, np.diag(curvature)), *np.outer(tried[1] / PRIOR**2, np.ones(len(fit.unit)))]
-    moves = np.array([bounded(curvature, slope, fit.unit, d) for d in dampings])
+def _step(look: _Look, fit: Fit, tried: tuple[Array, Array], *, bent: bool = False) -> tuple[Fit | None, float]:
+    """The best of several damped steps, its Jacobian improved by what they show, and gain over promise.
+
+    ``bent`` asks for steps along the bend of the valley as well.
+    """
+    damped = _Damped(look.stack, fit, tried)
+    moves = np.array([damped.move(d) for d in damped.dampings])
+    bends = np.zeros((len(moves), len(fit.coefficients)))
+    if bent:
+        every, bends = _bends(look, fit, moves[::2]), np.concatenate([bends, bends[::2]])
+        moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], every, strict=True)]])
+        bends[-len(every) :] = every
     units = np.clip(fit.unit + moves, 0.0, 1.0)
-    promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T, units)
+    promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T + bends, units)
     if promised.max() <= 1e-9 * fit.cost:
         return None, 0.0
     found, reasons, residuals = look.at(units, fit.near)
@@ -236,9 +245,36 @@ def _step(look: _Look, fit: Fit, tried: tuple[Array, Array]) -> tuple[Fit | None
         tuple(r[k] for r in residuals),
         float(cost[k]),
         fit.near if np.abs(units[k] - fit.near).max() <= BESIDE else units[k],
-        float(own[k]) if k < len(own) else fit.damping,
+        float(damped.own[k]) if k < len(damped.own) else fit.damping,
     )
     return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))
+
+
+class _Damped:
+    """Steps from a fit with several dampings: [S, F] of all, ``own`` by parts of each gene's own curvature."""
+
+    def __init__(self, stack: Stack, fit: Fit, tried: tuple[Array, Array]) -> None:
+        white, self.slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+        self.trust, self.unit, self.scale = stack.trust(fit.coefficients), fit.unit, stack.scale
+        self.curvature = self.trust * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR**2
+        self.slope = self.trust * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
+        self.own = np.clip(fit.damping * tried[0], LEAST_DAMPING, LARGEST_DAMPING)
+        by_box = np.outer(tried[1] / PRIOR**2, np.ones(len(fit.unit)))
+        self.dampings = np.concatenate([np.outer(self.own, np.diag(self.curvature)), by_box])
+
+    def move(self, damping: Array, bend: Array | float = 0.0) -> Array:
+        """The step [F] with a ``damping`` [F], where coefficients change by ``bend`` [D] beside its slopes."""
+        bent = self.trust * self.slopes.T @ np.broadcast_to(bend / self.scale, len(self.scale))
+        return bounded(self.curvature, self.slope + bent, self.unit, damping)
+
+
+def _bends(look: _Look, fit: Fit, moves: Array) -> Array:
+    """[S, D] of ``moves`` [S, F]: what coefficients change along each beside its slopes, by their second derivative."""
+    part = np.minimum(1.0, PROBE / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
+    found, reasons, _ = look.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.near)
+    bends = (found - fit.coefficients - part * moves @ fit.jacobian.T) / part**2
+    bends[[reason is not None for reason in reasons]] = 0.0
+    return np.asarray(bends)
 
 
 def _broyden(jacobian: Array, move: Array, change: Array) -> Array:

@@ -15,7 +15,7 @@ import pytest
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis.assess import Assessment, _elsewhere
-from diagnosis.fit import Fit, _Look, _measured, thoroughly
+from diagnosis.fit import MANY, Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal
 from diagnosis.refit import RACE, afresh, judged, left_out
@@ -194,3 +194,26 @@ def test_of_several_suspects_the_best_goes_on_alone(monkeypatch: pytest.MonkeyPa
     assert asked == {"never": 0, "early": 0, "slow": RACE, "wins": 20}
     assert race("early", "slow") == ("early", 9.0)
     assert list(afresh(nothing, nothing, nothing, nothing, cast("Any", ("never",)))) == []
+
+
+def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
+    """Rosenbrock's valley: its floor is a parabola, and a straight step is only as long as its walls allow."""
+
+    def at(units: Array, near: Array) -> tuple[Array, tuple[None, ...], list[Array]]:  # noqa: ARG001
+        u, v = units.T
+        return np.stack([3e4 * (v - 3.0 * (u - 0.1) ** 2), 30.0 * (0.6 - u)], axis=1), (None,) * len(units), []
+
+    def surprise(coefficients: Array) -> Array:
+        return np.asarray((coefficients**2).sum(axis=-1))
+
+    stack = SimpleNamespace(scale=np.ones(2), trust=lambda coefficients: 1.0, surprise=surprise)  # noqa: ARG005
+    look = cast(_Look, SimpleNamespace(stack=stack, at=at))
+    unit = np.array([0.1, 0.0])
+    here = at(unit[None], unit)[0][0]
+    slopes = np.array([[0.0, 3e4], [-30.0, 0.0]])
+    cost = float(surprise(here) + 4.0 * ((unit - 0.5) ** 2).sum())
+    fit = Fit(cast(Any, None), unit, here, slopes, (), cost, unit)
+    (straight, _), (bent, _) = (_step(look, fit, MANY, bent=one) for one in (False, True))
+    assert straight is not None
+    assert bent is not None
+    assert cost - bent.cost > 2.0 * (cost - straight.cost)
