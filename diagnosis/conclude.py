@@ -163,6 +163,7 @@ def _finding(
         summary=summary(decision, suspects, _told(stack, nominal, best, lies.words, proved)),
         probabilities=decision.probabilities,
         named=decision.named,
+        put_in=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / stack.noise**2)),
         floors=_floors(state, division),
         hypotheses=hypotheses(stack, weighed, state.trials),

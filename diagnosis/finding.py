@@ -268,6 +268,8 @@ class Finding:
         summary: it in a few sentences for people.
         probabilities: of every verdict; they sum to one.
         named: effects that the verdict names (one or more); of an ambiguous one, those that cannot be told apart.
+        put_in: effects in the model that is called "after": those named, the most probable of an ambiguous verdict, the
+            nearest of an unnamed one if they take as much as they cost; else empty.
         strength: misfit after the best nominal refit over the noise, d.
         floors: how small a misfit can be.
         hypotheses: most probable first; the nominal model is among them.
@@ -292,6 +294,7 @@ class Finding:
     summary: str
     probabilities: dict[str, float]
     named: tuple[str, ...]
+    put_in: tuple[str, ...]
     strength: float
     floors: Floors
     hypotheses: tuple[Hypothesis, ...]

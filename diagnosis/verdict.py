@@ -53,8 +53,8 @@ def decided(weighed: Weighed) -> Decision:
         best = refits[top]
     else:
         verdict = "adequate" if nominal >= weighed.unknown + total else "unnamed"
-        if verdict == "unnamed" and len(effects):
-            best = refits[top]
+        if verdict == "unnamed" and weighed.evidence[1:].max(initial=0.0) > 0.0:  # the nearest is put in if it earns it
+            best = refits[int(np.argmax(weighed.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()
     if verdict == "ambiguous":
@@ -151,7 +151,9 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[s
         return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
     if decision.verdict == "unnamed":
         return f"Something is lacking that nothing in the library explains: {told['where']}. {start} " + (
-            f"The nearest that there is, {nearest}, leaves {told['after']}." if nearest else "No effect takes anything."
+            f"The nearest that there is, {nearest}, leaves {told['after']}."
+            if nearest
+            else "No effect takes as much of it as it costs, and none was put in."
         )
     if decision.verdict == "ambiguous":
         return (

@@ -62,7 +62,7 @@ def _parts(finding: Finding) -> list[object]:
     return [
         *_verdict(finding),
         _section(
-            _PROVED if finding.verdict != "adequate" else "How well the model fits",
+            _PROVED if finding.put_in else "How well the model fits",
             misfits.proof(finding),
             misfits.recordings(finding),
         ),

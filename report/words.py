@@ -129,13 +129,13 @@ def best_of(finding: Finding) -> Hypothesis | None:
 
 def stages(finding: Finding) -> dict[str, str]:
     """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
-    if finding.verdict == "adequate":
+    if not finding.put_in:
         return {"before": "nominal model, refitted"}
     return {"before": "before: nominal model, refitted", "after": f"after: with {what_was_put_in(finding)}"}
 
 
 def what_was_put_in(finding: Finding) -> str:
-    """Of a finding that is not adequate, what its "after" has: in one without a name, what comes nearest."""
+    """Of a finding that has an "after", what that has: in one without a name, what comes nearest."""
     return "what was found" if finding.named else "the nearest in the library, which it is not"
 
 

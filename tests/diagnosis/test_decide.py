@@ -69,6 +69,12 @@ def test_what_leaves_most_is_no_name() -> None:
     assert verdict(3.0, refit(2.2, ("a",)), refit(2.5, ("b",))) == ("unnamed", ())
 
 
+@pytest.mark.parametrize(("left", "put_in"), [(1.5, ("a",)), (2.9, ())])
+def test_the_nearest_is_put_in_only_where_it_takes_as_much_as_it_costs(left: float, put_in: tuple[str, ...]) -> None:
+    found = decided(weighed(stack(), refit(3.0), [refit(left, ("a",), 2), refit(2.95, ("b",), 2)], 0.0, 40))
+    assert (found.verdict, found.best.names) == ("unnamed", put_in)
+
+
 def test_a_second_effect_must_earn_its_place() -> None:
     assert verdict(3.0, refit(0.4, ("a",)), refit(0.35, ("a", "b"), 1)) == ("named", ("a",))
     found = verdict(3.0, refit(1.4, ("a",)), refit(0.2, ("a", "b"), 1))

@@ -187,6 +187,7 @@ def wing_finding() -> Finding:
         "drive has a second harmonic of 3.55°. With both put in, the misfit on held-out recordings falls to the floor.",
         probabilities=probabilities("named"),
         named=BOTH,
+        put_in=BOTH,
         strength=5.12,
         floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083, ("Noise rests on 6 beats only.",)),
         hypotheses=hypotheses,
@@ -272,14 +273,18 @@ def with_verdict(finding: Finding, verdict: Verdict) -> Finding:
     """The same with another verdict and what goes with it."""
     changed = replace(finding, verdict=verdict, probabilities=probabilities(verdict), summary=f"It is {verdict}.")
     if verdict == "adequate":
-        return replace(changed, named=(), where=None, missing=(), proof=None, advice=(), strength=1.02)
+        return replace(changed, named=(), put_in=(), where=None, missing=(), proof=None, advice=(), strength=1.02)
     if verdict == "unnamed":
         terms = (
             Term("rho V^2 c", around(0.31, 0.05), "1"),
             Term("rho c^2 dV/dt", Interval(-0.08, None, -0.02), "N s^2/m^4"),
         )
         return replace(changed, named=(), law=FreeLaw("A load that grows with the square of speed.", terms, 0.87))
-    return replace(changed, named=("camera_rotation",)) if verdict == "measurement fault" else changed
+    return (
+        replace(changed, named=("camera_rotation",), put_in=("camera_rotation",))
+        if verdict == "measurement fault"
+        else changed
+    )
 
 
 def bare(finding: Finding) -> Finding:
