@@ -23,6 +23,7 @@ from diagnosis.refit import (
     partners,
     refitted,
     resumed,
+    substitutes,
     worth_a_refit,
 )
 from diagnosis.screen import Trial, screened
@@ -38,6 +39,7 @@ HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not 
 RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RUNNERS = 3  # suspects that are fitted from the estimates
 RIVALS = 3  # explanations to which a partner is sought
+SUBSTITUTES = 2  # tried in place of each part of an explanation of several
 
 
 @dataclass
@@ -191,6 +193,7 @@ def _refits(
     if _solved(state, nominal, evaluator):
         return
     yield from _together(state, nominal, evaluator)
+    yield from _exchanged(state, nominal, evaluator)
     yield 0.97, "continuing the best refits"
     _solved(state, nominal, evaluator)
 
@@ -246,6 +249,21 @@ def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iter
             tried.add(names)
             yield 0.94, f"refit with {' and '.join(sorted(names))}"
             _add(state, refitted(state.subject, stack, fit, evaluator, two))
+
+
+def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+    """Each part of the best explanation exchanged for what can do the same: one of two may have been found first."""
+    best = min(state.refits, key=lambda one: one.excess)
+    if len(best.trials) < 2:
+        return
+    tried = {frozenset(one.names) for one in state.refits}
+    for part in best.trials:
+        others = [trial for trial in best.trials if trial is not part]
+        for trial in substitutes(state.stack, evaluator, best, part, state.trials, SUBSTITUTES):
+            names = frozenset(one.suspect.name for one in (*others, trial))
+            if names not in tried:
+                yield 0.96, f"refit with {' and '.join(sorted(names))}"
+                _add(state, refitted(state.subject, state.stack, nominal.refit.fit, evaluator, [*others, trial]))
 
 
 def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:

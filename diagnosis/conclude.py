@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
-from calibration.problem import Problem
 from diagnosis import maps
 from diagnosis.advise import advised, separations
 from diagnosis.assess import Assessment
@@ -18,7 +17,7 @@ from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
 from diagnosis.fit import measured
 from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
-from diagnosis.refit import Refit
+from diagnosis.refit import Refit, action
 from diagnosis.stack import Stack
 from diagnosis.unexplained import MOST, Unexplained, missing_forces, probed_recordings, unexplained
 from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
@@ -90,8 +89,8 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
     """Where the misfit lies; of an effect that is named, where this acts: the fit smears a misfit over the beat."""
     coefficients = _nominal(state).fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        action = _action(state, best, evaluator)
-        coefficients = coefficients if action is None else action
+        acts = action(state.stack, evaluator, best)
+        coefficients = coefficients if acts is None else acts
     found = where(state.stack, maps.pieces(state.subject, state.stack, coefficients), coefficients)
     held = _nominal(state) if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
     span, chord = (_placed(held, "span") or lacking.span, _placed(held, "chord") or lacking.chord)
@@ -115,16 +114,6 @@ def _placed(best: Refit, along: str) -> Interval | None:
             value = best.fit.values[gene]
             return Interval(value, None, None)
     return None
-
-
-def _action(state: Assessment, best: Refit, evaluator: Evaluator) -> Array | None:
-    """What switching the effects off changes of the coefficients [D], all other genes as they are."""
-    fit, off = best.fit, dict(best.fit.values)
-    for trial in best.trials:
-        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.sizes}
-    problem = Problem(fit.problem.model, state.stack.recordings, fit.problem.free, fit.problem.base, state.stack.axes)
-    found, reasons, _ = state.stack.evaluate(problem, evaluator, np.array([list(off.values())]))
-    return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
 
 
 def _finding(

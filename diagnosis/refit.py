@@ -26,6 +26,7 @@ RACE = 6  # of several from there, before the best goes on alone
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
+ALIKE = 0.8  # of what a suspect does: another that can do as much is tried in its place
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
 BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
 CHANCE = 4.0  # times what noise makes of a prediction on average: so much it makes by chance (chi-squared of one)
@@ -237,6 +238,38 @@ def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int 
     scored.sort(key=lambda pair: -pair[0])
     worth = HELPS * (float(left @ left) - len(left))
     return [trial for gain, trial in scored[:most] if gain > worth]
+
+
+def action(stack: Stack, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
+    """What switching off the suspects of ``trials`` (all, if none is given) changes of the coefficients [D].
+
+    All other genes stay as they are. None where that cannot be simulated.
+    """
+    fit, off = refit.fit, dict(refit.fit.values)
+    for trial in trials or refit.trials:
+        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.sizes}
+    found, reasons, _ = stack.evaluate(fit.problem, evaluator, np.array([list(off.values())]))
+    return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
+
+
+def substitutes(
+    stack: Stack, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], most: int
+) -> list[Trial]:
+    """Trials of other suspects that can do nearly all of what one of those of ``refit`` does; the likest first."""
+    change = action(stack, evaluator, refit, [trial])
+    if change is None:
+        return []
+    own = {gene.name for gene in trial.suspect.genes}
+    kept = np.array([name not in own for name in refit.fit.problem.free])
+    nuisance = Nuisance(stack, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
+    done, scored = nuisance.rest(change), []
+    for trials in found:
+        if trials and trials[0].suspect.name not in refit.names:
+            gains = [_gain(nuisance.rest(one.fields), done) for one in trials]
+            k = int(np.argmax(gains))
+            scored.append((gains[k], trials[k]))
+    scored.sort(key=lambda pair: -pair[0])
+    return [one for gain, one in scored[:most] if gain > ALIKE * float(done @ done)]
 
 
 def pairs(

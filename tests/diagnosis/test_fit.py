@@ -18,8 +18,8 @@ from diagnosis.assess import Assessment, _elsewhere
 from diagnosis.fit import MANY, Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal
-from diagnosis.refit import RACE, afresh, judged, left_out
-from diagnosis.screen import Nuisance
+from diagnosis.refit import RACE, afresh, judged, left_out, refitted, substitutes
+from diagnosis.screen import Nuisance, screened
 from diagnosis.stack import PIECES, TOLERANCE, Stack
 from tests.diagnosis.pendulum_rig import PendulumRig, recorded
 from workers.in_process import InProcessEvaluator
@@ -217,3 +217,16 @@ def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
     assert straight is not None
     assert bent is not None
     assert cost - bent.cost > 2.0 * (cost - straight.cost)
+
+
+def test_a_part_of_an_explanation_is_exchanged_only_for_what_can_do_the_same() -> None:
+    stack = stacked(friction_torque=2e-3, delay_time=4e-3)
+    nominal = fit(stack)
+    found = [trials for _, trials in screened(RIG, stack, nominal, EVALUATOR, RIG.suspects)]
+    best = {trials[0].suspect.name: trials[0] for trials in found}
+    both = refitted(RIG, stack, nominal, EVALUATOR, [best["friction"], best["delay"]])
+    assert both is not None
+    twin = replace(best["delay"], suspect=replace(best["delay"].suspect, name="twin"))
+    offered = [*found, [twin]]
+    assert substitutes(stack, EVALUATOR, both, best["delay"], offered, 2) == [twin]
+    assert substitutes(stack, EVALUATOR, both, best["friction"], offered, 2) == []
