@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
-from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
+from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.fit import Fit
 from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
 from diagnosis.refit import (
+    LAST,
     Refit,
     afresh,
     again,
@@ -30,6 +31,7 @@ from diagnosis.screen import Trial, screened
 from diagnosis.spec import DiagnosisSpec
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject, Suspect
+from diagnosis.verdict import decided
 
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
@@ -98,9 +100,17 @@ def assess(
     yield 0.92, "comparing with a finer division"
     if spec.refine:
         _refined(state, nominal, evaluator)
+    yield 0.95, "fitting the best explanation to its end"
     floor = 0.0 if spec.refine else nominal.division or 0.0
-    first = state.nominal or nominal
-    state.weighed = weighed(stack, first.refit, state.refits, floor, len(suspects))
+    state.weighed = _weighed(state, floor, suspects)
+    best = decided(state.weighed).best
+    if best.trials and not (best.fit.converged and best.fit.fresh):
+        _add(state, continued(state.subject, stack, evaluator, best, LAST))
+        state.weighed = _weighed(state, floor, suspects)
+
+
+def _weighed(state: Assessment, floor: float, suspects: Sequence[Suspect]) -> Weighed:
+    return weighed(state.stack, _known(state).refit, state.refits, floor, len(suspects))
 
 
 def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
@@ -141,8 +151,12 @@ def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) 
     changes, takes = leaves(finer, stack, evaluator, refit)
     if not changes:
         return None
-    promising = takes > PROMISING and matters(stack, changes, refit)
-    return again(finer, stack, evaluator, refit) if promising else refit
+    if takes <= PROMISING or not matters(stack, changes, refit):
+        return refit
+    found = again(finer, stack, evaluator, refit)
+    if found is None or found.fit.converged or improves(found, refit):
+        return found
+    return continued(finer, stack, evaluator, found)
 
 
 def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
@@ -187,11 +201,15 @@ def _known(state: Assessment) -> Nominal:
 def _refits(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
-    """Suspects one by one, then together as long as none explains enough."""
+    """Suspects one by one, from the estimates where none could be named, then together while none explains enough."""
     yield from _alone(state, nominal, spec, evaluator)
-    yield 0.8, "continuing the best refits"
+    yield 0.72, "continuing the best refits"
     if _solved(state, nominal, evaluator):
         return
+    if min(one.excess for one in state.refits) > UNKNOWN**2 * nominal.refit.excess:
+        yield from _afresh(state, spec, evaluator)
+        if _enough(state, nominal):
+            return
     yield from _together(state, nominal, evaluator)
     yield from _exchanged(state, nominal, evaluator)
     yield 0.97, "continuing the best refits"
@@ -206,14 +224,12 @@ def _alone(
     for k, trial in enumerate(chosen):
         if _outdone(state, nominal, trial, chosen[0]):
             continue
-        yield 0.6 + 0.2 * k / len(chosen), f"refit with {trial.suspect.name}"
+        yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
-    if not _enough(state, nominal):
-        yield from _afresh(state, spec, evaluator)
 
 
 def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
-    """Suspects that explain most about the estimates, from there.
+    """Suspects that explain most about the estimates, from there, unless they have been refitted.
 
     About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
     """
@@ -225,7 +241,9 @@ def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
     best: tuple[Trial, Fit] | None = None
-    for best in afresh(state.subject, state.stack, evaluator, begun, worth_a_refit(found, RUNNERS)):
+    known = {name for one in state.refits for name in one.names}
+    runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
+    for best in afresh(state.subject, state.stack, evaluator, begun, runners):
         yield 0.77, f"refit with {best[0].suspect.name} from the estimates"
     if best is not None:
         _add(state, judged(state.stack, best[1], [best[0]]))

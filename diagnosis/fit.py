@@ -25,11 +25,10 @@ Flags = npt.NDArray[np.bool_]
 
 STEP = 0.003  # of the box, of finite differences
 PRIOR = 0.5  # standard deviation of a gene in parts of its box
-# Steps tried at once: a group of lanes, or two. Damping by parts of each gene's own curvature (Marquardt 1963), about
+# Steps tried at once: a group of lanes. Damping by parts of each gene's own curvature (Marquardt 1963), about
 # the last good part, suits genes that are told one by one; damping by parts of the box (Levenberg 1944) leads along
 # the bent valleys of stiffnesses that make up for each other.
-FEW = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
-MANY = (10.0 ** np.array([-4, -2, -1, -0.5, 0, 0.5, 1, 2]), 10.0 ** np.array([0, 1, 2, 2.5, 3, 4, 5, 6]))
+TRIED = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
 SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
@@ -100,7 +99,7 @@ def fitted(
     if columns.any() and not columns.all():
         again.append(~columns)
     for _ in range(steps):
-        better, gain = _step(look, now, FEW)
+        better, gain = _step(look, now)
         if better is None:
             if now.fresh or not again:
                 return replace(now, converged=now.fresh)
@@ -126,7 +125,7 @@ def thoroughly(
     now = _measured(look, _at(look, start), every, 1)
     for _ in range(steps):
         yield now
-        better, gain = _step(look, now, MANY, bent=bent)
+        better, gain = _step(look, now, bent=bent)
         ends = better is None or _settles(stack, now, better, 1.0 if bent else gain)
         if ends and bent:
             yield replace(_measured(look, better, every), converged=True) if better else replace(now, converged=True)
@@ -211,12 +210,12 @@ def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
     return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
 
 
-def _step(look: _Look, fit: Fit, tried: tuple[Array, Array], *, bent: bool = False) -> tuple[Fit | None, float]:
+def _step(look: _Look, fit: Fit, *, bent: bool = False) -> tuple[Fit | None, float]:
     """The best of several damped steps, its Jacobian improved by what they show, and gain over promise.
 
     ``bent`` asks for steps along the bend of the valley as well.
     """
-    damped = _Damped(look.stack, fit, tried)
+    damped = _Damped(look.stack, fit)
     moves = np.array([damped.move(d) for d in damped.dampings])
     bends = np.zeros((len(moves), len(fit.coefficients)))
     if bent:
@@ -253,13 +252,13 @@ def _step(look: _Look, fit: Fit, tried: tuple[Array, Array], *, bent: bool = Fal
 class _Damped:
     """Steps from a fit with several dampings: [S, F] of all, ``own`` by parts of each gene's own curvature."""
 
-    def __init__(self, stack: Stack, fit: Fit, tried: tuple[Array, Array]) -> None:
+    def __init__(self, stack: Stack, fit: Fit) -> None:
         white, self.slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
         self.trust, self.unit, self.scale = stack.trust(fit.coefficients), fit.unit, stack.scale
         self.curvature = self.trust * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR**2
         self.slope = self.trust * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
-        self.own = np.clip(fit.damping * tried[0], LEAST_DAMPING, LARGEST_DAMPING)
-        by_box = np.outer(tried[1] / PRIOR**2, np.ones(len(fit.unit)))
+        self.own = np.clip(fit.damping * TRIED[0], LEAST_DAMPING, LARGEST_DAMPING)
+        by_box = np.outer(TRIED[1] / PRIOR**2, np.ones(len(fit.unit)))
         self.dampings = np.concatenate([np.outer(self.own, np.diag(self.curvature)), by_box])
 
     def move(self, damping: Array, bend: Array | float = 0.0) -> Array:

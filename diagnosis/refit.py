@@ -21,11 +21,12 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
-AFRESH = 20  # of one from the estimates
-RACE = 6  # of several from there, before the best goes on alone
+LAST = 20  # of the best, to its end
+AFRESH = 14  # of one from the estimates
+RACE = 5  # of several from there, before the best goes on alone
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
-HELPS = 0.3  # of what an explanation leaves: a partner that would take less is not tried
+HELPS = 0.5  # of what an explanation leaves: a partner that would take less is not tried
 ALIKE = 0.8  # of what a suspect does: another that can do as much is tried in its place
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
 BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
@@ -167,10 +168,10 @@ def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) ->
     return judged(stack, fit, refit.trials)
 
 
-def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit:
+def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, steps: int = FURTHER) -> Refit:
     """``refit`` fitted further, with all slopes measured at every step."""
     fit = refit.fit
-    for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, FURTHER):
+    for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
         fit = better
     return judged(stack, fit, refit.trials)
 

@@ -54,7 +54,7 @@ FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
 VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
 SMALL = (FINER, EQUAL, FINER, FINER, EQUAL, FINER, FINER, FINER, EQUAL, FINER, EQUAL, FINER)
-WINGS = (*SMALL[:6], ELEVEN, *SMALL, ELEVEN_FINER, *SMALL[6:])
+WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "filt
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
 OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
-COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 40, "advice": 30}
+COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 28, "advice": 20}
 QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
 QUICK_KINDS = 3  # every third kind of the listed and the unlisted ones is in the sample
 
@@ -140,7 +140,7 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """Drafts of a group: ``n`` in all, or of each ``thinned``-th kind of the listed and the unlisted."""
     if group == "null":
         vehicles = (VEHICLE, BARE)
-        wings = (FINER, EQUAL, FINER, EQUAL, FINER, ELEVEN_FINER)
+        wings = (*SMALL, ELEVEN_FINER)
         builds = [one for wing in wings for one in (wing, *vehicles)]
         large = (WHOLE, WHOLE_FINER)[: n // 50]
         yield from (_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large))))

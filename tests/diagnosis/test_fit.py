@@ -15,7 +15,7 @@ import pytest
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis.assess import Assessment, _elsewhere
-from diagnosis.fit import MANY, Fit, _Look, _measured, _step, thoroughly
+from diagnosis.fit import Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal
 from diagnosis.refit import RACE, afresh, judged, left_out, refitted, substitutes
@@ -213,7 +213,7 @@ def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
     slopes = np.array([[0.0, 3e4], [-30.0, 0.0]])
     cost = float(surprise(here) + 4.0 * ((unit - 0.5) ** 2).sum())
     fit = Fit(cast(Any, None), unit, here, slopes, (), cost, unit)
-    (straight, _), (bent, _) = (_step(look, fit, MANY, bent=one) for one in (False, True))
+    (straight, _), (bent, _) = (_step(look, fit, bent=one) for one in (False, True))
     assert straight is not None
     assert bent is not None
     assert cost - bent.cost > 2.0 * (cost - straight.cost)
