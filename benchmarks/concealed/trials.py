@@ -115,7 +115,7 @@ PAIRS_WING = (
     ("drive_harmonics", "leading_edge_vortex"),
     ("camera_shift", "added_mass"),
 )
-PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "filter_delay"))
+PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "balance_tilt"))
 # Hidden in few conditions that are alike, so that another explanation may be as good: delays look like lags, tilted
 # hinges like turned cameras.
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
