@@ -138,7 +138,7 @@ def _finding(
     proved = None
     if seen is not None:
         rows += recording_misfits(seen, held_out=True, floor=division)
-        proved = proof(seen, division, unit)
+        proved = proof(seen, division, unit, put_in=bool(best.names))
         if not seen.failed:
             shown += maps.overlays(subject, seen.stack, seen.before, seen.after, held_out=True)
     before, after = (maps.pieces(subject, stack, one.fit.coefficients) for one in (nominal, best))

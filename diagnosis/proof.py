@@ -68,17 +68,20 @@ def recording_misfits(predicted: Predicted, *, held_out: bool, floor: float) -> 
     return tuple(rows)
 
 
-def proof(predicted: Predicted, floor: float, unit: str) -> Proof:
-    """What the held-out recordings say of both models together; ``floor`` as in :func:`recording_misfits`."""
+def proof(predicted: Predicted, floor: float, unit: str, *, put_in: bool) -> Proof:
+    """What the held-out recordings say of both models together; ``floor`` as in :func:`recording_misfits`.
+
+    ``put_in``: whether the models differ.
+    """
     stack = predicted.stack
     used, kinds = [view.used for view in stack.views], [one.kind for one in stack.recordings]
     before, after, better = _misfits(predicted, used, kinds)
     least = float(np.hypot(stack.noise, floor))
     told = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
-    words = (
-        f"{len(stack.recordings)} held-out recordings: {told[0] * before.value:.3g} {told[1]} before, "
-        f"{told[0] * after.value:.3g} {told[1]} after, {after.value / least:.2f} times the floor"
-    )
+    change = f"{told[0] * before.value:.3g} {told[1]}"
+    if put_in:
+        change += f" before, {told[0] * after.value:.3g} {told[1]} after"
+    words = f"{len(stack.recordings)} held-out recordings: {change}, {after.value / least:.2f} times the floor"
     if predicted.failed:
         words += f"; {predicted.failed[0]}"
     return Proof(_over(before, least), _over(after, least), least, better, words)

@@ -33,7 +33,8 @@ def proof(finding: Finding) -> Markup | None:
     parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings, over the floor")]
     for k, (name, interval) in enumerate(rows):
         y = 34.0 + 38 * k
-        parts.append(text(LEFT, y - 10, f"{name}: {number(interval.value)} ({_range(interval)})", class_="said"))
+        said = f"{number(interval.value)} ({_range(interval)})"
+        parts.append(text(LEFT, y - 10, f"{name}: {said}" if len(rows) > 1 else said, class_="said"))
         parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
         parts.append(whisker(along, y + 1, (interval.low, interval.high), interval.value, name))
     return figure(
