@@ -169,10 +169,16 @@ def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) ->
 
 
 def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, steps: int = FURTHER) -> Refit:
-    """``refit`` fitted further, with all slopes measured at every step."""
+    """``refit`` fitted further, with all slopes measured at every step; as it is where that cannot be simulated.
+
+    An individual that was reached beside another may flutter when it begins from rest.
+    """
     fit = refit.fit
-    for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
-        fit = better
+    try:
+        for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
+            fit = better
+    except ValueError:
+        return refit
     return judged(stack, fit, refit.trials)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.decide import ALIKE, KNOWN, SURE, Weighed
+from diagnosis.decide import ALIKE, DOUBT, KNOWN, SURE, Weighed
 from diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from diagnosis.intervals import gene_values
 from diagnosis.refit import Refit
@@ -53,7 +53,9 @@ def decided(weighed: Weighed) -> Decision:
         best = refits[top]
     else:
         verdict = "adequate" if nominal >= weighed.unknown + total else "unnamed"
-        if verdict == "unnamed" and weighed.evidence[1:].max(initial=0.0) > 0.0:  # the nearest is put in if it earns it
+        if (
+            verdict == "unnamed" and weighed.evidence[1:].max(initial=0.0) > DOUBT
+        ):  # the nearest is put in if it earns it
             best = refits[int(np.argmax(weighed.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()
