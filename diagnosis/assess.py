@@ -40,13 +40,17 @@ CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RUNNERS = 3  # suspects that are fitted from the estimates
+RIGHT = 0.2  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
 RIVALS = 3  # explanations to which a partner is sought
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
 
 
 @dataclass
 class Assessment:
-    """What is known so far; ``evaluations`` counts individuals. ``begun`` is the nominal model at the estimates."""
+    """What is known so far; ``evaluations`` counts individuals.
+
+    ``begun`` is the nominal model at the estimates; ``afresh``: whether suspects were fitted from there.
+    """
 
     subject: Subject
     stack: Stack
@@ -56,6 +60,7 @@ class Assessment:
     weighed: Weighed | None = None
     evaluations: int = 0
     begun: tuple[Subject, Fit] | None = None
+    afresh: bool = False
 
 
 @dataclass(frozen=True)
@@ -96,21 +101,30 @@ def assess(
         state.nominal, state.trials, state.refits = replace(state.nominal, refit=better), [], []
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
-    nominal = state.nominal
     yield 0.92, "comparing with a finer division"
     if spec.refine:
-        _refined(state, nominal, evaluator)
-    yield 0.95, "fitting the best explanation to its end"
-    floor = 0.0 if spec.refine else nominal.division or 0.0
-    state.weighed = _weighed(state, floor, suspects)
+        _refined(state, state.nominal, evaluator)
+    for stage in _doubted(state, spec, evaluator):
+        yield 0.93, stage
+    yield 0.94, "continuing the best refits"
+    if state.refits:
+        _solved(state, state.nominal, evaluator)
+    yield 0.96, "fitting the best explanation to its end"
+    floor = 0.0 if spec.refine else _known(state).division or 0.0
+    state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
     best = decided(state.weighed).best
     if best.trials and not (best.fit.converged and best.fit.fresh):
         _add(state, continued(state.subject, stack, evaluator, best, LAST))
-        state.weighed = _weighed(state, floor, suspects)
+        state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
 
 
-def _weighed(state: Assessment, floor: float, suspects: Sequence[Suspect]) -> Weighed:
-    return weighed(state.stack, _known(state).refit, state.refits, floor, len(suspects))
+def _doubted(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+    """Rivals from the estimates to an explanation that leaves more than one that is right: its look-alike may be."""
+    if state.afresh or not state.refits:
+        return
+    best = min(state.refits, key=lambda one: one.excess)
+    if best.excess > tolerated(state.stack, 0.0, 0.0) + RIGHT**2 * _known(state).refit.excess:
+        yield from (stage for _, stage in _afresh(state, spec, evaluator, best.names))
 
 
 def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
@@ -228,20 +242,21 @@ def _alone(
         _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
 
 
-def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
-    """Suspects that explain most about the estimates, from there, unless they have been refitted.
+def _afresh(
+    state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator, known: Sequence[str] = ()
+) -> Iterator[tuple[float, str]]:
+    """Suspects that explain most about the estimates, from there; not those that are ``known`` well enough.
 
     About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
     """
     if state.begun is None:
         raise ValueError("the nominal model has not been fitted")
     subject, begun = state.begun
-    found = []
+    state.afresh, found = True, []
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
     best: tuple[Trial, Fit] | None = None
-    known = {name for one in state.refits for name in one.names}
     runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
     for best in afresh(state.subject, state.stack, evaluator, begun, runners):
         yield 0.77, f"refit with {best[0].suspect.name} from the estimates"
