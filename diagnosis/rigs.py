@@ -35,6 +35,7 @@ MOST_ELEMENTS = 640
 CONVERGED = 1e-3  # of the root mean square force: far below what any balance tells
 MOST_CONDITIONS = 40
 MERGED = 0.05  # of the range of a variable: conditions nearer than that are meant to be the same
+SPOTS = 64  # markers of which a fault is tried
 _PLACES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
 
 
@@ -107,8 +108,7 @@ class WingSubject:
         wing, planform, found = self.model.wing, Planform(self.model.wing), []
         for name in recording.markers:
             x, y, _ = wing.marker(name).position
-            span = float(np.clip((y - wing.stations[0].y) / wing.span, 0.0, 1.0))
-            found += [Place(name, axis, span, planform.fraction(x, y), x, y) for axis in "xyz"]
+            found += [Place(name, axis, _station(wing, y), planform.fraction(x, y), x, y) for axis in "xyz"]
         return tuple(found)
 
     def origin(self, recording: Recording) -> float:
@@ -229,7 +229,19 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
         signature=effect.signature,
         places=places,
         page=f"docs/effects/{effect.name}.md",
+        spots=_at_markers(rig) if places and effect.port == "observation" and isinstance(rig, Wing) else (),
     )
+
+
+def _at_markers(wing: Wing) -> tuple[tuple[float, float], ...]:
+    """Station and chord of the markers, SPOTS at most: a fault of a marker is that of one of them."""
+    planform, every = Planform(wing), -(-len(wing.markers) // SPOTS)
+    found = ((marker.position[:2], _station(wing, marker.position[1])) for marker in wing.markers[::every])
+    return tuple((station, float(np.clip(planform.fraction(x, y), 0.0, 1.0))) for (x, y), station in found)
+
+
+def _station(wing: Wing, y: float) -> float:
+    return float(np.clip((y - wing.stations[0].y) / wing.span, 0.0, 1.0))
 
 
 def _with(effects: Sequence[str]) -> str:

@@ -169,14 +169,21 @@ def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
     return low, high
 
 
+def _spots(suspect: Suspect, typical: Array) -> list[Array]:
+    """Shapes [E'] in parts of their boxes to be tried, the ``typical`` one first."""
+    if suspect.spots:
+        genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
+        return [unit_at(genes, np.array(spot)) for spot in suspect.spots]
+    count = PLACES if suspect.places else SHAPES
+    return [typical, *qmc.Halton(len(typical), scramble=False).random(count + 1)[1:]]
+
+
 def _blocks(suspect: Suspect) -> Iterator[Array]:
     """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]
-    count = (PLACES if suspect.places else SHAPES) if shape else 0
-    spots = [typical[shape], *qmc.Halton(max(len(shape), 1), scramble=False).random(count + 1)[1:, : len(shape)]]
-    for spot in spots if shape else [typical[shape]]:
+    for spot in _spots(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
             block = []
             for k in size:

@@ -36,6 +36,7 @@ class Suspect:
         source: where its law is from.
         signature: what it looks like in a recording.
         page: where one reads more, or "".
+        spots: values of its shapes that are tried, in their order, where it acts at these only; else any are.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Suspect:
     signature: str
     places: Mapping[Literal["span", "chord"], str]
     page: str = ""
+    spots: tuple[tuple[float, ...], ...] = ()
 
     @property
     def shapes(self) -> tuple[str, ...]:

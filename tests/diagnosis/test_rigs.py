@@ -13,9 +13,10 @@ from scipy.integrate import solve_ivp
 from calibration.spec import CalibrationSpec
 from diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
 from diagnosis.subject import Subject
-from records import Dataset
+from records import Dataset, Wing
 from sim.balance import TRIALS, delfly
 from sim.balance import blank_recording as blank_forces
+from sim.effects.markers import nearest
 from sim.flexible_wing import FlexibleWing
 from sim.model import Array
 from sim.rig import SMALL, blank_recording, name_of, robird_wing
@@ -152,6 +153,15 @@ def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Datase
     assert subject.outline[0] == subject.outline[-1]
     area = abs(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])) / 2
     assert area == pytest.approx(np.trapezoid([s.chord for s in stations], [s.y for s in stations]))
+
+
+def test_a_fault_of_a_marker_is_tried_at_every_marker(wing: Dataset) -> None:
+    rig, suspects = wing.rig, {s.name: s for s in subject_of(wing, CalibrationSpec()).suspects}
+    assert isinstance(rig, Wing)
+    for name in ("marker_slip", "marker_swap"):
+        station, chord = np.array(suspects[name].spots).T
+        assert nearest(rig, {"station": station, "chord": chord})[:, 0].tolist() == list(range(len(rig.markers)))
+    assert suspects["lumped_mass"].spots == ()
 
 
 def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject], wing: Dataset) -> None:
