@@ -42,6 +42,7 @@ RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is 
 RUNNERS = 3  # suspects that are fitted from the estimates
 RIGHT = 0.2  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
 RIVALS = 3  # explanations to which a partner is sought
+OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
 
 
@@ -49,7 +50,7 @@ SUBSTITUTES = 2  # tried in place of each part of an explanation of several
 class Assessment:
     """What is known so far; ``evaluations`` counts individuals.
 
-    ``begun`` is the nominal model at the estimates; ``afresh``: whether suspects were fitted from there.
+    ``begun`` is the nominal model at the estimates; ``afresh``: with which model suspects were fitted from there.
     """
 
     subject: Subject
@@ -60,7 +61,7 @@ class Assessment:
     weighed: Weighed | None = None
     evaluations: int = 0
     begun: tuple[Subject, Fit] | None = None
-    afresh: bool = False
+    afresh: Subject | None = None
 
 
 @dataclass(frozen=True)
@@ -111,16 +112,31 @@ def assess(
         _solved(state, state.nominal, evaluator)
     yield 0.96, "fitting the best explanation to its end"
     floor = 0.0 if spec.refine else _known(state).division or 0.0
-    state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
-    best = decided(state.weighed).best
-    if best.trials and not (best.fit.converged and best.fit.fresh):
-        _add(state, continued(state.subject, stack, evaluator, best, LAST))
+    for _ in range(CONTINUED):
         state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
+        unended = _unended(state.weighed)
+        if unended is None:
+            break
+        _add(state, continued(state.subject, stack, evaluator, unended, LAST))
+    state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
+
+
+def _unended(weighed: Weighed) -> Refit | None:
+    """The best explanation if its fit has not ended, else the first such rival that might overtake it."""
+    best = decided(weighed).best
+    if best.trials and not (best.fit.converged and best.fit.fresh):
+        return best
+    evidence = weighed.evidence[1:]
+    for k in np.argsort(-evidence, kind="stable")[: RIVALS if best.trials else 0]:
+        rival: Refit = weighed.refits[1:][k]
+        if evidence[k] > evidence.max() - OVERTAKES and not rival.fit.converged:
+            return rival
+    return None
 
 
 def _doubted(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
     """Rivals from the estimates to an explanation that leaves more than one that is right: its look-alike may be."""
-    if state.afresh or not state.refits:
+    if state.afresh is state.subject or not state.refits:
         return
     best = min(state.refits, key=lambda one: one.excess)
     if best.excess > tolerated(state.stack, 0.0, 0.0) + RIGHT**2 * _known(state).refit.excess:
@@ -252,7 +268,7 @@ def _afresh(
     if state.begun is None:
         raise ValueError("the nominal model has not been fitted")
     subject, begun = state.begun
-    state.afresh, found = True, []
+    state.afresh, found = state.subject, []
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
