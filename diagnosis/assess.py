@@ -116,7 +116,7 @@ def assess(
         state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
         unended = _unended(state.weighed)
         if unended is None:
-            break
+            return
         _add(state, continued(state.subject, stack, evaluator, unended, LAST))
     state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
 

@@ -235,16 +235,8 @@ def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int 
     """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
     nuisance = Nuisance(stack, base.fit)
     left = nuisance.left
-    scored = []
-    for trials in found:
-        if not trials or trials[0].suspect.name in base.names:
-            continue
-        gains = [_gain(nuisance.rest(trial.fields), left) for trial in trials]
-        k = int(np.argmax(gains))
-        scored.append((gains[k], trials[k]))
-    scored.sort(key=lambda pair: -pair[0])
     worth = HELPS * (float(left @ left) - len(left))
-    return [trial for gain, trial in scored[:most] if gain > worth]
+    return [trial for gain, trial in _takers(nuisance, left, found, base.names)[:most] if gain > worth]
 
 
 def action(stack: Stack, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
@@ -269,14 +261,22 @@ def substitutes(
     own = {gene.name for gene in trial.suspect.genes}
     kept = np.array([name not in own for name in refit.fit.problem.free])
     nuisance = Nuisance(stack, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
-    done, scored = nuisance.rest(change), []
+    done = nuisance.rest(change)
+    worth = ALIKE * float(done @ done)
+    return [one for gain, one in _takers(nuisance, done, found, refit.names)[:most] if gain > worth]
+
+
+def _takers(
+    nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
+) -> list[tuple[float, Trial]]:
+    """Of each suspect but the ``known`` the trial that takes most of a ``misfit``, with how much; strongest first."""
+    best = []
     for trials in found:
-        if trials and trials[0].suspect.name not in refit.names:
-            gains = [_gain(nuisance.rest(one.fields), done) for one in trials]
+        if trials and trials[0].suspect.name not in known:
+            gains = [_gain(nuisance.rest(trial.fields), misfit) for trial in trials]
             k = int(np.argmax(gains))
-            scored.append((gains[k], trials[k]))
-    scored.sort(key=lambda pair: -pair[0])
-    return [one for gain, one in scored[:most] if gain > ALIKE * float(done @ done)]
+            best.append((gains[k], trials[k]))
+    return sorted(best, key=lambda pair: -pair[0])
 
 
 def pairs(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from diagnosis.assess import _unended
 from diagnosis.decide import KNOWN, weighed
 from diagnosis.finding import Interval
 from diagnosis.refit import Refit
@@ -73,6 +75,18 @@ def test_what_leaves_most_is_no_name() -> None:
 def test_the_nearest_is_put_in_only_where_it_takes_as_much_as_it_costs(left: float, put_in: tuple[str, ...]) -> None:
     found = decided(weighed(stack(), refit(3.0), [refit(left, ("a",), 2), refit(2.95, ("b",), 2)], 0.0, 40))
     assert (found.verdict, found.best.names) == ("unnamed", put_in)
+
+
+@pytest.mark.parametrize(("left", "ended", "expected"), [(0.5, False, "b"), (0.5, True, None), (2.9, False, None)])
+def test_a_rival_that_has_not_ended_is_fitted_on_if_it_may_overtake(
+    left: float, ended: bool, expected: str | None
+) -> None:
+    def fitted(one: Refit, converged: bool) -> Refit:
+        return replace(one, fit=cast("Any", SimpleNamespace(converged=converged, fresh=True)))
+
+    others = [fitted(refit(0.3, ("a",)), converged=True), fitted(refit(left, ("b",), 2), converged=ended)]
+    found = _unended(weighed(stack(), refit(3.0), others, 0.0, 40))
+    assert (found and found.names) == (expected and (expected,))
 
 
 def test_a_second_effect_must_earn_its_place() -> None:
