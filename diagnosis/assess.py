@@ -11,8 +11,8 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
-from diagnosis.fit import Fit
-from diagnosis.nominal import PROMISING, Nominal, first_fit, improves, leaves, matters, settled
+from diagnosis.fit import SMALLEST, Fit
+from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from diagnosis.refit import (
     LAST,
     Refit,
@@ -91,25 +91,23 @@ def assess(
         state.begun = state.begun or (state.subject, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.25, "comparing with a finer division"
-    nominal = settled(state.subject, stack, evaluator, fit, refine=spec.refine)
-    state.nominal, state.subject = nominal, nominal.subject
     suspects = suspected(state.subject, spec)
-    for fraction, stage in _suspected(state, spec, suspects, evaluator):
-        yield 0.4 + 0.45 * fraction, stage
+    for fraction, stage in _settled(state, spec, fit, suspects, evaluator):
+        yield 0.3 + 0.55 * fraction, stage
     yield 0.85, "fitting the nominal model again"
     better = _elsewhere(state, evaluator)
     if better is not None:
-        state.nominal, state.trials, state.refits = replace(state.nominal, refit=better), [], []
+        _begin(state, replace(_known(state), refit=better))
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer division"
     if spec.refine:
-        _refined(state, state.nominal, evaluator)
+        _refined(state, _known(state), evaluator)
     for stage in _doubted(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
     if state.refits:
-        _solved(state, state.nominal, evaluator)
+        _solved(state, _known(state), evaluator)
     yield 0.96, "fitting the best explanation to its end"
     floor = 0.0 if spec.refine else _known(state).division or 0.0
     for _ in range(CONTINUED):
@@ -119,6 +117,27 @@ def assess(
             return
         _add(state, continued(state.subject, stack, evaluator, unended, LAST))
     state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
+
+
+def _settled(
+    state: Assessment, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
+) -> Iterator[tuple[float, str]]:
+    """Suspects beside the nominal ``fit``; where a finer division does better than all of these, beside that one's."""
+    nominal = settled(state.subject, state.stack, evaluator, fit, refine=spec.refine)
+    if nominal.subject is not state.subject:
+        _begin(state, settled(state.subject, state.stack, evaluator, fit, refine=False))
+        for fraction, stage in _suspected(state, spec, suspects, evaluator, at_least=nominal.refit):
+            yield 0.3 * fraction, stage
+    if not any(improves(one, nominal.refit) for one in state.refits):
+        _begin(state, nominal)
+        for fraction, stage in _suspected(state, spec, suspects, evaluator):
+            yield 0.3 + 0.7 * fraction, stage
+
+
+def _begin(state: Assessment, nominal: Nominal) -> None:
+    """Go on with a nominal fit; nothing is known of suspects beside it yet."""
+    state.nominal, state.subject = nominal, nominal.subject
+    state.trials, state.refits, state.afresh = [], [], None
 
 
 def _unended(weighed: Weighed) -> Refit | None:
@@ -155,7 +174,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     innocent, leading = nominal.innocent, sorted(state.refits, key=lambda one: one.excess)[:CONTINUED]
     for finer in nominal.subject.finer():
         tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
-        innocent = innocent or any(found is not None for _, found in tried)
+        innocent = innocent or any(found is not None and found is not one for one, found in tried)
         known = [found for one, found in tried if found is not None and found is not one]
         better = min(known, key=lambda one: one.excess, default=best)
         if improves(better, best):
@@ -181,7 +200,7 @@ def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) 
     changes, takes = leaves(finer, stack, evaluator, refit)
     if not changes:
         return None
-    if takes <= PROMISING or not matters(stack, changes, refit):
+    if not promises(stack, changes, takes, refit):
         return refit
     found = again(finer, stack, evaluator, refit)
     if found is None or found.fit.converged or improves(found, refit):
@@ -198,14 +217,24 @@ def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
 
 
 def _suspected(
-    state: Assessment, spec: DiagnosisSpec, suspects: Sequence[Suspect], evaluator: Evaluator
+    state: Assessment,
+    spec: DiagnosisSpec,
+    suspects: Sequence[Suspect],
+    evaluator: Evaluator,
+    at_least: Refit | None = None,
 ) -> Iterator[tuple[float, str]]:
-    """Score tests about the nominal fit, then refits; yields the part of that done."""
+    """Score tests about the nominal fit, then refits; yields the part of that done.
+
+    No refits where none promises to leave less than the nominal model of a finer division (``at_least``) does: a
+    division may take up what an effect leaves, as an effect may take up what a division leaves.
+    """
     nominal = _known(state)
     for k, (suspect, trials) in enumerate(screened(state.subject, state.stack, nominal.refit.fit, evaluator, suspects)):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    if not beyond_doubt(state.stack, nominal.refit, len(suspects)):
+    least = min((trial.leaves for trials in state.trials for trial in trials), default=np.inf)
+    promising = at_least is None or least < state.stack.chi_squared(at_least.fit.coefficients)
+    if promising and not beyond_doubt(state.stack, nominal.refit, len(suspects)):
         yield from _refits(state, nominal, spec, evaluator)
 
 
@@ -348,7 +377,7 @@ def _add(state: Assessment, refit: Refit | None) -> None:
         return
     for k, known in enumerate(state.refits):
         if set(known.names) == set(refit.names):
-            state.refits[k] = min(known, refit, key=lambda one: one.fit.cost)
+            state.refits[k] = min(known, refit, key=lambda one: one.fit.cost - SMALLEST * one.fit.converged)
             return
     state.refits.append(refit)
 
@@ -358,5 +387,5 @@ def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
     known = {suspect.name: suspect for suspect in subject.suspects}
     for name in spec.suspects:
         if name not in known:
-            raise ValueError(f"unknown suspect {name!r}; for this rig there are {', '.join(known)}")
+            raise ValueError(f"unknown suspect {name!r}: take it out; for this rig there are {', '.join(known)}")
     return [suspect for name, suspect in known.items() if not spec.suspects or name in spec.suspects]

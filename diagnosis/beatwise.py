@@ -48,7 +48,6 @@ class Beatwise:
         variance: [C, P] of the coefficients' noise.
         noise: [C] standard deviation of a sample's noise.
         memory: correlation of noise from one sample to the next, median of the channels.
-        samples: [C] seen.
         told: whether the scatter between beats told the noise; else what no harmonic explains did.
         coefficients: [C, P] of the recording itself.
     """
@@ -61,7 +60,6 @@ class Beatwise:
     variance: Array
     noise: Array
     memory: float
-    samples: npt.NDArray[np.int64]
     told: bool
     coefficients: Array
 
@@ -76,11 +74,12 @@ class Beatwise:
 def beatwise(recording: Recording, compared: npt.NDArray[np.bool_] | None = None) -> Beatwise:
     """Reduce ``recording``; ``compared`` [T, C] says which samples count (None: all that were recorded).
 
-    ValueError where no channel has enough samples, or every sample is from the same phase of the beat.
+    ValueError where no channel has enough samples, or moves, or every sample is from the same phase of the beat.
     """
     seen = recording.valid if compared is None else recording.valid & compared
     advance, place = _apparent(recording)
     kept, beats = _harmonics(recording, advance), int(advance * (place[-1] + 1) + 0.05)
+    _check_moves(recording, seen)
     basis, order, trend = _basis(recording, kept, beats)
     inverse, spread, used = _inverses(basis, seen, recording.name)
     values = np.where(seen, recording.values, 0.0)
@@ -101,10 +100,21 @@ def beatwise(recording: Recording, compared: npt.NDArray[np.bool_] | None = None
         spread * scale[:, None] * density,
         np.sqrt(((left**2).sum(axis=0) + taken) / np.maximum(count, 1)),
         _memory(left, seen & used),
-        count,
         beats >= 2,
         coefficients,
     )
+
+
+def _check_moves(recording: Recording, seen: npt.NDArray[np.bool_]) -> None:
+    """ValueError where every channel holds one and the same value throughout."""
+    least, most = (
+        end(np.where(seen, recording.values, none), axis=0) for end, none in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    if seen.any() and not (most > least).any():
+        raise ValueError(
+            f"recording {recording.name!r}: nothing moves, each channel holds one value in all {len(seen)} samples; "
+            "check its export, or leave the recording out"
+        )
 
 
 def _apparent(recording: Recording) -> tuple[float, npt.NDArray[np.int64]]:
@@ -112,7 +122,10 @@ def _apparent(recording: Recording) -> tuple[float, npt.NDArray[np.int64]]:
     times = recording.times
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if step <= 0.0:
-        raise ValueError(f"recording {recording.name!r} has {len(times)} samples; a diagnosis needs a beat of them")
+        raise ValueError(
+            f"recording {recording.name!r} has {len(times)} samples, {step:.3g} s apart (median); a diagnosis needs a "
+            "beat of samples at growing times: check its time column, or leave the recording out"
+        )
     true = step * recording.condition.flap_frequency
     return abs(true - round(true)), np.round((times - times[0]) / step).astype(np.int64)
 
@@ -163,8 +176,9 @@ def _inverses(basis: Array, seen: npt.NDArray[np.bool_], name: str) -> tuple[Arr
         inverse[c], spread[c] = found
     if not used.any():
         raise ValueError(
-            f"recording {name!r}: no channel has {int(np.ceil(SPARE * size))} samples spread over the beat, which its "
-            f"{size} coefficients need; record more frames, or leave the recording out"
+            f"recording {name!r}: no channel has {int(np.ceil(SPARE * size))} samples spread over the beat without "
+            f"long gaps, which its {size} coefficients need; the fullest has {int(seen.sum(axis=0).max())}: record "
+            "more frames, or leave the recording out"
         )
     return inverse, spread, used
 

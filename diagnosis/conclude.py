@@ -17,9 +17,10 @@ from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
 from diagnosis.fit import measured
 from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
-from diagnosis.refit import Refit, action
+from diagnosis.pulse import pulse
+from diagnosis.refit import Refit, action, again
 from diagnosis.stack import Stack
-from diagnosis.unexplained import MOST, Unexplained, missing_forces, probed_recordings, unexplained
+from diagnosis.unexplained import Unexplained, guesses, largest, missing_forces, unexplained
 from diagnosis.verdict import Decision, all_genes, decided, hypotheses, summary
 from diagnosis.where import acting, where
 from records import Recording
@@ -37,12 +38,10 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
     yield 0.0, "measuring how well genes are told", None
     best = replace(best, fit=measured(state.subject, state.stack, evaluator, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    seen = None
-    if held_out:
-        seen = predicted(Stack.of(held_out, state.stack.axes), evaluator, state.nominal.refit.fit, best.fit)
+    seen, failed = predicted(held_out, state.stack.axes, evaluator, state.nominal.refit.fit, best.fit)
     lacking = Unexplained()
     if decision.verdict == "unnamed" or _is_load(decision, best):
-        for fraction, stage, told in _lacking(state, law=decision.verdict == "unnamed"):
+        for fraction, stage, told in _lacking(state, evaluator, unnamed=decision.verdict == "unnamed"):
             lacking = told
             yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
@@ -52,10 +51,9 @@ def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evalu
             apart += [one] if one else []
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
         advice = advised(state.stack, state.weighed, apart)
-    found = _finding(
-        state, name, decision, best, seen, lacking, advice, _where(state, decision, best, lacking, evaluator)
-    )
-    yield 1.0, "done", found
+    lies = _where(state, decision, best, lacking, evaluator)
+    found = _finding(state, name, decision, best, seen, lacking, advice, lies)
+    yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
 
 
 def _is_load(decision: Decision, best: Refit) -> bool:
@@ -64,19 +62,24 @@ def _is_load(decision: Decision, best: Refit) -> bool:
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
-def _lacking(state: Assessment, *, law: bool) -> Iterator[tuple[float, str, Unexplained]]:
-    """The missing load, recording by recording."""
-    nominal = _nominal(state)
-    if state.stack.recordings[0].kind == "forces":
-        yield 1.0, "locating the missing force", Unexplained(missing_forces(state.subject, state.stack, nominal))
+def _lacking(state: Assessment, evaluator: Evaluator, *, unnamed: bool) -> Iterator[tuple[float, str, Unexplained]]:
+    """What is lacking, recording by recording; of what is ``unnamed`` by a finer division as well, and with a law."""
+    stack, nominal = state.stack, _nominal(state)
+    if stack.recordings[0].kind == "forces":
+        when = pulse(state.subject, stack, nominal.fit) if unnamed else None
+        loads = missing_forces(state.subject, stack, nominal)
+        yield 1.0, "locating the missing force", Unexplained(loads, pulse=when)
         return
+    models, which = [(state.subject, nominal)], largest(stack, nominal)
+    for finer in state.subject.finer()[:1] if unnamed else ():
+        yield 0.0, f"fitting a {finer.told}", Unexplained()
+        fitted = again(finer, stack, evaluator, nominal)
+        models += [(finer, fitted)] if fitted is not None else []
     found = []
-    for k, (r, one) in enumerate(probed_recordings(state.subject, state.stack, nominal)):
-        if one is None:
-            continue
-        found.append((r, one))
-        yield (k + 1) / (MOST + 1.0), f"probing the wing under {state.stack.recordings[r].name}", Unexplained()
-    yield 1.0, "locating the missing load", unexplained(state.stack, nominal, found, law=law)
+    for k, (name, guess) in enumerate(guesses(models, stack, which)):
+        yield k / ((len(which) + 1.0) * len(models)), f"probing the wing under {name}", Unexplained()
+        found += [guess] if guess is not None else []
+    yield 1.0, "locating what is missing", unexplained(found, law=unnamed)
 
 
 def _nominal(state: Assessment) -> Refit:
@@ -87,16 +90,16 @@ def _nominal(state: Assessment) -> Refit:
 
 def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplained, evaluator: Evaluator) -> Where:
     """Where the misfit lies; of an effect that is named, where this acts: the fit smears a misfit over the beat."""
-    coefficients = _nominal(state).fit.coefficients
+    stack, coefficients = state.stack, _nominal(state).fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        acts = action(state.stack, evaluator, best)
-        coefficients = coefficients if acts is None else acts
-    found = where(state.stack, maps.pieces(state.subject, state.stack, coefficients), coefficients)
+        acts = action(stack, evaluator, best)
+        stack, coefficients = (stack, coefficients) if acts is None else (stack.noiseless, acts)
+    found = where(stack, maps.pieces(state.subject, stack, coefficients), coefficients)
     held = _nominal(state) if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
     span, chord = (_placed(held, "span") or lacking.span, _placed(held, "chord") or lacking.chord)
     phase = lacking.phase if decision.verdict != "measurement fault" else None
     return Where(
-        found.words + acting(span, chord, phase),
+        found.words + acting(span, chord, phase, driven=lacking.driven),
         span or found.span,
         chord or found.chord,
         phase or found.phase,
@@ -139,10 +142,10 @@ def _finding(
     if seen is not None:
         rows += recording_misfits(seen, held_out=True, floor=division)
         proved = proof(seen, division, unit, put_in=bool(best.names))
-        if not seen.failed:
-            shown += maps.overlays(subject, seen.stack, seen.before, seen.after, held_out=True)
+        shown += maps.overlays(subject, seen.stack, seen.before, seen.after, held_out=True)
     before, after = (maps.pieces(subject, stack, one.fit.coefficients) for one in (nominal, best))
     suspects = {suspect.name: suspect for suspect in subject.suspects}
+    told = replace(weighed, refits=tuple(best if one.names == best.names else one for one in weighed.refits))
     return Finding(
         dataset=name,
         kind=kind,
@@ -155,7 +158,7 @@ def _finding(
         put_in=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / stack.noise**2)),
         floors=_floors(state, division),
-        hypotheses=hypotheses(stack, weighed, state.trials),
+        hypotheses=hypotheses(stack, told, state.trials),
         alike=decision.alike,
         where=lies,
         markers=maps.markers(before, after),
@@ -205,7 +208,9 @@ def _told(stack: Stack, nominal: Refit, best: Refit, place: str, proved: Proof |
         "after": size(best.excess),
         "noise": f"{1e3 * stack.noise:.3g} {unit}",
         "where": place,
-        "held_out": f"On {proved.words}." if proved else "No recording is held out, so that nothing proves it.",
+        "held_out": f"On {proved.words}."
+        if proved
+        else "No held-out recording could be predicted, so that nothing proves it.",
     }
 
 

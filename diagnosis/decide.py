@@ -90,6 +90,8 @@ def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: i
 
 def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
     """Whether the nominal model leaves so little that no explanation could be worth its price, were it perfect."""
+    if refuted(stack, nominal.excess, 0.0):
+        return False
     tau = tolerated(stack, nominal.excess, 0.0)
     left = _misfit(nominal, tau)
     ends = _evidence(stack, np.array([tau + left, tau]) / stack.noise**2, np.arange(2.0), np.arange(2.0), suspects)

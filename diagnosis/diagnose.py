@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from calibration.evaluator import Evaluator
 from calibration.plan import plan, prepared
+from calibration.problem import base_genome
 from diagnosis.assess import Assessment, Counted, assess, suspected
 from diagnosis.conclude import concluded
 from diagnosis.finding import Finding
@@ -22,9 +23,15 @@ ASSESSED = 0.7  # of the work: after that there is a verdict, and its place and 
 
 def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
     """ValueError, for the user, where ``spec`` does not fit ``dataset``; nothing is simulated."""
-    subject, fitted, _, _ = _prepared(dataset, spec)
-    Stack.of(fitted, _axes(dataset, spec))
+    subject, fitted, held_out, _ = _prepared(dataset, spec)
+    axes = _axes(dataset, spec)
+    Stack.of(fitted, axes)
+    for recording in held_out:
+        Stack.of([recording], axes)
     suspected(subject, spec)
+    base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
+    if spec.refits < 1:
+        raise ValueError(f"refits is {spec.refits}; at least 1 effect must be refitted: give 1 or more")
 
 
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:

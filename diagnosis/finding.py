@@ -77,7 +77,7 @@ class Hypothesis:
         predicted: the same for recordings that were left out of the fit one by one; None where that was not done.
         misfit: what its refit leaves, root mean square.
         refitted: whether it was refitted in full; else all but the score is by linear extrapolation.
-        genes: of its effects; empty unless refitted.
+        genes: of its effects; empty unless refitted. Intervals of all but the best rest on slopes learnt on the way.
     """
 
     effects: tuple[str, ...]
@@ -100,7 +100,7 @@ class Hypothesis:
 class Exponent:
     """How the misfit that the nominal model leaves grows with one variable of the condition: as its power.
 
-    ``variable`` is "flap frequency", "air density", "airspeed" or "phase lag"; ``low`` and ``high`` say between which
+    ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` say between which
     values recordings told it.
     """
 
@@ -119,7 +119,7 @@ class Where:
         words: the same in a sentence or two.
         span, chord: centre and extent of the place on the wing; None where forces do not tell a place.
         phase: centre and extent in the beat; None where the misfit is spread over the whole beat.
-        axis: along which channel axis most of it lies ("x", "z", "flap normal" ...).
+        axis: along which channel axis most of it lies ("x", "y" or "z").
         harmonics: part of its mean square in each harmonic of the beat, from 0.
         exponents: how it scales.
     """
@@ -169,10 +169,11 @@ class PhaseMap:
 
 @dataclass(frozen=True)
 class MissingLoad:
-    """The load that the nominal model lacks, found through its own response, under one condition.
+    """The load that the nominal model lacks, or the motion of its drive, found through its own response.
 
-    ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap normal, N/m; where a
-    recording of forces shows it directly, N.
+    Under one condition. ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap
+    normal, N/m; where a recording of forces shows it directly, N; what the front rod turns further than it is said to,
+    rad, upward.
     """
 
     recording: str

@@ -39,6 +39,13 @@ BESIDE = 0.05  # of a box: a motion as near as this is near enough to begin besi
 FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
 
 
+class CannotBeginError(ValueError):
+    """The model cannot be simulated where a fit begins."""
+
+
+UNFIT = (CannotBeginError, np.linalg.LinAlgError)  # ends one fit, and not a diagnosis
+
+
 @dataclass(frozen=True)
 class Fit:
     """A fitted model.
@@ -85,7 +92,7 @@ def fitted(
     known: Flags | None = None,
     steps: int = 8,
 ) -> Fit:
-    """Fit the free genes from ``start`` [F]; ValueError where that cannot be simulated.
+    """Fit the free genes from ``start`` [F]; CannotBeginError where that cannot be simulated.
 
     ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first, and again where a step
     does not keep its promise; if that does not help, all are, once.
@@ -184,7 +191,12 @@ class _Look:
 def _at(look: _Look, unit: Array) -> Fit:
     found, reasons, residuals = look.at(unit[None], unit)
     if reasons[0] is not None:
-        raise ValueError(f"the model cannot be simulated where the fit begins: {reasons[0]}")
+        values = values_at(free_genes(look.problem), unit[None])[0]
+        told = ", ".join(f"{name} = {value:.4g}" for name, value in zip(look.problem.free, values, strict=True))
+        raise CannotBeginError(
+            f"the model cannot be simulated where the fit begins ({told}): {reasons[0]}; start from other genes, or "
+            "check the rig's estimates"
+        )
     cost = float(_cost(look.stack, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
     return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, unit)

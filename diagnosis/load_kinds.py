@@ -1,7 +1,8 @@
-"""Kinds of load that a wing may bear which its model does not know: smooth ones, and those of one place."""
+"""Kinds of load that a wing may bear which its model does not know: smooth ones, those of one place; and of drive."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -19,17 +20,21 @@ _CHORDS = np.linspace(0.0, 1.0, 9)  # where along the chord they may act, parts 
 _TURNING = 0.25  # of the chord: standard deviation of the lever of smooth loads about its middle
 _DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
 _SMOOTH = 0.1  # probability a priori of smooth loads; that of loads of one place is the rest
+_DRIVEN = 0.1  # of a drive that moves otherwise
+_RODS = (((1.0, 1.0),), ((1.0, 0.0),), ((0.0, 1.0),), ((1.0, 0.0), (0.0, 1.0)))  # alike, one, or each by itself
 
 
 class Family(NamedTuple):
-    """Shapes [K, Z, stations] of loads, forces and moments; ``places``: centre, width and chord of each, if any.
+    """Shapes of loads, forces and moments; ``places``: centre, width and chord of each, if any.
 
-    ``share``: probability a priori of each of them.
+    ``shapes``: K of them, [Z, stations] each, whose sum with independent sizes it is. ``share``: probability a priori
+    of each. ``driven``: the motion of two rods, which stand behind the stations.
     """
 
-    shapes: Array
+    shapes: tuple[Array, ...]
     places: tuple[tuple[float | None, float | None, float | None], ...]
     share: float
+    driven: bool = False
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -44,7 +49,7 @@ class Form(NamedTuple):
 
     @property
     def root(self) -> Array:
-        """[P, Z M] of the covariance of loads at strength one."""
+        """[P, Z M] of the covariance at strength one."""
         return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
 
 
@@ -63,7 +68,7 @@ def smooth(probe: Probe, chord: Array | None) -> Family:
             nothing = np.zeros_like(root)
             root = np.block([[root, nothing], [nothing, _TURNING * chord * root]])
         shapes.append(root)
-    return Family(np.array(shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
+    return Family(_beside_rods(probe, shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
 
 
 def placed(probe: Probe, chord: Array | None) -> Family:
@@ -75,10 +80,25 @@ def placed(probe: Probe, chord: Array | None) -> Family:
         bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
         force = np.linalg.lstsq(hats, bump, rcond=None)[0]
         if not probe.turning or chord is None:
-            shapes.append(force)
+            shapes.append(force[None])
             places.append((float(centre), width, None))
             continue
         for part in _CHORDS:
-            shapes.append(np.concatenate([force, (0.5 - part) * chord * force]))
+            shapes.append(np.concatenate([force, (0.5 - part) * chord * force])[None])
             places.append((float(centre), width, float(part)))
-    return Family(np.array(shapes)[:, None, :], tuple(places), (1.0 - _SMOOTH) / len(shapes))
+    rest = 1.0 - _SMOOTH - (_DRIVEN if probe.driving else 0.0)
+    return Family(_beside_rods(probe, shapes), tuple(places), rest / len(shapes))
+
+
+def driven(probe: Probe) -> Family:
+    """Rods that move otherwise than they are said to; none for a probe that does not drive."""
+    if not probe.driving:
+        return Family((), (), 0.0, driven=True)
+    still = np.zeros((2, probe.loads // (1 + 2 * probe.harmonics)))
+    shapes = tuple(np.hstack([still[: len(rods)], np.array(rods)]) for rods in _RODS)
+    return Family(shapes, ((None, None, None),) * len(shapes), _DRIVEN / len(shapes), driven=True)
+
+
+def _beside_rods(probe: Probe, shapes: Sequence[Array]) -> tuple[Array, ...]:
+    """Loads beside which rods move as they are said to."""
+    return tuple(np.pad(shape, ((0, 0), (0, 2 * probe.driving))) for shape in shapes)

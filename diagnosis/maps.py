@@ -134,14 +134,17 @@ def harmonics(stack: Stack, coefficients: Array) -> tuple[float, ...]:
 def overlays(
     subject: Subject, stack: Stack, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
 ) -> Iterator[Overlay]:
-    """Channels in which the two models differ most, one from each of the recordings that changed most.
+    """Channels in which the two models differ most (one that differs nowhere: that the nominal one misses most).
+
+    One from each of the recordings that changed most.
 
     ``before`` and ``after`` are residuals [T, C] of each recording.
     """
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:
         recording = stack.recordings[r]
-        square = np.where(stack.views[r].used, np.nan_to_num((before[r] - after[r]) ** 2).sum(axis=0), 0.0)
+        apart = before[r] - after[r] if change[r] > 0.0 else before[r]
+        square = np.where(stack.views[r].used, np.nan_to_num(apart**2).sum(axis=0), 0.0)
         channel = int(np.argmax(square))
         seen = np.isfinite(before[r][:, channel])
         psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen] - subject.origin(recording)

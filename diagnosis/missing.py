@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 import numpy.typing as npt
 
 from diagnosis.finding import Interval, MissingLoad
-from diagnosis.load_kinds import Form, placed, smooth, spreads
+from diagnosis.load_kinds import Form, driven, placed, smooth, spreads
 from sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
@@ -89,19 +90,19 @@ def _decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) ->
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P], genes [F].
+    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P].
 
     ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span, and where along the chord
-    they act; None for smooth loads, and without a probe that turns.
+    they act; None for smooth loads, and without a probe that turns. ``driven``: a motion of the rods instead.
     """
 
     probability: float
     centre: float | None
     width: float | None
     chord: float | None
+    driven: bool
     sizes: Array
     covariance: Array
-    genes: Array
 
 
 @dataclass(frozen=True)
@@ -129,21 +130,39 @@ class Inferred:
         """Probability of loads of one place."""
         return sum(kind.probability for kind in self.kinds if kind.centre is not None)
 
+    @property
+    def driven(self) -> bool:
+        """Whether the rods move otherwise, and no load acts."""
+        return self.kinds[0].driven
+
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
-        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat."""
+        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat.
+
+        Of rods that move otherwise their turns, deg, [R, 2, phase].
+        """
         values, errors = [], []
+        weight = np.array([kind.probability for kind in self.kinds])
+        places = np.eye(2) if self.driven else self.probe.hats(span)
         for r, crossing in enumerate(self.crossings):
-            basis = np.kron(self.probe.hats(span), self.probe.terms(phase + crossing))
-            forces = slice(0, self.probe.forces)
-            each = np.array([basis @ kind.sizes[r, forces] for kind in self.kinds])
-            covariances = [kind.covariance[r, forces, forces] for kind in self.kinds]
+            basis = np.kron(places, self.probe.terms(phase + crossing))
+            each = np.array([basis @ kind.sizes[r, self.told] for kind in self.kinds])
+            covariances = [kind.covariance[r, self.told, self.told] for kind in self.kinds]
             own = [np.einsum("np,pq,nq->n", basis, one, basis, optimize=True) for one in covariances]
-            weight = np.array([kind.probability for kind in self.kinds])
             mean = weight @ each
             values.append(mean)
             errors.append(np.sqrt(weight @ (np.array(own) + (each - mean) ** 2)))
-        shape = (len(self.names), len(span), len(phase))
+        shape = (len(self.names), len(places), len(phase))
         return np.reshape(values, shape), np.reshape(errors, shape)
+
+    @property
+    def told(self) -> slice:
+        """The forces among the sizes, or the turns of the rods."""
+        return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
+
+    @property
+    def left(self) -> float:
+        """Mean square of what is left, in parts of the noise's: of two models, the one with less is nearer."""
+        return float(np.mean(self.floor**2))
 
 
 @dataclass(frozen=True)
@@ -153,10 +172,11 @@ class LoadPlace:
     ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
     the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
     larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start); ``chord`` in parts of
-    it from the leading edge, None where the load is spread smoothly, or the probe does not turn.
+    it from the leading edge, None where the load is spread smoothly, or the probe does not turn. Of rods that move
+    otherwise there is a phase only.
     """
 
-    span: Interval
+    span: Interval | None
     reach: tuple[float, float]
     phase: Interval | None
     lasts: tuple[float, float]
@@ -180,16 +200,21 @@ class _Normal:
         self.alone = self.A - self.B @ genes @ self.B.T
         self.force = self.h - self.B @ genes @ self.s
 
-    def evidence(self, shapes: Array, spread: Array) -> Array:
+    def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
         """Logarithm of the evidence over that of no load, [K, strengths].
 
-        Of loads that are independent normal numbers for every one of M terms, with standard deviations ``spread`` [M]
-        times the strength, times one of ``shapes`` [K, stations], or the sum of several of them [K, Z, stations].
+        Of loads that are sums of ``shapes``, K times [Z, stations], each times independent normal numbers for every one
+        of M terms, with standard deviations ``spread`` [M] times the strength.
         """
+        return np.concatenate(
+            [self._evidence(np.array(list(alike)), spread) for _, alike in groupby(shapes, key=len)]
+            or [np.zeros((0, len(_STRENGTHS)))]
+        )
+
+    def _evidence(self, shapes: Array, spread: Array) -> Array:
         M = len(spread)
         Q = len(self.force) // M
         inner = self.alone.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
-        shapes = shapes.reshape(len(shapes), -1, Q)
         K, Z = shapes.shape[:2]
         pairs = np.einsum("kyq,kzr->kyzqr", shapes, shapes).reshape(K * Z * Z, Q * Q)
         blocks = (pairs @ inner).reshape(K, Z, Z, M, M).transpose(0, 1, 3, 2, 4)
@@ -204,6 +229,7 @@ class _Normal:
 def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt: float = DOUBT) -> Inferred:
     """Invert ``cases``, which share the nominal genes; ValueError where there is none.
 
+    Kinds of load are averaged over; rods that move otherwise are told where nothing else does as well.
     ``chord`` [stations] of the wing at the probe's (m), for one that turns; ``doubt`` about the model's responses, as a
     part of the evidence.
     """
@@ -212,7 +238,7 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     if probe.turning and (chord is None or len(chord) != len(probe.stations)):
         raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
     normals = [_Normal(case) for case in cases]
-    families = [smooth(probe, chord), placed(probe, chord)]
+    families = [smooth(probe, chord), placed(probe, chord), driven(probe)]
     forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
     evidence = np.array(
         [
@@ -223,13 +249,15 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     best = evidence.max(axis=2)
     total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
     weight = np.exp((total - total.max()) / max(doubt * float(total.max()), 1.0))
+    driving = np.array([form.family.driven for form in forms])
+    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that do as well as rods are huge ones at the root
     kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
     kinds = []
     for k in kept:
         family, number, _ = form = forms[k]
         strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
         solved = _solved(normals, [strength * form.root for strength in strengths])
-        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], *solved))
+        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], family.driven, *solved))
     return Inferred(
         probe,
         tuple(case.name for case in cases),
@@ -240,8 +268,8 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     )
 
 
-def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array, Array]:
-    """Loads [R, P], their covariance [R, P, P] and the genes [F], all together: the loads are eliminated first."""
+def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array]:
+    """Loads [R, P] and their covariance [R, P, P], the genes free: the loads are eliminated first."""
     F = len(normals[0].s)
     precision, slope = np.eye(F) / GENES**2, np.zeros(F)
     inner = []
@@ -254,13 +282,19 @@ def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, 
     genes = spread @ slope
     sizes = [V @ (one.h - one.B @ genes) for one, V in zip(normals, inner, strict=True)]
     covariance = [V + V @ one.B @ spread @ one.B.T @ V for one, V in zip(normals, inner, strict=True)]
-    return np.array(sizes), np.array(covariance), genes
+    return np.array(sizes), np.array(covariance)
 
 
-def missing_loads(inferred: Inferred, unit: str = "N/m") -> tuple[MissingLoad, ...]:
-    """The load under each condition at the probe's stations and PHASES instants from the start of the beat on."""
+def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
+    """The load under each condition at the probe's stations and PHASES instants from the start of the beat on.
+
+    Of rods that move otherwise, what the front one turns further, rad.
+    """
     phase, stations = np.arange(PHASES) / PHASES, np.array(inferred.probe.stations)
     values, errors = inferred.fields(stations, phase)
+    if inferred.driven:
+        values, errors, stations = np.radians(values[:, :1]), np.radians(errors[:, :1]), np.zeros(1)
+    unit = "rad" if inferred.driven else "N/m"
     return tuple(
         MissingLoad(name, tuple(stations.tolist()), tuple(phase.tolist()), _table(v), _table(e), unit)
         for name, v, e in zip(inferred.names, values, errors, strict=True)
@@ -306,13 +340,18 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
         if not count:
             continue
         fields = _drawn(inferred, kind, shown, phase, int(count), rng)
-        if kind.centre is not None and kind.width is not None:
+        if kind.driven:
+            pass
+        elif kind.centre is not None and kind.width is not None:
             bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
             along.append(np.tile(bump, (count, 1)))
         else:
             along.append(np.abs(fields).sum(axis=(0, 3)))
-        during.append(np.abs(fields.sum(axis=2)).sum(axis=0))
+        over = fields - fields.mean(axis=3, keepdims=True) if kind.driven else fields.sum(axis=2, keepdims=True)
+        during.append(np.abs(over).sum(axis=(0, 2)))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
+    if inferred.driven:
+        return LoadPlace(None, (0.0, 1.0), *_during(phase, np.concatenate(during)))
     span, reach = _along(np.concatenate(along))
     likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
@@ -337,15 +376,17 @@ def _drawn(
     count: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square."""
-    hats, found = inferred.probe.hats(_SPAN), []
+    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square.
+
+    Of rods that move otherwise [shown, count, 2, phase].
+    """
+    places, found = np.eye(2) if kind.driven else inferred.probe.hats(_SPAN), []
     for r in shown:
         size, turn = np.linalg.eigh(kind.covariance[r])
         off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
-        sizes = (kind.sizes[r] + off @ turn.T)[:, : inferred.probe.forces]
-        sizes = sizes.reshape(count, len(inferred.probe.stations), -1)
+        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.told].reshape(count, places.shape[1], -1)
         series = inferred.probe.terms(phase + inferred.crossings[r])
-        field = np.einsum("sj,cjk,pk->csp", hats, sizes, series, optimize=True)
+        field = np.einsum("sj,cjk,pk->csp", places, sizes, series, optimize=True)
         found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))
     return np.array(found)
 

@@ -37,7 +37,7 @@ class Nominal:
         refit: its fit.
         division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
         finer: in words.
-        innocent: whether a finer division was fitted and did no better, so that it is not the division that limits.
+        innocent: whether the finer division was fitted and did no better, so that it is not the division that limits.
         remarks: for the reader.
     """
 
@@ -74,9 +74,11 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
             changes, takes = leaves(finer, stack, evaluator, now)
             if changes <= left:
                 continue
-            left, finest = changes, finer.told
-            if refine and takes > PROMISING and matters(stack, changes, now):
-                better, tried = _better(finer, stack, evaluator, now), True
+            left, finest, tried = changes, finer.told, False
+            if refine and promises(stack, changes, takes, now):
+                found = again(finer, stack, evaluator, now)
+                better = found if found is not None and improves(found, now) else None
+                tried = found is not None
             if better is not None:
                 break
         if better is None:
@@ -89,15 +91,13 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
     return Nominal(subject, now, None, "", tuple(remarks))
 
 
-def matters(stack: Stack, changes: float, now: Refit) -> bool:
-    """Whether a division that makes such a difference (m or N) may be what limits a fit."""
-    return changes >= MATTERS * stack.noise and now.excess >= (LIMIT * stack.noise) ** 2
+def promises(stack: Stack, changes: float, takes: float, now: Refit) -> bool:
+    """Whether a division that ``changes`` as much (m or N) and ``takes`` such a part of a misfit is worth a fit.
 
-
-def _better(finer: Subject, stack: Stack, evaluator: Evaluator, now: Refit) -> Refit | None:
-    """``now`` fitted with the finer model; None where that is not worth its cost."""
-    found = again(finer, stack, evaluator, now)
-    return found if found is not None and improves(found, now) else None
+    Of one that changes more than the whole misfit the linearised model knows nothing.
+    """
+    matters = changes >= MATTERS * stack.noise and now.excess >= (LIMIT * stack.noise) ** 2
+    return matters and (takes > PROMISING or changes**2 >= now.excess)
 
 
 def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:

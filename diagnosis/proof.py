@@ -13,6 +13,7 @@ from calibration.problem import Problem
 from diagnosis.finding import Interval, Proof, RecordingMisfit
 from diagnosis.fit import Fit
 from diagnosis.stack import Stack
+from records import Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -24,24 +25,38 @@ CONFIDENCE = 0.9
 class Predicted:
     """Residuals [T, C] of each recording of a stack, with the nominal model and with what was found.
 
-    An entry of ``failed`` says why a model could not be simulated; its residuals are then NaN.
+    ``broken``: what was found could not be simulated under every recording; those are not among the stack's.
     """
 
     stack: Stack
     before: tuple[Array, ...]
     after: tuple[Array, ...]
-    failed: tuple[str, ...] = ()
+    broken: bool = False
 
 
-def predicted(stack: Stack, evaluator: Evaluator, before: Fit, after: Fit) -> Predicted:
-    """Predict recordings that neither model was fitted to."""
-    found, failed = [], []
-    for fit in (before, after):
-        problem = Problem(fit.problem.model, stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
-        _, reasons, residuals = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
-        failed += [reason for reason in reasons if reason]
-        found.append(tuple(one[0] for one in residuals))
-    return Predicted(stack, found[0], found[1], tuple(failed))
+def predicted(
+    recordings: Sequence[Recording], axes: tuple[str, ...], evaluator: Evaluator, before: Fit, after: Fit
+) -> tuple[Predicted | None, tuple[str, ...]]:
+    """Predict recordings that neither model was fitted to, and say which cannot be; None where none can by both."""
+    kept, pairs, failed, broken = list[Recording](), list[tuple[Array, Array]](), list[str](), False
+    for recording in recordings:
+        one, found, reasons = Stack.of([recording], axes), [], []
+        for fit in (before, after):
+            problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, axes)
+            _, (reason,), (residuals,) = one.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+            found.append(residuals[0])
+            reasons.append(reason)
+        broken = broken or reasons[1] is not None
+        if any(reasons):
+            which = "the nominal model" if reasons[0] else "what was found"
+            failed.append(f"{recording.name} was not predicted: {which} fails there: {reasons[0] or reasons[1]}")
+        else:
+            kept.append(recording)
+            pairs.append((found[0], found[1]))
+    if not kept:
+        return None, tuple(failed)
+    before_all, after_all = zip(*pairs, strict=True)
+    return Predicted(Stack.of(kept, axes), before_all, after_all, broken), tuple(failed)
 
 
 def recording_misfits(predicted: Predicted, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
@@ -82,9 +97,7 @@ def proof(predicted: Predicted, floor: float, unit: str, *, put_in: bool) -> Pro
     if put_in:
         change += f" before, {told[0] * after.value:.3g} {told[1]} after"
     words = f"{len(stack.recordings)} held-out recordings: {change}, {after.value / least:.2f} times the floor"
-    if predicted.failed:
-        words += f"; {predicted.failed[0]}"
-    return Proof(_over(before, least), _over(after, least), least, better, words)
+    return Proof(_over(before, least), _over(after, least), least, better and not predicted.broken, words)
 
 
 def _over(interval: Interval, floor: float) -> Interval:

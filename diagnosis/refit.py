@@ -12,7 +12,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, unit_at, values_at
 from calibration.problem import Problem, base_genome
-from diagnosis.fit import PRIOR, Fit, fitted, thoroughly
+from diagnosis.fit import PRIOR, UNFIT, Fit, fitted, thoroughly
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -112,13 +112,13 @@ def refitted(
         start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
         try:
             fit = _widened(subject, stack, problem, evaluator, start, before)
-        except ValueError:
+        except UNFIT:
             continue
-        if len(trials) == 1 and stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves:
-            sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
+        sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
+        astray = stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves
+        if len(trials) == 1 and astray and not sizes.all():
             first = _some(subject, stack, problem, evaluator, start, before, sizes)
-            if not sizes.all():
-                first = _widened(subject, stack, problem, evaluator, first.unit, first)
+            first = _widened(subject, stack, problem, evaluator, first.unit, first)
             fit = min((fit, first), key=lambda one: one.cost)
         return judged(stack, fit, trials)
     return None
@@ -163,7 +163,7 @@ def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) ->
     known = np.ones(len(before.unit), bool)
     try:
         fit = fitted(subject, stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
-    except ValueError:
+    except UNFIT:
         return None
     return judged(stack, fit, refit.trials)
 
@@ -177,7 +177,7 @@ def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit
     try:
         for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
             fit = better
-    except ValueError:
+    except UNFIT:
         return refit
     return judged(stack, fit, refit.trials)
 
@@ -186,7 +186,7 @@ def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
     """``refit`` fitted anew from other genes ``start`` [F]; None where these cannot be simulated."""
     try:
         return judged(stack, fitted(subject, stack, refit.fit.problem, evaluator, start, steps=STEPS), refit.trials)
-    except ValueError:
+    except UNFIT:
         return None
 
 
@@ -204,7 +204,7 @@ def afresh(
         try:
             for fit in islice(steps, RACE):
                 yield min([(trial, fit), *((t, f) for t, f, _ in runners)], key=lambda one: one[1].cost)
-        except ValueError:
+        except UNFIT:
             continue
         runners.append((trial, fit, steps))
     if runners:
@@ -213,7 +213,7 @@ def afresh(
 
 
 def _from_estimates(subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trial: Trial) -> Iterator[Fit]:
-    """Fits of the nominal model with a suspect of typical size; ValueError where the first cannot be simulated."""
+    """Fits of the nominal model with a suspect of typical size; CannotBeginError where they cannot begin."""
     suspect, base = trial.suspect, begun.problem.base
     model = subject.extended([suspect.name])
     free = (*begun.problem.free, *(gene.name for gene in suspect.genes))

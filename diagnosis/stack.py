@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -42,13 +42,21 @@ class Stack:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = ()) -> Stack:
-        """Reduce ``recordings``; ValueError for one that is of no use."""
+        """Reduce ``recordings``; ValueError for one that is of no use, or for none."""
+        if not recordings:
+            raise ValueError("no recording to diagnose: give at least one that is not held out")
         views = tuple(
             beatwise(one, compared(one, axes) if one.kind == "forces" else _whole_markers(one)) for one in recordings
         )
         noise = np.sqrt(np.mean(np.concatenate([view.noise[view.used] ** 2 for view in views])))
         largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
         return cls(tuple(recordings), views, axes, max(TOLERANCE * float(noise), 1e-6 * largest))
+
+    @cached_property
+    def noiseless(self) -> Stack:
+        """For coefficients that a simulation made, of which noise has no part."""
+        views = tuple(replace(view, variance=np.zeros_like(view.variance)) for view in self.views)
+        return replace(self, views=views)
 
     @cached_property
     def noise(self) -> float:

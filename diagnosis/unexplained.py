@@ -1,4 +1,4 @@
-"""The load that the nominal model lacks, where it acts, and a free-form law for it, by the model's own response."""
+"""What the nominal model lacks, as a load or a motion of its drive: where it acts, and a free-form law for a load."""
 
 from __future__ import annotations
 
@@ -9,25 +9,30 @@ import numpy as np
 
 from diagnosis.finding import FreeLaw, Interval, MissingLoad
 from diagnosis.law import free_law
-from diagnosis.missing import Case, LoadPlace, infer, missing_force, missing_loads, place
+from diagnosis.missing import Case, Inferred, LoadPlace, infer, missing_force, missing_loads, place
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 from sim.effects.probe import Probe
-from sim.probing import Probed
+from sim.probing import Probed, StationMotion
 
-PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 6, turning=True)
+PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 LARGEST = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
 MOST = 4  # recordings that are probed: those with the largest misfit
 
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What is lacking as a load: per recording, its place, and a law; nothing where the rig cannot be probed."""
+    """What is lacking: per recording, its place, and a law; nothing where the rig cannot be probed.
+
+    ``driven``: it is no load, but rods that move otherwise. ``pulse``: when a force acts, where forces were recorded.
+    """
 
     loads: tuple[MissingLoad, ...] = ()
     place: LoadPlace | None = None
     law: FreeLaw | None = None
+    driven: bool = False
+    pulse: Interval | None = None
 
     @property
     def span(self) -> Interval | None:
@@ -42,34 +47,57 @@ class Unexplained:
     @property
     def phase(self) -> Interval | None:
         """When in the beat it acts."""
-        return None if self.place is None else self.place.phase
+        return self.pulse if self.place is None else self.place.phase
 
 
-def probed_recordings(subject: Subject, stack: Stack, nominal: Refit) -> Iterator[tuple[int, Probed | None]]:
-    """Responses about the nominal fit of the recordings with the largest misfit, one after the other."""
-    fit = nominal.fit
-    genome = fit.problem.genomes(np.array(list(fit.values.values())))[0]
-    for r in np.argsort(-stack.excess_of(fit.coefficients))[:MOST]:
-        yield int(r), subject.probed(genome, stack.recordings[r], PROBE)
+@dataclass(frozen=True)
+class Guess:
+    """What is ``inferred`` to be lacking from ``cases``: recordings, with one model's responses and ``motions``."""
+
+    cases: tuple[Case, ...]
+    motions: tuple[StationMotion, ...]
+    inferred: Inferred
 
 
-def unexplained(stack: Stack, nominal: Refit, found: list[tuple[int, Probed]], *, law: bool) -> Unexplained:
-    """What is lacking, from the ``found`` responses of recordings; ``law`` asks for a law as well."""
+def largest(stack: Stack, nominal: Refit) -> list[int]:
+    """Numbers of the recordings that are probed."""
+    return [int(r) for r in np.argsort(-stack.excess_of(nominal.fit.coefficients))[:MOST]]
+
+
+def guesses(
+    models: Sequence[tuple[Subject, Refit]], stack: Stack, which: Sequence[int]
+) -> Iterator[tuple[str, Guess | None]]:
+    """What is lacking by each of ``models``, which are fitted; before each recording ``which`` is probed, its name."""
+    for subject, nominal in models:
+        fit = nominal.fit
+        genome, found = fit.problem.genomes(np.array(list(fit.values.values())))[0], []
+        for r in which:
+            yield stack.recordings[r].name, None
+            found.append((r, subject.probed(genome, stack.recordings[r], PROBE)))
+        known = [(r, one) for r, one in found if one is not None]
+        if known:
+            cases = tuple(_case(stack, nominal, r, one) for r, one in known)
+            motions = tuple(one.motion for _, one in known)
+            yield stack.recordings[which[-1]].name, Guess(cases, motions, infer(cases, PROBE, motions[0].chord))
+
+
+def unexplained(found: Sequence[Guess], *, law: bool) -> Unexplained:
+    """What is lacking by the model that leaves least, of those that could be probed most; ``law`` asks for one."""
     if not found:
         return Unexplained()
-    cases = [_case(stack, nominal, r, one) for r, one in found]
-    inferred = infer(cases, PROBE, found[0][1].motion.chord)
-    loads = missing_loads(inferred)
-    if not _plausible(loads, [one for _, one in found]):
+    whole = max(len(guess.cases) for guess in found)
+    best = min((guess for guess in found if len(guess.cases) == whole), key=lambda guess: guess.inferred.left)
+    loads, driven = missing_loads(best.inferred), best.inferred.driven
+    if not driven and not _plausible(loads, best.motions):
         return Unexplained()
-    told = free_law(cases, PROBE, [one.motion for _, one in found]) if law else None
-    return Unexplained(loads, place(inferred), told)
+    told = free_law(best.cases, PROBE, best.motions) if law and not driven else None
+    return Unexplained(loads, place(best.inferred), told, driven)
 
 
-def _plausible(loads: Sequence[MissingLoad], found: Sequence[Probed]) -> bool:
+def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:
     """Whether the loads are no larger than some times the wing's own inertia: what is lacking may be no load at all."""
     size = np.sqrt(np.mean([np.mean(np.square(load.values)) for load in loads]))
-    own = np.sqrt(np.mean([np.mean((one.motion.mass[:, None] * one.motion.acceleration) ** 2) for one in found]))
+    own = np.sqrt(np.mean([np.mean((motion.mass[:, None] * motion.acceleration) ** 2) for motion in motions]))
     return bool(size <= LARGEST * own)
 
 

@@ -47,15 +47,16 @@ def decided(weighed: Weighed) -> Decision:
             probability["ambiguous"] = total - float(effects[top])
         else:
             probability["ambiguous"] = total
-    if total > nominal and total >= KNOWN * (total + weighed.unknown):
-        sure = effects[top] >= SURE * total
-        verdict: Verdict = one if sure else "ambiguous"
+    lacking = total + weighed.unknown
+    verdict: Verdict
+    if nominal >= lacking:
+        verdict = "adequate"
+    elif total >= KNOWN * lacking:
+        verdict = one if effects[top] >= SURE * total else "ambiguous"
         best = refits[top]
     else:
-        verdict = "adequate" if nominal >= weighed.unknown + total else "unnamed"
-        if (
-            verdict == "unnamed" and weighed.evidence[1:].max(initial=0.0) > DOUBT
-        ):  # the nearest is put in if it earns it
+        verdict = "unnamed"
+        if weighed.evidence[1:].max(initial=0.0) > DOUBT:  # the nearest is put in if it earns it
             best = refits[int(np.argmax(weighed.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()
@@ -68,25 +69,21 @@ def decided(weighed: Weighed) -> Decision:
 
 def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:
     """All that was weighed, most probable first, then what was only tested, by score."""
-    start = weighed.left[0]
     order = np.argsort(-weighed.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
-    told = [_weighed(stack, weighed, int(k), start, gains) for k in order]
+    told = [_weighed(stack, weighed, int(k), gains) for k in order]
     known = {refit.names for refit in weighed.refits}
     rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
-    whole = max(stack.chi_squared(weighed.refits[0].fit.coefficients) - len(stack.scale), 1e-300)
-    return (*told, *(_tested(trial, whole, start, stack) for trial in rest[:LISTED]))
+    start = max(weighed.refits[0].excess, 0.0) / stack.noise**2
+    return (*told, *(_tested(trial, start, stack) for trial in rest[:LISTED]))
 
 
-def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mapping[str, Trial]) -> Hypothesis:
-    refit = weighed.refits[k]
+def _weighed(stack: Stack, weighed: Weighed, k: int, gains: Mapping[str, Trial]) -> Hypothesis:
+    refit, nominal = weighed.refits[k], weighed.refits[0]
     suspects = [trial.suspect for trial in refit.trials]
-    unit = stack.noise**2
-    first = start if start > 0 else 1.0
     predicted = None
-    if refit.predicted is not None and weighed.refits[0].predicted is not None:
-        before = max(weighed.refits[0].predicted / unit, 1e-12)
-        predicted = 1.0 - max(refit.predicted / unit, 0.0) / before if k else 0.0
+    if refit.predicted is not None and nominal.predicted is not None:
+        predicted = _part(refit.predicted, nominal.predicted)
     return Hypothesis(
         effects=refit.names,
         title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
@@ -97,17 +94,23 @@ def _weighed(stack: Stack, weighed: Weighed, k: int, start: float, gains: Mappin
         evidence=float(weighed.evidence[k]),
         score=sum(gains[s.name].gain for s in suspects if s.name in gains),
         freedom=refit.freedom,
-        explained=float(np.clip(1.0 - weighed.left[k] / first, -1.0, 1.0)) if k else 0.0,
-        predicted=None if predicted is None else float(np.clip(predicted, -1.0, 1.0)),
+        explained=_part(refit.excess, nominal.excess),
+        predicted=predicted,
         misfit=float(np.sqrt(max(refit.excess, 0.0) + stack.noise**2)),
         refitted=True,
         genes=effect_genes(stack, refit),
     )
 
 
-def _tested(trial: Trial, whole: float, start: float, stack: Stack) -> Hypothesis:
-    suspect = trial.suspect
-    explained = float(np.clip(trial.gain / whole, 0.0, 1.0))
+def _part(left: float, before: float) -> float:
+    """Which part of a mean square beyond the noise is gone; of nothing, nothing."""
+    return float(np.clip(1.0 - max(left, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
+
+
+def _tested(trial: Trial, start: float, stack: Stack) -> Hypothesis:
+    suspect, samples = trial.suspect, len(stack.scale)
+    by_chance = np.sqrt(2.0 * samples)  # of chi-squared
+    explained = float(np.clip(trial.gain / max(trial.gain + trial.leaves - samples, by_chance), 0.0, 1.0))
     left = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),

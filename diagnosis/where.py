@@ -39,10 +39,7 @@ def _masses(pieces: Sequence[Piece]) -> list[Array]:
 
 
 def _along(pieces: Sequence[Piece], name: str) -> Interval | None:
-    """Middle and extent of the misfit along the span or the chord; None for forces.
-
-    Each place counts by how much larger the misfit is there than markers are dense.
-    """
+    """Middle and extent of the misfit along the span or the chord, by markers; None for forces."""
     at, mass = [], []
     for piece, masses in zip(pieces, _masses(pieces), strict=True):
         for place, one in zip(piece.places, masses, strict=True):
@@ -123,7 +120,8 @@ def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[fl
     rho = np.array([density(c.pressure, c.temperature) for c in conditions])
     speed = np.array([c.airspeed for c in conditions])
     found = [("flap frequency", "Hz", (float(f.min()), float(f.max())), f)]
-    found.append(("air density", "kg/m^3", (float(rho.min()), float(rho.max())), rho))
+    if (rho > 0).all():
+        found.append(("air density", "kg/m^3", (float(rho.min()), float(rho.max())), rho))
     if (speed > 0).all():
         found.append(("airspeed", "m/s", (float(speed.min()), float(speed.max())), speed))
     return found
@@ -146,8 +144,11 @@ def _words(
     return f"{place}, {when}, along {axis}, {line}{scaling}"
 
 
-def acting(span: Interval | None, chord: Interval | None, phase: Interval | None) -> str:
-    """Where the cause of a misfit acts, in words that follow those of the misfit; "" where that is not known."""
+def acting(span: Interval | None, chord: Interval | None, phase: Interval | None, *, driven: bool = False) -> str:
+    """Where the cause of a misfit acts, in words that follow those of the misfit; "" where that is not known.
+
+    ``driven``: rods that move otherwise than they are said to.
+    """
     told = [
         f"{100 * one.value:.0f} % of the {name}{_between(one, 100, 0, ' %')}"
         for name, one in (("span", span), ("chord", chord))
@@ -155,6 +156,8 @@ def acting(span: Interval | None, chord: Interval | None, phase: Interval | None
     ]
     if phase is not None:
         told.append(f"{phase.value % 1.0:.2f} of the beat{_between(phase, 1, 2, '', -(phase.value // 1.0))}")
+    if driven:
+        return "; as a drive that moves otherwise than it is said to" + (f", most at {told[-1]}" if phase else "")
     return f"; its cause acts at {', '.join(told)}" if told else ""
 
 

@@ -56,8 +56,17 @@ def misfit_maps(finding: Finding) -> Markup | None:
     return figure(_misfit_told(finding, given, scale), drawings, note=note)
 
 
+def lacking(finding: Finding) -> str:
+    """What is missing: a load, or a motion of the drive."""
+    return _kind(finding.missing[0]) if finding.missing else "load"
+
+
+def _kind(load: MissingLoad) -> str:
+    return "motion of the drive" if load.unit == "rad" else "load"
+
+
 def missing_loads(finding: Finding) -> Markup | None:
-    """The load that the nominal model lacks, under the conditions where it is largest."""
+    """The load, or motion, that the nominal model lacks, under the conditions where it is largest."""
     loads = [m for m in finding.missing if m.stations and m.phase]
     if not loads:
         return None
@@ -130,13 +139,14 @@ def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
 def _load_told(load: MissingLoad, scale: Scale) -> str:
     i, j, ratio = _peak(load)
     if ratio < NINETY:
-        return "No missing load stands out from its error"
+        return f"No missing {_kind(load)} stands out from its error"
     where = f"phase {number(load.phase[j], 2)}"
     if len(load.stations) > 1:
         where += f" and {share(load.stations[i])} of the span"
     size = number(load.values[i][j] * scale.factor)
     error = number(NINETY * load.errors[i][j] * scale.factor, 2)
-    return f"The missing load is clearest at {where}: {size} ± {error} {scale.unit} ({shortened(load.recording, 40)})"
+    told = f"{size} ± {error} {scale.unit} ({shortened(load.recording, 40)})"
+    return f"The missing {_kind(load)} is clearest at {where}: {told}"
 
 
 def _load_map(load: MissingLoad, scale: Scale) -> Markup:
@@ -169,10 +179,10 @@ def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
     return drawing(
         WIDTH,
         BOTTOM + 34,
-        f"Missing load over the beat, {title}",
+        f"Missing {_kind(load)} over the beat, {title}",
         text(LEFT, 14, title, class_="title"),
         x_axis(across, TOP, BOTTOM, PHASE, BEATS),
-        y_axis(up, LEFT, RIGHT, f"missing load, {scale.unit}"),
+        y_axis(up, LEFT, RIGHT, f"missing {_kind(load)}, {scale.unit}"),
         area([(x, up.at(v)) for x, v in ends], "band"),
         line(LEFT, up.at(0), RIGHT, up.at(0), "axis"),
         curve([(x, up.at(v)) for x, v in zip(places, values, strict=True)], "curve after"),

@@ -67,7 +67,7 @@ def _parts(finding: Finding) -> list[object]:
             misfits.recordings(finding),
         ),
         _section("Where and when", place.place(finding), wing_map.wing_map(finding), beat_maps.misfit_maps(finding)),
-        _section("The load that is missing", beat_maps.missing_loads(finding)),
+        _section(f"The {beat_maps.lacking(finding)} that is missing", beat_maps.missing_loads(finding)),
         _section("What was considered", ranking.ranking(finding)),
         tables.law(finding.law),
         _section("Recorded and simulated", misfits.overlays(finding)),

@@ -80,8 +80,8 @@ class FlexibleWing:
     @cached_property
     def chosen(self) -> tuple[Effect, ...]:
         """The effects, in the order in which they act."""
-        load = (self.probe.effect(),) if self.probe else ()
-        return (*chosen(self.effects, self.wing), *load)
+        known = self.probe.effects() if self.probe else ()
+        return (*chosen(self.effects, self.wing), *known)
 
     def with_effects(self, *names: str) -> FlexibleWing:
         """The same wing with more effects; their genes are appended, switched off."""

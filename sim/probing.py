@@ -110,7 +110,7 @@ def _span(model: FlexibleWing) -> float:
 
 
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
-    """Loads [stations], or twice as many, to begin with, N/m and N: a part of the wing's weight.
+    """Loads [stations], or twice as many, to begin with, N/m and N: a part of the wing's weight. Turns of rods, deg.
 
     More where forces have little lever; moments as of forces at a quarter of the chord.
     """
@@ -119,7 +119,8 @@ def _sizes(model: FlexibleWing, probe: Probe) -> Array:
     edges = model.structure.planform.strips(model.structure.division)
     chord = float(np.mean(model.structure.planform.chord(edges)))
     turning = np.full(len(forces), forces.min() * chord)
-    return np.concatenate([forces, turning]) if probe.turning else np.asarray(forces)
+    turns = np.full(2, np.degrees(MOVES))
+    return np.concatenate([forces, turning][: 1 + probe.turning] + [turns] * probe.driving)
 
 
 def _changes(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from benchmarks.concealed.answer import Answer, Group, Secret, Side
+from benchmarks.concealed.answer import Answer, Group, Side
 from diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
 from sim.effects.registry import EFFECTS
 from sim.wing_genes import wing_genes
@@ -69,7 +70,7 @@ class Mark:
 
 
 def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
-    """A mark with nothing but the answer in it: that of a diagnosis which failed, where nothing follows."""
+    """A mark with nothing but the answer in it, everything missed."""
     missed = bool(answer.secrets)
     return Mark(
         trial=answer.trial,
@@ -79,7 +80,6 @@ def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
         target=answer.target,
         strength=answer.strength,
         verdict=verdict,
-        alarm=not missed and verdict == "failed",
         first=False if missed else None,
         exact=False if missed else None,
         found=0 if missed else None,
@@ -89,6 +89,16 @@ def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
         plant=answer.plant,
         remark=remark,
     )
+
+
+def failed(answer: Answer, remark: str) -> Mark:
+    """The mark of a diagnosis that gave no finding: the worst in all that the trial counts in."""
+    span, chord, phase = (_apart(_true(answer, along), None) for along in ("span", "chord", "phase"))
+    intervals = sum(len(secret.values) for secret in answer.secrets) if answer.secrets else len(_nominal(answer))
+    worst = replace(blank(answer, "failed", remark), alarm=True, wrong=True, intervals=intervals)
+    if not answer.secrets:
+        return worst
+    return replace(worst, held_out=math.inf, worse=True, span=span, chord=chord, phase=phase)
 
 
 def mark(finding: Finding, answer: Answer) -> Mark:
@@ -140,16 +150,15 @@ def side_of(effect: str) -> Side:
 def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]:
     """Held-out misfit over floor, and whether it is worse than the refitted nominal model's.
 
-    The floor is the noise that was put into those very recordings, with what the finding says that its model's division
-    leaves: the scorer has the one by itself, and the other is no fault of a diagnosis.
+    The floor is the noise that was put into those very recordings, and nothing else: a diagnosis may go to a finer
+    division, so what the first one leaves is no excuse.
     """
     held_out = [one for one in finding.recordings if one.held_out]
     if not held_out:
         return None, None
     before = math.hypot(*(one.before.value for one in held_out)) / math.sqrt(len(held_out))
     after = math.hypot(*(one.after.value for one in held_out)) / math.sqrt(len(held_out))
-    floor = math.hypot(answer.noise_held_out, finding.floors.division or 0.0)
-    return after / floor, after > WORSE * before
+    return after / answer.noise_held_out, after > WORSE * before
 
 
 def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
@@ -158,9 +167,7 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
     A plant of finer division has no true value of the coarser model's genes, nor has one with physics that the model
     lacks: only a null trial at equal division has.
     """
-    true: dict[str, float] = {}
-    if not answer.secrets and not answer.finer:
-        true.update({name: value for name, value in answer.genome.items() if name not in SHARES})
+    true = _nominal(answer)
     if finding.verdict in NAMING:
         for secret in answer.secrets:
             if secret.name in finding.named:
@@ -170,32 +177,52 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
     return sum(told), len(told)
 
 
+def _nominal(answer: Answer) -> dict[str, float]:
+    """True values of the nominal genes, where a model can have them."""
+    if answer.secrets or answer.finer:
+        return {}
+    return {name: value for name, value in answer.genome.items() if name not in SHARES}
+
+
+def _true(answer: Answer, along: str) -> float | None:
+    """Where the only thing that is hidden acts along the span, the chord or the beat; None if there is no one place."""
+    value: float | None = getattr(answer.secrets[0], along) if len(answer.secrets) == 1 else None
+    return value
+
+
 def _holds(gene: GeneValue, true: float) -> bool | None:
     low, high = gene.value.low, gene.value.high
     return None if low is None or high is None else low <= true <= high
 
 
 def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | None, float | None]:
-    """How far the place that is told lies from the true one; for several effects at once there is no one place."""
-    if len(answer.secrets) != 1:
-        return None, None, None
-    secret, where = answer.secrets[0], finding.where
-    span = _place(finding, secret, "station") or (where.span if where else None)
-    chord = _place(finding, secret, "chord") or (where.chord if where else None)
+    """How far the place that is told lies from the true one; infinitely, where none is told."""
+    where = finding.where
+    span = _place(finding, answer, "station") or (where.span if where else None)
+    chord = _place(finding, answer, "chord") or (where.chord if where else None)
     phase = where.phase if where else None
     return (
-        None if secret.span is None or span is None else abs(span.value - secret.span),
-        None if secret.chord is None or chord is None else abs(chord.value - secret.chord),
-        None if secret.phase is None or phase is None else 360 * beats_apart(phase.value, secret.phase),
+        _apart(_true(answer, "span"), span),
+        _apart(_true(answer, "chord"), chord),
+        _apart(_true(answer, "phase"), phase, lambda a, b: 360 * beats_apart(a, b)),
     )
 
 
-def _place(finding: Finding, secret: Secret, parameter: str) -> Interval | None:
+def _place(finding: Finding, answer: Answer, parameter: str) -> Interval | None:
     """The place by a gene of the effect that is named, where it has one."""
+    secret = answer.secrets[0]
     if finding.verdict not in NAMING or secret.name not in finding.named:
         return None
     wanted = f"{secret.name}.{parameter}"
     return next((gene.value for gene in finding.genes if gene.name == wanted), None)
+
+
+def _apart(
+    true: float | None, told: Interval | None, distance: Callable[[float, float], float] = lambda a, b: abs(a - b)
+) -> float | None:
+    if true is None:
+        return None
+    return math.inf if told is None else distance(told.value, true)
 
 
 def beats_apart(a: float, b: float) -> float:

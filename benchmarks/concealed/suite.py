@@ -22,11 +22,11 @@ import numpy as np
 
 from benchmarks.concealed import laboratory, seal
 from benchmarks.concealed.answer import Answer
-from benchmarks.concealed.score import Mark, blank, mark
+from benchmarks.concealed.score import Mark, failed, mark
 from benchmarks.concealed.table import Advised, Table
 from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
-from records import Condition
+from records import Condition, load_dataset
 from report import finding_from_json, finding_json
 
 if TYPE_CHECKING:
@@ -230,7 +230,7 @@ def follow_up(
         for trial in trials
         for label, condition in (
             (f"{trial.name}-advised", _advice(first[trial.name])),
-            (f"{trial.name}-random", any_condition(trial, np.random.default_rng([trial.seed, 9]))),
+            (f"{trial.name}-random", _by_chance(trial, folders)),
         )
         if condition is not None
     ]
@@ -242,6 +242,12 @@ def follow_up(
         each(executor, laboratory.add, orders, "recording what was advised")
     again = diagnosed(tool, [(trial, label) for trial, label, _ in wanted], folders, "diagnosing again")
     return {outcome.trial: outcome for outcome in again}
+
+
+def _by_chance(trial: Trial, folders: Folders) -> Condition:
+    """One of the rig's conditions that the dataset does not have."""
+    known = {one.name for one in load_dataset(folders.dataset(trial.name)).recordings}
+    return any_condition(trial, known, np.random.default_rng([trial.seed, 9]))
 
 
 def _advice(outcome: Outcome) -> Condition | None:
@@ -280,5 +286,5 @@ def _advised(trial: Trial, first: Outcome, second: dict[str, Outcome], truth: fr
 
 def _marked(outcome: Outcome, answer: Answer) -> Mark:
     if outcome.finding is None:
-        return replace(blank(answer, "failed", outcome.reason), seconds=outcome.seconds)
+        return replace(failed(answer, outcome.reason), seconds=outcome.seconds)
     return replace(mark(outcome.finding, answer), seconds=outcome.seconds)

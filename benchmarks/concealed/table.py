@@ -199,6 +199,7 @@ class Table:
                 "resolved_percent": rates["advice: resolved"].percent,
                 "random_percent": rates["advice: by a random recording"].percent,
             },
+            "rates": {name: [one.hits, one.n, one.interval] for name, one in rates.items() if one.n},
             "failures": self.failures,
             "seconds": round(self.seconds, 1),
         }
@@ -232,14 +233,13 @@ def wrongs(one: Mark) -> str:
     """What is wrong with a trial, in words; "" where nothing is."""
     if one.verdict == "failed":
         return f"no finding: {one.remark}"
-    said = []
+    said = list[str]()
     if not one.truth:
         return "false alarm" if one.alarm else ""
-    if one.strength < WEAK:
-        said += ["wrong name"] * one.wrong
-        return "; ".join(said)
-    if one.group == "unlisted":
-        said += ["not detected"] * (one.verdict == "adequate")
+    if one.strength < WEAK and one.group != "pairs":
+        pass
+    elif one.group == "unlisted":
+        said += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
     elif one.group == "measurement":
         said += ["wrong side"] * (not one.right_side)
     elif one.group == "pairs":
@@ -280,6 +280,7 @@ def of_kind(marks: Iterable[Mark], name: str) -> list[Mark]:
 
 
 def median(values: Iterable[float | None]) -> float | None:
-    """Of those that there are; None of none."""
+    """Of those that there are; None of none, and where it is not finite."""
     told = [value for value in values if value is not None]
-    return round(float(np.median(told)), 4) if told else None
+    middle = float(np.median(told)) if told else math.inf
+    return round(middle, 4) if math.isfinite(middle) else None

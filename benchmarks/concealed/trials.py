@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, cycle, islice
 from typing import Literal
@@ -226,8 +226,12 @@ def _flights(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bo
     return [(flight(k), False) for k in chosen] + [(flight(k), True) for k in held_out]
 
 
-def any_condition(trial: Trial, rng: np.random.Generator) -> Condition:
-    """A condition of the rig's, drawn at random."""
+def any_condition(trial: Trial, known: Collection[str], rng: np.random.Generator) -> Condition:
+    """A condition of the rig's, drawn at random from those that do not have the name of one ``known``."""
+    return next(one for one in iter(lambda: _drawn(trial, rng), None) if name_of(one) not in known)
+
+
+def _drawn(trial: Trial, rng: np.random.Generator) -> Condition:
     if trial.build.rig == "vehicle":
         return flight(int(rng.integers(len(FLIGHT))))
     lag, frequency = float(rng.choice(LAGS)), float(rng.choice(FREQUENCIES))

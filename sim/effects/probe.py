@@ -1,7 +1,7 @@
-"""A known load on the wing, given by its place along the span and in the beat: a probe, no suspect.
+"""A known load on the wing, given by its place along the span and in the beat, or a known motion of its drive.
 
-What the tracks answer to it tells which load is missing where a model and a recording differ. It is not in the
-registry: a search for what is missing must not name it.
+A probe, no suspect: what the tracks answer to it tells which load is missing where a model and a recording differ, or
+which motion. It is not in the registry: a search for what is missing must not name it.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sim.structure import Structure
 Array = npt.NDArray[np.float64]
 
 LARGEST = 1000.0  # N/m, of a gene: far beyond what a wing bears
+_FURTHEST = 90.0  # deg, likewise of what a rod turns further
 _THINNEST = 1e-9  # kg/m^3: loads are told as parts of the air's, so that there must be some
 _CUTS = 1200  # of the span, for the means of its hats
 
@@ -35,13 +36,16 @@ class Probe:
 
     ``stations`` in parts of the span, rising from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency. It acts
     along the normal of the wing where it is, upward, and is spread over the chord. With ``turning`` there is a moment
-    about the span as well, nose up, N m/m: a force before or behind the middle of the chord is both. The genes of the
-    effect (:meth:`effect`) are numbered station by station, forces first: constant, cosines, sines (:meth:`terms`).
+    about the span as well, nose up, N m/m: a force before or behind the middle of the chord is both. With ``driving``
+    both rods turn further by such a series each, deg, the rear one later by its lag. The genes of the effects
+    (:meth:`effects`) are numbered station by station, forces first, rods last: constant, cosines, sines
+    (:meth:`terms`).
     """
 
     stations: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
     harmonics: int = 8
     turning: bool = False
+    driving: bool = False
 
     def __post_init__(self) -> None:
         y = np.array(self.stations)
@@ -52,12 +56,17 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of its genes, P = stations times (1 + 2 harmonics), and twice that with moments."""
+        """Number of its genes, P = stations times (1 + 2 harmonics), twice that with moments; and of two rods."""
+        return self.loads + (2 * (1 + 2 * self.harmonics) if self.driving else 0)
+
+    @property
+    def loads(self) -> int:
+        """Number of those that are forces or moments."""
         return self.forces * (2 if self.turning else 1)
 
     @property
     def forces(self) -> int:
-        """Number of those that are forces; the others are moments."""
+        """Number of those that are forces."""
         return len(self.stations) * (1 + 2 * self.harmonics)
 
     def terms(self, phase: npt.ArrayLike) -> Array:
@@ -84,10 +93,35 @@ class Probe:
         hats = self.hats(span)
         return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
-    def effect(self) -> Effect:
-        """The load as an effect, for :class:`sim.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
-        names = ["0", *(f"{kind}{k}" for kind in "cs" for k in range(1, self.harmonics + 1))]
-        what = {"0": "constant", "c": "cosine", "s": "sine"}
+    def effects(self) -> tuple[Effect, ...]:
+        """Load and motion as effects, for :class:`sim.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
+        return (self._load(), self._motion()) if self.driving else (self._load(),)
+
+    @property
+    def _series(self) -> dict[str, str]:
+        """Names of the terms, and what they are."""
+        kinds = {"c": "cosine", "s": "sine"}
+        terms = {f"{kind}{k}": f"{told} {k}" for kind, told in kinds.items() for k in range(1, self.harmonics + 1)}
+        return {"0": "constant", **terms}
+
+    def _motion(self) -> Effect:
+        return Effect(
+            name="driving_probe",
+            title="Known motion of the drive",
+            family="actuation",
+            port="drive",
+            size=tuple(
+                Parameter(f"{rod}_{name}", "deg", -_FURTHEST, _FURTHEST, 0.1, f"{rod} rod turns further, {told}")
+                for rod in ("front", "rear")
+                for name, told in self._series.items()
+            ),
+            source="Fourier series of the drive phase, for each rod",
+            signature="whatever one wishes",
+            confused_with=(),
+            wing=_drive,
+        )
+
+    def _load(self) -> Effect:
         loads = [("", "N/m", "force"), ("turn", "N", "moment nose up")][: 2 if self.turning else 1]
         return Effect(
             name="probe",
@@ -101,11 +135,11 @@ class Probe:
                     -LARGEST,
                     LARGEST,
                     1.0,
-                    f"{told} per metre of span at {y:g} of it, {what[name[0]]}",
+                    f"{told} per metre of span at {y:g} of it, {what}",
                 )
                 for load, unit, told in loads
                 for j, y in enumerate(self.stations)
-                for name in names
+                for name, what in self._series.items()
             ),
             source="sum of hats of the span times Fourier series of the drive phase: any load, as well as these can",
             signature="whatever one wishes",
@@ -167,7 +201,7 @@ def _further(turned: Any, by: Any) -> Any:
 
 
 def _wing(probe: Probe, scene: WingScene, values: Values) -> None:
-    kinds = probe.size // probe.forces
+    kinds = probe.loads // probe.forces
     sizes = np.array(list(values.values())).reshape(kinds, len(probe.stations), 1 + 2 * probe.harmonics, -1)
     scene.density = np.maximum(scene.density, _THINNEST)
     strips, levers = probe.on_strips(scene.structure)
@@ -176,3 +210,15 @@ def _wing(probe: Probe, scene: WingScene, values: Values) -> None:
         laws.append((_turn, strips, sizes[1]))
     for law, shares, loads in laws:
         scene.add_strip_law(law, list(np.einsum("sj,jkw->ksw", shares, loads)))
+
+
+def _drive(scene: WingScene, values: Values) -> None:
+    rods, lag = scene.rods, scene.condition.phase_lag
+    sizes = np.radians(np.array(list(values.values())))
+    sizes = sizes.reshape(2, len(sizes) // 2, -1)
+    harmonics = sizes.shape[1] // 2
+    rods.lengthened(harmonics)
+    rods.series[0] += sizes[:, 0]
+    for k in range(1, harmonics + 1):
+        turned = sizes[:, k] - 1j * sizes[:, harmonics + k]
+        rods.series[k] += turned * np.exp(-1j * k * np.array([[0.0], [lag]]))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from benchmarks.concealed.answer import GROUPS, Answer, Secret
 from benchmarks.concealed.laboratory import Addition, Order, add, make
 from benchmarks.concealed.plant import observe, observe_forces
 from benchmarks.concealed.plant.catalogue import UNKNOWN
-from benchmarks.concealed.score import Mark, beats_apart, blank, mark
+from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.suite import Folders, diagnosed
@@ -207,7 +208,8 @@ def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
     assert figures["heldout_worse_percent"] == 50.0
     assert figures["advice"] == {"n": 1, "resolved_percent": 100.0, "random_percent": 0.0}
     assert [row["trial"] for row in figures["failures"]] == ["trial-1", "trial-2", "trial-3", "trial-6"]
-    assert {"seconds", "coverage_percent", "place", "pairs", "measurement"} <= set(figures)
+    assert {"seconds", "coverage_percent", "place", "pairs", "measurement", "rates"} <= set(figures)
+    assert figures["rates"]["null: false alarms"][:2] == [1, 2]
     assert len(at(marks, 5)) == 1
     rows = Table((*marks, replace(marks[0], division="4", plant="8x1")), advised, 1, 3.0).rows()
     assert rows["wing 4 of 4: nulls without alarm"].startswith(" 50.0 %  (1 of 2")
@@ -216,12 +218,31 @@ def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
     json.dumps(figures)
 
 
-def test_a_diagnosis_that_fails_fails_its_trial() -> None:
-    failed = blank(answer(MASS), "failed", "ValueError: no")
-    table = Table((failed,), (), 0, 1.0)
+def test_a_diagnosis_that_fails_gets_the_worst_in_all_that_its_trial_counts_in() -> None:
+    table = Table((failed(answer(MASS), "ValueError: no"), failed(answer(group="null"), "")), (), 0, 1.0)
+    figures = table.as_json()
     assert table.rates["listed, d = 2: top-1"].percent == 0.0
     assert table.failures[0]["what"] == "no finding: ValueError: no"
-    assert blank(answer(group="null"), "failed").alarm
+    assert figures["null"]["false_alarms"] == 1
+    assert figures["wrong_name_percent"] == figures["heldout_worse_percent"] == 100.0
+    assert table.coverage.percent == 0.0
+    assert table.coverage.n == 2  # the mass, and E_f: shares have no value of their own
+    assert figures["heldout_over_floor_median"] is None  # it is not finite
+    assert figures["place"] == {"span_R": None, "chord_c": None, "phase_deg": None}
+    json.dumps(figures, allow_nan=False)
+
+
+def test_a_place_that_is_not_told_is_far_off() -> None:
+    silent = replace(finding("unnamed"), where=None)
+    marks = mark(silent, answer(MASS))
+    assert (marks.span, marks.chord, marks.phase) == (math.inf, math.inf, math.inf)
+    assert mark(silent, answer(replace(MASS, phase=None))).phase is None
+
+
+def test_what_a_division_is_said_to_leave_is_no_excuse() -> None:
+    found = finding("named", ("lumped_mass",))
+    boasting = replace(found, floors=replace(found.floors, division=1e-2))
+    assert mark(boasting, answer(MASS)).held_out == mark(found, answer(MASS)).held_out
 
 
 def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
@@ -263,7 +284,10 @@ def test_conditions_keep_to_the_rigs() -> None:
         drawn = conditions(trial, rng)
         assert len({name_of(condition) for condition, _ in drawn}) == len(drawn)
         assert any(held for _, held in drawn)
-        for condition in [*(one for one, _ in drawn), any_condition(trial, rng)]:
+        known = {name_of(one) for one, _ in drawn}
+        another = any_condition(trial, known, rng)
+        assert name_of(another) not in known
+        for condition in [*(one for one, _ in drawn), another]:
             if trial.build.rig == "wing":
                 assert 2.0 <= condition.flap_frequency <= 4.0
                 assert condition.airspeed == 0.0 or 3.5 <= condition.airspeed <= 8.5

@@ -63,6 +63,19 @@ def pushed(
     return genome
 
 
+def hurried(wing: FlexibleWing, condition: Condition, when: float, turn_deg: float, lasting: float = 0.05) -> Array:
+    """Genome of ``wing``, whose probe drives: its rods are further on for a moment, ``when`` beats after rising."""
+    probe, blank, genome = wing.probe, blank_recording(wing.wing, condition), nominal(wing)
+    assert probe is not None
+    phase = np.arange(256) / 256
+    for _ in range(2):  # that moves the crossing a little
+        start = crossing(wing, blank, wing.beat(genome, blank).tracks)
+        during = (phase - when - start + 0.5) % 1.0 - 0.5
+        series = np.linalg.pinv(probe.terms(phase)) @ (turn_deg * np.exp(-0.5 * (during / lasting) ** 2))
+        genome[-2 * len(series) :] = np.tile(series, 2)
+    return genome
+
+
 def noise(shape: tuple[int, int], rng: np.random.Generator) -> Array:
     """[T, C] with NOISE and MEMORY."""
     found = rng.standard_normal(shape)

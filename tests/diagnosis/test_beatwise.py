@@ -101,11 +101,24 @@ def test_a_low_pass_limits_what_is_looked_at() -> None:
     [(1, 30, "a diagnosis needs a beat"), (40, 1, "tell no harmonic"), (6, 30, "no harmonic|no channel")],
 )
 def test_what_tells_no_beat_is_refused_with_a_remedy(frames: int, per_beat: int, message: str) -> None:
-    one = recording(np.zeros((frames, 3)))
+    one = recording(noise(frames, 0.0, 1, 3))
     if per_beat == 1:  # every frame at the same phase
         one = replace(one, times=np.arange(frames) / CONDITION.flap_frequency)
     with pytest.raises(ValueError, match=message):
         beatwise(one)
+
+
+def test_a_recording_in_which_nothing_moves_is_refused_and_a_stuck_marker_is_not() -> None:
+    values = np.tile([1.0, 0.0, 0.2, 0.0, 0.0, 0.0], (124, 1))
+    with pytest.raises(ValueError, match=r"nothing moves, .* all 124 samples; check"):
+        beatwise(recording(values))
+    values[:, :3] += noise(124, 0.5, 1, 3)
+    assert np.isfinite(beatwise(recording(values)).variance).all()
+
+
+def test_no_recording_is_refused() -> None:
+    with pytest.raises(ValueError, match="no recording to diagnose"):
+        Stack.of([])
 
 
 def test_excess_is_what_is_there_beyond_the_noise() -> None:

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from diagnosis.assess import _unended
-from diagnosis.decide import KNOWN, weighed
+from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, weighed
 from diagnosis.finding import Interval
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
-from diagnosis.verdict import decided
-from diagnosis.where import acting
+from diagnosis.verdict import _part, decided
+from diagnosis.where import _variables, acting
+from records import Condition
 
 
 def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure") -> Refit:
@@ -65,6 +66,38 @@ def test_where_a_cause_acts_is_told_with_its_interval() -> None:
         "; its cause acts at 85 % of the span (37 to 90 %), 50 % of the chord, 0.25 of the beat (0.20 to 0.30)"
     )
     assert acting(None, None, None) == ""
+
+
+@pytest.mark.parametrize(
+    ("nominal", "effect", "unknown", "expected"),
+    [(0.48, 0.47, 0.05, "named"), (0.48, 0.05, 0.47, "unnamed"), (0.52, 0.43, 0.05, "adequate")],
+)
+def test_that_something_lacks_comes_before_what(nominal: float, effect: float, unknown: float, expected: str) -> None:
+    refits, shares = (refit(1.0), refit(0.5, ("a",))), np.array([nominal, effect])
+    assert decided(Weighed(refits, np.log(shares), shares, unknown, np.array([1.0, 0.25]))).verdict == expected
+
+
+def test_a_misfit_that_noise_cannot_make_is_looked_into_however_few_the_pieces() -> None:
+    one = stack(1, 0.01)
+    assert refuted(one, refit(0.45).excess, 0.0)
+    assert not beyond_doubt(one, refit(0.45), 40)
+    assert beyond_doubt(stack(1, 0.1), refit(0.45), 40)
+
+
+@pytest.mark.parametrize(
+    ("left", "before", "part"),
+    [(1.0, 4.0, 0.75), (-0.1, 4.0, 1.0), (9.0, 4.0, -1.0), (1.0, 0.0, 0.0), (0.1, -0.1, 0.0)],
+)
+def test_what_is_explained_is_a_part_of_the_misfit_and_of_none_nothing(left: float, before: float, part: float) -> None:
+    assert _part(left, before) == part
+
+
+def test_a_vacuum_has_no_power_of_its_density() -> None:
+    def named(*pressures: float) -> list[str]:
+        return [name for name, *_ in _variables([Condition(3.0, 0.0, p, 293.15) for p in pressures])]
+
+    assert named(0.0, 1e3, 1e5) == ["flap frequency"]
+    assert named(1e3, 1e5) == ["flap frequency", "air density"]
 
 
 def test_what_leaves_most_is_no_name() -> None:

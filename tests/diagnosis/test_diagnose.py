@@ -75,6 +75,33 @@ def test_what_is_concealed_is_named_and_proved(truth: dict[str, float], verdict:
     assert found.proof.after.value < 1.1 < 1.1 * found.proof.before.value
 
 
+@pytest.mark.parametrize("fails", [(3.0,), HELD_OUT])
+def test_what_cannot_be_predicted_proves_nothing(monkeypatch: pytest.MonkeyPatch, fails: tuple[float, ...]) -> None:
+    """With the effect put in the model finds no motion under some, or all, held-out conditions."""
+    truth = {**NOMINAL, "friction.torque": 2e-3}
+    fitted, held_out = recorded(truth, noise=5e-4, seed=1), recorded(truth, noise=5e-4, seed=2, frequencies=HELD_OUT)
+    seen = Pendulum._seen
+
+    def failing(self: Pendulum, values: Mapping[str, float], recording: Recording) -> np.ndarray:
+        lost = values.get("friction.torque", 0.0) > 0.0 and recording.condition.flap_frequency in fails
+        return np.full(recording.values.shape, np.nan) if lost else seen(self, values, recording)
+
+    monkeypatch.setattr(Pendulum, "_seen", failing)
+    found = diagnosed(fitted, held_out)
+    assert found.named == ("friction",)
+    assert sum("was not predicted: what was found fails there" in remark for remark in found.remarks) == len(fails)
+    proved = [one for one in found.recordings if one.held_out]
+    assert len(proved) == len(HELD_OUT) - len(fails)
+    assert all(one.after.value > 0.0 for one in proved)
+    if found.proof is None:
+        assert "nothing proves it" in found.summary
+    else:
+        assert not found.proof.improved
+        assert found.proof.after.value == pytest.approx(1.0, abs=0.1)
+    assert finding_from_json(finding_json(found)) == found
+    assert "was not predicted" in html(found)
+
+
 def test_two_at_once_are_both_named() -> None:
     found = finding({"friction.torque": 2e-3, "gain.part": 0.03})
     assert set(found.named) == {"friction", "gain"}

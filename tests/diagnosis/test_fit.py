@@ -14,10 +14,11 @@ import pytest
 
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
-from diagnosis.assess import Assessment, _elsewhere
-from diagnosis.fit import Fit, _Look, _measured, _step, thoroughly
+from diagnosis import DiagnosisSpec
+from diagnosis.assess import Assessment, _elsewhere, _settled
+from diagnosis.fit import CannotBeginError, Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
-from diagnosis.nominal import Nominal
+from diagnosis.nominal import Nominal, promises
 from diagnosis.refit import RACE, afresh, judged, left_out, refitted, substitutes
 from diagnosis.screen import Nuisance, screened
 from diagnosis.stack import PIECES, TOLERANCE, Stack
@@ -171,6 +172,54 @@ def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
     assert _elsewhere(state, EVALUATOR) is None
 
 
+@pytest.mark.parametrize(
+    ("changes", "takes", "left", "expected"),
+    [
+        (0.5, 0.2, 2.0, True),
+        (0.5, 0.05, 2.0, False),
+        (3.0, 0.0, 2.0, True),
+        (0.1, 0.9, 2.0, False),
+        (3.0, 0.9, 0.1, False),
+    ],
+)
+def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
+    changes: float, takes: float, left: float, expected: int
+) -> None:
+    """It takes a part of the misfit; or it changes more than all of that, and the tangent knows nothing of it."""
+    stack, now = SimpleNamespace(noise=1.0), SimpleNamespace(excess=left**2)
+    assert promises(cast("Any", stack), changes, takes, cast("Any", now)) == bool(expected)
+
+
+@pytest.mark.parametrize(
+    ("coarse", "asked", "taken"),
+    [(0.1, ["coarse"], "coarse"), (0.9, ["coarse", "fine"], "fine"), (None, ["coarse", "fine"], "fine")],
+)
+def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
+    monkeypatch: pytest.MonkeyPatch, coarse: float | None, asked: list[str], taken: str
+) -> None:
+    """Suspects are tried at the coarse one first, and it stays where one of them does better than the finer one."""
+
+    def found(subject: str, excess: float) -> Any:
+        return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess))
+
+    def tried(state: Any, *_: Any, **__: Any) -> Iterator[Any]:
+        begun.append(state.subject)
+        if coarse is not None:
+            state.refits.append(SimpleNamespace(excess=coarse))
+        yield 1.0, "tried"
+
+    begun: list[str] = []
+    fits = {False: found("coarse", 1.0), True: found("fine", 0.7)}
+    monkeypatch.setattr("diagnosis.assess.settled", lambda *_, refine: fits[refine])
+    monkeypatch.setattr("diagnosis.assess._suspected", tried)
+    state = Assessment(cast("Any", "coarse"), cast("Any", None))
+    parts = [part for part, _ in _settled(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
+    assert begun == asked
+    assert cast("Any", state.nominal).subject == taken
+    assert cast("Any", state.subject) == taken
+    assert parts == sorted(parts)
+
+
 def test_of_several_suspects_the_best_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """One cannot be simulated, one ends early, one falls behind, one wins."""
     falling = [20.0 - k for k in range(20)]
@@ -180,7 +229,7 @@ def test_of_several_suspects_the_best_goes_on_alone(monkeypatch: pytest.MonkeyPa
     def steps(*arguments: Any) -> Iterator[Any]:
         name = arguments[-1]
         if not costs[name]:
-            raise ValueError("it cannot be simulated")
+            raise CannotBeginError("it cannot be simulated")
         for cost in costs[name]:
             asked[name] += 1
             yield SimpleNamespace(cost=cost)

@@ -9,14 +9,27 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from diagnosis.missing import PHASES, Case, infer, missing_force, missing_loads, place
+from diagnosis.finding import Interval
+from diagnosis.missing import PHASES, Case, LoadPlace, infer, missing_force, missing_loads, place
 from sim.effects.probe import Probe
 from sim.probing import Probed
-from tests.diagnosis.loaded import CONDITIONS, MEMORY, NOISE, case, chord_at, filmed, model, noise, nominal, pushed
+from tests.diagnosis.loaded import (
+    CONDITIONS,
+    MEMORY,
+    NOISE,
+    case,
+    chord_at,
+    filmed,
+    hurried,
+    model,
+    noise,
+    nominal,
+    pushed,
+)
 
 Array = npt.NDArray[np.float64]
 
-PROBE = Probe()
+PROBE, DRIVING = Probe(), Probe(driving=True)
 PLACE, WHEN, SIZE = 0.7, 0.3, 10.0
 
 
@@ -32,6 +45,49 @@ def cases() -> tuple[tuple[Case, Probed], ...]:
     return tuple(found)
 
 
+@cache
+def hurried_cases() -> tuple[tuple[Case, Probed], ...]:
+    """The same, not pushed: its rods are a degree further on for a moment."""
+    plant, found = replace(model("6x1"), probe=Probe((0.0, 1.0), 12, driving=True)), []
+    for k, condition in enumerate(CONDITIONS):
+        recording = filmed(plant, hurried(plant, condition, WHEN, 1.0), condition, np.random.default_rng(k))
+        found.append(case(model("6x1"), recording, DRIVING))
+    return tuple(found)
+
+
+def test_a_drive_that_hurries_is_no_load() -> None:
+    inferred = infer([one for one, _ in hurried_cases()], DRIVING)
+    found = place(inferred)
+    assert inferred.driven
+    assert found is not None
+    assert found.span is found.chord is None
+    assert found.phase is not None
+    assert abs(found.phase.value - WHEN) < 10.0 / 360.0
+    for motion in missing_loads(inferred):
+        values = np.degrees(motion.values[0])
+        assert motion.unit == "rad"
+        assert abs(motion.phase[int(np.argmax(values))] - WHEN) < 10.0 / 360.0
+        assert values.max() - values.mean() == pytest.approx(0.87, abs=0.15)  # of the degree, the mean apart
+
+
+def test_a_push_is_no_drive_that_hurries() -> None:
+    plant = replace(model("6x1"), probe=Probe(tuple(np.linspace(0.0, 1.0, 21).tolist()), 12))
+    found = []
+    for k, condition in enumerate(CONDITIONS[:2]):
+        recording = filmed(plant, pushed(plant, condition, PLACE, WHEN, SIZE), condition, np.random.default_rng(k))
+        found.append(case(model("6x1"), recording, DRIVING)[0])
+    inferred = infer(found, DRIVING)
+    assert not inferred.driven
+    assert span_of(place(inferred)).value == pytest.approx(PLACE, abs=0.1)
+
+
+def span_of(found: LoadPlace | None) -> Interval:
+    """Where along the span it acts, which it must say."""
+    assert found is not None
+    assert found.span is not None
+    return found.span
+
+
 def quiet(one: Case, rng: np.random.Generator, size: Array | None = None) -> Case:
     """The same with noise alone, and perhaps a load of a ``size`` [P]."""
     lacking = rng.standard_normal(len(one.lacking))
@@ -45,10 +101,11 @@ def test_a_push_is_found_with_all_genes_free() -> None:
     assert found.phase is not None
     assert found.chord is None
     assert abs(found.phase.value - WHEN) < 10.0 / 360.0
-    assert abs(found.span.value - PLACE) < 0.05
-    assert found.span.low is not None
-    assert found.span.high is not None
-    assert found.span.high - found.span.low < 0.35
+    span = span_of(found)
+    assert abs(span.value - PLACE) < 0.05
+    assert span.low is not None
+    assert span.high is not None
+    assert span.high - span.low < 0.35
     assert found.lasts[0] > WHEN - 0.12
     assert found.lasts[1] < WHEN + 0.12
     assert found.reach[0] > 0.2
@@ -63,10 +120,9 @@ def test_a_push_is_found_with_all_genes_free() -> None:
 
 def test_doubt_about_the_model_widens_the_place() -> None:
     sure, doubtful = (place(infer([one for one, _ in cases()], PROBE, doubt=doubt)) for doubt in (0.0, 0.002))
-    assert sure is not None
-    assert doubtful is not None
-    assert abs(doubtful.span.value - PLACE) < 0.05
-    ends = [one.span.high - one.span.low for one in (sure, doubtful) if one.span.high and one.span.low]
+    assert abs(span_of(doubtful).value - PLACE) < 0.05
+    spans = [span_of(one) for one in (sure, doubtful)]
+    ends = [span.high - span.low for span in spans if span.high and span.low]
     assert ends[1] > 2 * ends[0]
 
 
@@ -83,7 +139,7 @@ def test_where_along_the_chord_it_is_pushed(part: float) -> None:
     assert told is not None
     assert told.chord is not None
     assert abs(told.chord.value - part) < 0.1
-    assert abs(told.span.value - PLACE) < 0.15
+    assert abs(span_of(told).value - PLACE) < 0.15
 
 
 def test_a_probe_that_turns_needs_the_chord() -> None:

@@ -11,6 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from calibration.spec import CalibrationSpec
+from diagnosis import DiagnosisSpec, check
 from diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
 from diagnosis.subject import Subject
 from records import Dataset, Wing
@@ -135,6 +136,27 @@ def test_a_term_of_a_vehicle_is_no_suspect_and_one_left_out_is(vehicle: Dataset)
     assert lacks - has == {"clap_and_peel"}
     assert {s.name for s in subject_of(apart, CalibrationSpec(without=("clap_and_peel",))).suspects} == has
     assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).told
+
+
+def test_what_cannot_be_diagnosed_is_refused_before_anything_is_simulated(wing: Dataset) -> None:
+    subject = subject_of(wing, FEW)
+    genome = nominal(subject)
+    moving = [replace(r, values=subject.model.observe(genome, r).channels[0]) for r in wing.recordings]
+    known = replace(wing, recordings=tuple(moving))
+    check(known, DiagnosisSpec(calibration=FEW))
+    short = replace(moving[0], name="short", times=moving[0].times[:3], values=moving[0].values[:3])
+    for dataset, spec, message in (
+        (
+            replace(known, recordings=(*moving, short), held_out=("short",)),
+            DiagnosisSpec(),
+            "'short': none of the reference markers",
+        ),
+        (known, DiagnosisSpec(start={"mass_of_nothing": 1.0}), "mass_of_nothing"),
+        (known, DiagnosisSpec(refits=0), "refits is 0"),
+        (known, DiagnosisSpec(suspects=("nothing",)), "unknown suspect 'nothing'"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            check(dataset, replace(spec, calibration=FEW))
 
 
 def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from records import Condition
 from sim.division import Division
+from sim.drive import RodDrive
 from sim.effects.probe import LARGEST, Probe, strip_middles
 from sim.effects.registry import EFFECTS
 from sim.flexible_wing import FlexibleWing
@@ -109,6 +110,23 @@ def test_answers_are_those_of_any_size_and_motion_is_that_of_the_wing() -> None:
     at_crossing = motion.velocity[-1, 0]  # the tip, on the upstroke
     assert at_crossing > 0.9 * np.abs(motion.velocity[-1]).max() or at_crossing > 1.0
     np.testing.assert_allclose(motion.mass @ np.full(3, SPAN / 3), sum(b.mass for b in BARE.structure.bodies), rtol=0.2)
+
+
+def test_rods_turn_as_the_series_says() -> None:
+    """As the harmonics of a drive do that are an effect of the library, written by itself."""
+    blank = blank_recording(WING, tunnel(0.15, 3.0, 6.0))
+    effect = replace(BARE, effects=("drive_harmonics",))
+    values = {gene.name: gene.nominal for gene in effect.genes} | {
+        "drive_harmonics.cos2": 0.03, "drive_harmonics.sin3": -0.02,
+    }  # fmt: skip
+    amplitude = np.degrees(abs(RodDrive.of(WING.drive, 0.0, 1).series[1, 0, 0]))
+    known = effect.beat(np.array(list(values.values())), blank).tracks
+    model, genome = with_load(replace(SMALL, driving=True, harmonics=3))
+    names = [gene.name for gene in model.genes]
+    for rod in ("front", "rear"):
+        genome[names.index(f"driving_probe.{rod}_c2")] = 0.03 * amplitude
+        genome[names.index(f"driving_probe.{rod}_s3")] = -0.02 * amplitude
+    np.testing.assert_allclose(model.beat(genome, blank).tracks, known, atol=1e-9)
 
 
 @pytest.mark.parametrize("stations", [(0.0,), (0.1, 1.0), (0.0, 0.5), (0.0, 0.6, 0.5, 1.0)])

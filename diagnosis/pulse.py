@@ -1,0 +1,74 @@
+"""When in the beat a force acts that a model lacks: a pulse that does so, the nominal genes free (a matched filter).
+
+The misfit that is left by a fit is not the force that lacks: genes have taken up what they can, and a low-pass has
+spread the rest. So a short pulse is put at every instant of the beat, with a size of its own in every channel of every
+recording; where it takes most away, with what the genes can do taken out of both, it acts (Turin, IRE Transactions on
+Information Theory 6, 311, 1960). A wider pulse would as soon fit what swings back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from diagnosis.finding import Interval
+from diagnosis.fit import Fit
+from diagnosis.screen import Nuisance
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+INSTANTS = 144
+WIDTH = 0.015  # of a beat, standard deviation
+TAKES = 0.1  # of the misfit: a pulse that takes less tells no instant
+NINETY = 2.706  # chi-squared of one degree
+
+
+def pulse(subject: Subject, stack: Stack, fit: Fit) -> Interval | None:
+    """Instant (beats) of the pulse that takes most of what ``fit`` leaves; None where none takes much.
+
+    Its interval holds the instants at which it would take nearly as much, a misfit counting as a model's error.
+    """
+    nuisance = Nuisance(stack, fit)
+    left, white = nuisance.left, fit.coefficients / stack.scale
+    phase = np.arange(INSTANTS) / INSTANTS
+    gain = np.array([_taken(nuisance, _pulses(subject, stack, at)) for at in phase])
+    best = int(np.argmax(gain))
+    if gain[best] < TAKES * float(left @ left):
+        return None
+    beyond = max(float(white @ white) - gain[best] - len(white), 0.0)
+    near = gain[best] - gain < NINETY * (1.0 + beyond / stack.pieces)
+    apart = (phase - phase[best] + 0.5) % 1.0 - 0.5
+    low, high = (_reach(near, apart, sign) for sign in (-1, 1))
+    return Interval(float(phase[best]), float(phase[best] - low), float(phase[best] + high))
+
+
+def _reach(near: npt.NDArray[np.bool_], apart: Array, sign: int) -> float:
+    """How far the instants that are ``near`` reach to one side without a gap, and half an instant beyond."""
+    order = np.argsort(np.where(sign * apart >= 0, sign * apart, np.inf))[: INSTANTS // 2]
+    ends = np.flatnonzero(~near[order])
+    return float(sign * apart[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
+
+
+def _pulses(subject: Subject, stack: Stack, at: float) -> Array:
+    """[channels, D]: a pulse ``at`` an instant (beats) in every channel of every recording, by itself."""
+    rows = []
+    for recording, view, part in zip(stack.recordings, stack.views, stack.parts, strict=True):
+        order = np.arange(1, int(view.order[~view.trend].max()) + 1)
+        psi = subject.origin(recording) + 2 * np.pi * at
+        size = 2 * np.exp(-0.5 * (2 * np.pi * WIDTH * order) ** 2)
+        own = np.zeros(len(view.order))
+        own[: 2 * len(order) + 1] = np.concatenate([[1.0], size * np.cos(order * psi), size * np.sin(order * psi)])
+        for channel in range(int(view.used.sum())):
+            row = np.zeros(len(stack.scale))
+            row[part][channel * len(own) : (channel + 1) * len(own)] = own
+            rows.append(row)
+    return np.array(rows)
+
+
+def _taken(nuisance: Nuisance, fields: Array) -> float:
+    """Decrease of chi-squared by ``fields`` [S, D] of free sizes, the nominal genes adapting."""
+    own = nuisance.rest(fields)
+    inner, score = own @ own.T, own @ nuisance.left
+    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)), score))
