@@ -124,7 +124,7 @@ def _settled(
 ) -> Iterator[tuple[float, str]]:
     """Suspects beside the nominal ``fit``; where a finer division does better than all of these, beside that one's."""
     nominal = settled(state.subject, state.stack, evaluator, fit, refine=spec.refine)
-    if nominal.subject is not state.subject:
+    if nominal.subject is not state.subject and not beyond_doubt(state.stack, nominal.refit, len(suspects)):
         _begin(state, settled(state.subject, state.stack, evaluator, fit, refine=False))
         for fraction, stage in _suspected(state, spec, suspects, evaluator, at_least=nominal.refit):
             yield 0.3 * fraction, stage
@@ -171,7 +171,8 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    innocent, leading = nominal.innocent, sorted(state.refits, key=lambda one: one.excess)[:CONTINUED]
+    innocent, most = nominal.innocent, RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)
+    leading = sorted((one for one in state.refits if one.excess <= most), key=lambda one: one.excess)[:CONTINUED]
     for finer in nominal.subject.finer():
         tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
         innocent = innocent or any(found is not None and found is not one for one, found in tried)
@@ -225,17 +226,18 @@ def _suspected(
 ) -> Iterator[tuple[float, str]]:
     """Score tests about the nominal fit, then refits; yields the part of that done.
 
-    No refits where none promises to leave less than the nominal model of a finer division (``at_least``) does: a
-    division may take up what an effect leaves, as an effect may take up what a division leaves.
+    Few or no refits where none does, or promises to do, better than the nominal model of a finer division
+    (``at_least``): a division may take up what an effect leaves, as an effect may take up what a division leaves.
     """
     nominal = _known(state)
     for k, (suspect, trials) in enumerate(screened(state.subject, state.stack, nominal.refit.fit, evaluator, suspects)):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
+    if beyond_doubt(state.stack, nominal.refit, len(suspects)):
+        return
     least = min((trial.leaves for trials in state.trials for trial in trials), default=np.inf)
-    promising = at_least is None or least < state.stack.chi_squared(at_least.fit.coefficients)
-    if promising and not beyond_doubt(state.stack, nominal.refit, len(suspects)):
-        yield from _refits(state, nominal, spec, evaluator)
+    if at_least is None or least < state.stack.chi_squared(at_least.fit.coefficients):
+        yield from _refits(state, nominal, spec, evaluator, at_least)
 
 
 def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
@@ -258,12 +260,14 @@ def _known(state: Assessment) -> Nominal:
 
 
 def _refits(
-    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
+    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
 ) -> Iterator[tuple[float, str]]:
     """Suspects one by one, from the estimates where none could be named, then together while none explains enough."""
     yield from _alone(state, nominal, spec, evaluator)
     yield 0.72, "continuing the best refits"
     if _solved(state, nominal, evaluator):
+        return
+    if at_least is not None and not any(improves(one, at_least) for one in state.refits):
         return
     if min(one.excess for one in state.refits) > UNKNOWN**2 * nominal.refit.excess:
         yield from _afresh(state, spec, evaluator)

@@ -192,7 +192,7 @@ def _floors(state: Assessment, division: float) -> Floors:
         raise ValueError("the nominal model has not been fitted")
     memory = float(np.median([view.memory for view in stack.views]))
     total = float(np.sqrt(stack.noise**2 + division**2 + stack.tolerance**2))
-    left = 0.0 if nominal.innocent else nominal.division
+    left = None if nominal.division is None else division
     return Floors(stack.noise, memory, left, nominal.finer, stack.tolerance, total)
 
 

@@ -32,9 +32,10 @@ class Floors:
     Attributes:
         noise: root mean square of the measurement's noise, by the scatter between beats.
         memory: correlation of the noise from frame to frame (or sample to sample).
-        division: misfit that the model's own division leaves, by comparison with a finer one; None where there is none.
+        division: misfit that the model's own division leaves, by comparison with a finer one, but no more than is left;
+            None where there is none.
         finer: the division that it was compared with.
-        simulation: error of the simulation itself.
+        simulation: misfit that no model is asked to be better than, a tenth of the noise.
         total: root of the sum of squares of these: what a right model would leave.
         remarks: what they rest on, where that is doubtful.
     """

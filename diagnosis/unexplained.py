@@ -18,7 +18,7 @@ from sim.probing import Probed, StationMotion
 
 PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 LARGEST = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
-MOST = 4  # recordings that are probed: those with the largest misfit
+MOST = 3  # recordings that are probed: those with the largest misfit
 
 
 @dataclass(frozen=True)

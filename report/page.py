@@ -128,7 +128,7 @@ def _floors(finding: Finding) -> Markup:
     floors = finding.floors
     rows = [
         ("noise, from the scatter between beats", floors.noise, "pale"),
-        ("simulation", floors.simulation, "pale"),
+        ("than which none is asked to be better", floors.simulation, "pale"),
         ("floor: these together", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]

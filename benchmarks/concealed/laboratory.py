@@ -26,7 +26,7 @@ from records import Condition, Dataset, Recording, load_dataset, save_dataset
 Array = npt.NDArray[np.float64]
 
 ATTEMPTS = 4  # draws of a trial, where the plant cannot run one
-ROUNDS = 3  # of a refit, at most
+ROUNDS = 8  # of a refit, at most: genes may take up nearly all of a mass by slow steps
 CORRECTIONS = 1  # of a strength by full refits; what then lacks, less noise makes up for
 LITTLE = 0.85  # of the d that is aimed at: what stays below is recorded with less noise, where cameras get as good
 

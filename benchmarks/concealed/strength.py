@@ -25,7 +25,6 @@ PART, PARTS = 0.4, 3
 STEPS = 5  # with slopes that are not measured anew
 SETTLED = 0.02  # relative gain in root mean square below which a refit ends
 FAR = 4.0  # times a strength: as far as one step of a search goes
-ALIKE = 0.92, 1.04  # times the misfit that the tangent foretells
 CLOSE = 0.2  # relative error of d that a search for a strength is content with
 
 
@@ -104,14 +103,9 @@ class Refit:
         """The same by a refit inside the genes' boxes, and the genes [F] that it ends with, in parts of their boxes.
 
         The refitted data are what the nominal model shows, with ``change`` added; so a coarser division of the model
-        counts for nothing here. It begins at the best of the true values and all ``near`` [F]. Where the first round
-        leaves what the tangent foretold there are no more.
+        counts for nothing here. It begins at the best of the true values and all ``near`` [F].
         """
-        target = self.nominal + change
-        unit, residual = self.refitted(target, 1, near)
-        low, high = (part * self.linear(change) for part in ALIKE)
-        if rounds > 1 and not low < rms(residual) < high:
-            unit, residual = self.refitted(target, rounds - 1, [unit])
+        unit, residual = self.refitted(self.nominal + change, rounds, near)
         return rms(residual), unit
 
     def refitted(self, target: Array, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[Array, Array]:

@@ -48,12 +48,13 @@ class Build:
 
 
 EQUAL, FINER = Build("wing", "4", "4"), Build("wing", "4", "8x1")
+BEYOND = Build("wing", "4", "10x1")  # no division that a diagnosis goes to by itself is this one
 ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
 WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
 VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
-SMALL = (FINER, EQUAL, FINER, FINER, EQUAL, FINER, FINER, FINER, EQUAL, FINER, EQUAL, FINER)
+SMALL = (FINER, EQUAL, BEYOND, FINER, EQUAL, BEYOND, EQUAL, FINER, BEYOND, EQUAL, FINER, EQUAL)
 WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
 
 
@@ -121,8 +122,9 @@ PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "bala
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
 OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
-COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 28, "advice": 20}
+COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 21, "advice": 20}
 QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
+SPARSE = 9  # every ninth null has as few recordings as an open case
 QUICK_KINDS = 3  # every third kind of the listed and the unlisted ones is in the sample
 
 
@@ -139,15 +141,15 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """Drafts of a group: ``n`` in all, or of each ``thinned``-th kind of the listed and the unlisted."""
     if group == "null":
-        vehicles = (VEHICLE, BARE)
-        wings = (*SMALL, ELEVEN_FINER)
-        builds = [one for wing in wings for one in (wing, *vehicles)]
+        builds = [one for pair in zip((*SMALL, ELEVEN_FINER), cycle(VEHICLES), strict=False) for one in pair]
         large = (WHOLE, WHOLE_FINER)[: n // 50]
-        yield from (_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large))))
+        drafts = [_draft(group, build) for build in (*large, *islice(cycle(builds), n - len(large)))]
+        yield from (replace(draft, poor=k % SPARSE == SPARSE - 1) for k, draft in enumerate(drafts))
     elif group == "listed":
         yield from _each(group, LISTED_WING[::thinned], WINGS, n)
         yield from _each(group, LISTED_VEHICLE[::thinned], VEHICLES, n)
-        yield from (_draft(group, WHOLE, (name,), 3.0) for name in LISTED_WING[: n // 7])
+        whole = zip((WHOLE, WHOLE_FINER), LISTED_WING, strict=False)
+        yield from (_draft(group, build, (name,), 3.0) for build, name in islice(whole, n // 7))
     elif group == "unlisted":
         yield from _each(group, UNLISTED_WING[::thinned], WINGS, n)
         yield from _each(group, UNLISTED_VEHICLE[::thinned], VEHICLES, n)

@@ -212,6 +212,7 @@ def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
     fits = {False: found("coarse", 1.0), True: found("fine", 0.7)}
     monkeypatch.setattr("diagnosis.assess.settled", lambda *_, refine: fits[refine])
     monkeypatch.setattr("diagnosis.assess._suspected", tried)
+    monkeypatch.setattr("diagnosis.assess.beyond_doubt", lambda *_: False)
     state = Assessment(cast("Any", "coarse"), cast("Any", None))
     parts = [part for part, _ in _settled(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
     assert begun == asked
