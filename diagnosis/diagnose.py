@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
 
 from calibration.evaluator import Evaluator
 from calibration.plan import plan, prepared
@@ -66,8 +68,18 @@ def diagnose_subject(
         yield Progress(ASSESSED + (1.0 - ASSESSED) * fraction, stage, state.evaluations)
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
-    finding = replace(finding, seconds=time.monotonic() - began, evaluations=state.evaluations)
+    spent = time.monotonic() - began
+    finding = replace(finding, seconds=spent, evaluations=state.evaluations, versions=_versions())
     yield Progress(1.0, "done", state.evaluations, finding)
+
+
+def _versions() -> dict[str, str]:
+    """Of the packages that the numbers rest on, as far as they are installed."""
+    found = {}
+    for name in ("wingfit", "numpy", "scipy", "numba"):
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def _prepared(

@@ -37,7 +37,6 @@ class Floors:
         finer: the division that it was compared with.
         simulation: misfit that no model is asked to be better than, a tenth of the noise.
         total: root of the sum of squares of these: what a right model would leave.
-        remarks: what they rest on, where that is doubtful.
     """
 
     noise: float
@@ -46,7 +45,6 @@ class Floors:
     finer: str
     simulation: float
     total: float
-    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -286,6 +284,7 @@ class Finding:
         advice: what to record next, best first.
         outline: of the wing, (x, y) in m, to draw the map on; empty for forces.
         remarks: everything else that a reader must know.
+        seconds, evaluations: what it took; ``versions`` of the packages that it rests on.
     """
 
     dataset: str

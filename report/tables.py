@@ -87,10 +87,9 @@ def sources(finding: Finding) -> Markup | None:
 
 def remarks(finding: Finding) -> Markup | None:
     """What a reader must know besides."""
-    said = [*finding.floors.remarks, *finding.remarks]
-    if not said:
+    if not finding.remarks:
         return None
-    return section("Remarks", tag("ul", *(tag("li", words) for words in said), class_="plain"))
+    return section("Remarks", tag("ul", *(tag("li", words) for words in finding.remarks), class_="plain"))
 
 
 def _genes(given: list[GeneValue]) -> Markup:

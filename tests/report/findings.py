@@ -189,7 +189,7 @@ def wing_finding() -> Finding:
         named=BOTH,
         put_in=BOTH,
         strength=5.12,
-        floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083, ("Noise rests on 6 beats only.",)),
+        floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083),
         hypotheses=hypotheses,
         alike=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
         where=Where(
@@ -223,7 +223,7 @@ def wing_finding() -> Finding:
             Advice("Record at 5 Hz in still air.", 5.0, 0.0, 1013.25, 0.0, 0.0, 3.2, 0.81, OPEN),
         ),
         outline=(*LEADING, *TRAILING),
-        remarks=("Marker m17 was seen in two recordings only.",),
+        remarks=("Noise rests on 6 beats only.", "Marker m17 was seen in two recordings only."),
         seconds=412.5,
         evaluations=18240,
         versions={"wingfit": "0.1.0", "commit": "0123abc", "numpy": "2.1.0"},
