@@ -41,19 +41,18 @@ def decided(weighed: Weighed) -> Decision:
     if len(effects):
         top = int(np.argmax(effects))
         possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= ALIKE * max(total, 1e-300)]
-        one: Verdict = "measurement fault" if _measured(refits[top]) else "named"
-        if effects[top] >= SURE * total:
-            probability[one] = float(effects[top])
-            probability["ambiguous"] = total - float(effects[top])
-        else:
-            probability["ambiguous"] = total
+        sure = refits[top] if effects[top] >= SURE * total else _shared(possible)
+        one: Verdict = "measurement fault" if sure and _measured(sure) else "named"
+        if sure:
+            holds = [set(sure.names) <= set(refit.names) for refit in refits]
+            probability[one] = float(effects[holds].sum())
+        probability["ambiguous"] = total - probability[one]
     lacking = total + weighed.unknown
     verdict: Verdict
     if nominal >= lacking:
         verdict = "adequate"
     elif total >= KNOWN * lacking:
-        verdict = one if effects[top] >= SURE * total else "ambiguous"
-        best = refits[top]
+        verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
         if weighed.evidence[1:].max(initial=0.0) > DOUBT:  # the nearest is put in if it earns it
@@ -65,6 +64,11 @@ def decided(weighed: Weighed) -> Decision:
     else:
         named = best.names if verdict in ("named", "measurement fault") else ()
     return Decision(verdict, probability, named, alike, best)
+
+
+def _shared(possible: Sequence[Refit]) -> Refit | None:
+    """The one of them that all others only add to: it is what lacks, whether or not more does. None without one."""
+    return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 
 def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:

@@ -54,6 +54,17 @@ def test_what_explains_as_well_is_not_told_apart() -> None:
     assert verdict(2.0, refit(0.30, ("a",)), refit(0.31, ("b",)))[0] == "ambiguous"
 
 
+def test_what_all_possible_explanations_share_is_named_and_the_rest_left_open() -> None:
+    """Whether a second effect is there is not known, but the first is; where that alone is not possible, nothing is."""
+    both = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
+    found = decided(weighed(stack(), refit(2.0), both, 0.0, 40))
+    assert (found.verdict, found.named) == ("named", ("a",))
+    assert set(found.alike) == {("a",), ("a", "b")}
+    assert found.probabilities["named"] > 0.9
+    apart = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
+    assert decided(weighed(stack(), refit(2.0), apart, 0.0, 40)).verdict == "ambiguous"
+
+
 def test_explanations_are_alike_where_one_of_them_is_right_and_only_there() -> None:
     open_ = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
     assert set(open_.alike) == {("a",), ("b",)}
