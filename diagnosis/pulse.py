@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 
 from diagnosis.finding import Interval
 from diagnosis.fit import Fit
-from diagnosis.screen import Nuisance
+from diagnosis.screen import Nuisance, taken
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 
@@ -22,6 +23,7 @@ Array = npt.NDArray[np.float64]
 INSTANTS = 144
 WIDTH = 0.015  # of a beat, standard deviation
 TAKES = 0.1  # of the misfit: a pulse that takes less tells no instant
+CHANCE = 0.01  # that noise alone makes one take as much at any of them
 NINETY = 2.706  # chi-squared of one degree
 
 
@@ -33,9 +35,10 @@ def pulse(subject: Subject, stack: Stack, fit: Fit) -> Interval | None:
     nuisance = Nuisance(stack, fit)
     left, white = nuisance.left, fit.coefficients / stack.scale
     phase = np.arange(INSTANTS) / INSTANTS
-    gain = np.array([_taken(nuisance, _pulses(subject, stack, at)) for at in phase])
+    gain = np.array([taken(nuisance.rest(_pulses(subject, stack, at)), left) for at in phase])
     best = int(np.argmax(gain))
-    if gain[best] < TAKES * float(left @ left):
+    by_noise = float(chi2.isf(CHANCE / INSTANTS, len(_pulses(subject, stack, 0.0))))
+    if gain[best] < max(TAKES * float(left @ left), by_noise):
         return None
     beyond = max(float(white @ white) - gain[best] - len(white), 0.0)
     near = gain[best] - gain < NINETY * (1.0 + beyond / stack.pieces)
@@ -65,10 +68,3 @@ def _pulses(subject: Subject, stack: Stack, at: float) -> Array:
             row[part][channel * len(own) : (channel + 1) * len(own)] = own
             rows.append(row)
     return np.array(rows)
-
-
-def _taken(nuisance: Nuisance, fields: Array) -> float:
-    """Decrease of chi-squared by ``fields`` [S, D] of free sizes, the nominal genes adapting."""
-    own = nuisance.rest(fields)
-    inner, score = own @ own.T, own @ nuisance.left
-    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)), score))

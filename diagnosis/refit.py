@@ -13,7 +13,7 @@ from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, unit_at, values_at
 from calibration.problem import Problem, base_genome
 from diagnosis.fit import PRIOR, UNFIT, Fit, fitted, thoroughly
-from diagnosis.screen import Nuisance, Trial, off_units, size_columns
+from diagnosis.screen import Nuisance, Trial, off_units, size_columns, taken
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 
@@ -273,7 +273,7 @@ def _takers(
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
-            gains = [_gain(nuisance.rest(trial.fields), misfit) for trial in trials]
+            gains = [taken(nuisance.rest(trial.fields), misfit) for trial in trials]
             k = int(np.argmax(gains))
             best.append((gains[k], trials[k]))
     return sorted(best, key=lambda pair: -pair[0])
@@ -287,17 +287,11 @@ def pairs(
     left = nuisance.left
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
     own = [nuisance.rest(trial.fields) for trial in best]
-    scored = [(_gain(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
+    scored = [(taken(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
     scored.sort(key=lambda triple: -triple[0])
     for gain, one, other in scored[:most]:
         if float(left @ left) - gain < beyond:
             yield (one, other) if one.gain >= other.gain else (other, one)
-
-
-def _gain(own: Array, left: Array) -> float:
-    inner = own @ own.T
-    score = own @ left
-    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
 
 
 def _scaled(trial: Trial, part: float) -> Array:

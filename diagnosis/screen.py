@@ -82,6 +82,12 @@ class Nuisance:
         return np.asarray(-inside)
 
 
+def taken(fields: Array, misfit: Array) -> float:
+    """By how much whitened ``fields`` [S, D] of free sizes lower the sum of squares of a ``misfit`` [D]."""
+    inner, score = fields @ fields.T, fields @ misfit
+    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
+
+
 def off_units(suspect: Suspect) -> Array:
     """Genes [E] in parts of their boxes with the suspect switched off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
