@@ -13,10 +13,11 @@ from calibration.problem import Evaluation, Problem
 from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.fit import SMALLEST, Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
+from diagnosis.race import afresh
 from diagnosis.refit import (
     LAST,
+    RIVALRY,
     Refit,
-    afresh,
     again,
     continued,
     judged,
@@ -38,9 +39,8 @@ WEAKER = 0.6  # of the best score
 PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
 CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
-RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival at a finer division
 RUNNERS = 3  # suspects that are fitted from the estimates
-RIGHT = 0.2  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
+RIGHT = 0.15  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
 RIVALS = 3  # explanations to which a partner is sought
 OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
@@ -204,7 +204,7 @@ def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) 
     if not promises(stack, changes, takes, refit):
         return refit
     found = again(finer, stack, evaluator, refit)
-    if found is None or found.fit.converged or improves(found, refit):
+    if found is None or found.fit.converged or improves(found, refit) or found.excess >= refit.excess:
         return found
     return continued(finer, stack, evaluator, found)
 
@@ -307,7 +307,8 @@ def _afresh(
         yield 0.74, f"score test of {suspect.name} about the estimates"
     best: tuple[Trial, Fit] | None = None
     runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
-    for best in afresh(state.subject, state.stack, evaluator, begun, runners):
+    most = min(HOPEFUL * _known(state).refit.excess, RIVALRY * min(one.excess for one in state.refits))
+    for best in afresh(state.subject, state.stack, evaluator, begun, runners, most):
         yield 0.77, f"refit with {best[0].suspect.name} from the estimates"
     if best is not None:
         _add(state, judged(state.stack, best[1], [best[0]]))

@@ -137,7 +137,7 @@ def thoroughly(
         if ends and bent:
             yield replace(_measured(look, better, every), converged=True) if better else replace(now, converged=True)
             return
-        bent = bent or better is None or _gained_little(stack, now, better, CRAWLING)
+        bent = bent or better is None or gained_little(stack, now, better, CRAWLING)
         now = _measured(look, better or now, every, 2 if bent else 1)
     yield now if bent else _measured(look, now, every)
 
@@ -151,10 +151,11 @@ def measured(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> 
 
 def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
     """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
-    return _gained_little(stack, before, after) and gain > GOOD / 2
+    return gained_little(stack, before, after) and gain > GOOD / 2
 
 
-def _gained_little(stack: Stack, before: Fit, after: Fit, times: float = 1.0) -> bool:
+def gained_little(stack: Stack, before: Fit, after: Fit, times: float = 1.0) -> bool:
+    """Whether the step gained no more than some ``times`` what makes one worth its cost."""
     whole = stack.trust(before.coefficients) * stack.chi_squared(before.coefficients)
     return before.cost - after.cost <= times * max(SMALLEST, SETTLED * whole)
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
 
 import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
-from calibration.linearised import free_genes, unit_at, values_at
+from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem, base_genome
 from diagnosis.fit import PRIOR, UNFIT, Fit, fitted, thoroughly
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns, taken
@@ -22,8 +21,6 @@ Array = npt.NDArray[np.float64]
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
 LAST = 20  # of the best, to its end
-AFRESH = 14  # of one from the estimates
-RACE = 5  # of several from there, before the best goes on alone
 WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
 HELPS = 0.5  # of what an explanation leaves: a partner that would take less is not tried
@@ -31,6 +28,7 @@ ALIKE = 0.8  # of what a suspect does: another that can do as much is tried in i
 FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
 BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
 CHANCE = 4.0  # times what noise makes of a prediction on average: so much it makes by chance (chi-squared of one)
+RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival
 HALVINGS = 3  # of a start that cannot be simulated
 
 
@@ -188,41 +186,6 @@ def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
         return judged(stack, fitted(subject, stack, refit.fit.problem, evaluator, start, steps=STEPS), refit.trials)
     except UNFIT:
         return None
-
-
-def afresh(
-    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trials: Sequence[Trial]
-) -> Iterator[tuple[Trial, Fit]]:
-    """The nominal model with the suspect of one of ``trials``, fitted from the estimates, where ``begun`` is.
-
-    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back. All run
-    for RACE steps and the best of them to its end; yields that after every step. Nothing where none can be simulated.
-    """
-    runners = list[tuple[Trial, Fit, Iterator[Fit]]]()
-    for trial in trials:
-        steps = _from_estimates(subject, stack, evaluator, begun, trial)
-        try:
-            for fit in islice(steps, RACE):
-                yield min([(trial, fit), *((t, f) for t, f, _ in runners)], key=lambda one: one[1].cost)
-        except UNFIT:
-            continue
-        runners.append((trial, fit, steps))
-    if runners:
-        trial, _, steps = min(runners, key=lambda one: one[1].cost)
-        yield from ((trial, fit) for fit in steps)
-
-
-def _from_estimates(subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trial: Trial) -> Iterator[Fit]:
-    """Fits of the nominal model with a suspect of typical size; CannotBeginError where they cannot begin."""
-    suspect, base = trial.suspect, begun.problem.base
-    model = subject.extended([suspect.name])
-    free = (*begun.problem.free, *(gene.name for gene in suspect.genes))
-    problem = Problem(model, stack.recordings, free, base_genome(model, base.as_dict()), stack.axes)
-    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
-    size = size_columns(suspect)
-    own = trial.unit[0].copy()
-    own[size] = typical[size]
-    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, own]), AFRESH)
 
 
 def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:

@@ -16,10 +16,10 @@ from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis import DiagnosisSpec
 from diagnosis.assess import Assessment, _elsewhere, _settled
-from diagnosis.fit import CannotBeginError, Fit, _Look, _measured, _step, thoroughly
+from diagnosis.fit import Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal, promises
-from diagnosis.refit import RACE, afresh, judged, left_out, refitted, substitutes
+from diagnosis.refit import judged, left_out, refitted, substitutes
 from diagnosis.screen import Nuisance, screened
 from diagnosis.stack import PIECES, TOLERANCE, Stack
 from tests.diagnosis.pendulum_rig import PendulumRig, recorded
@@ -219,31 +219,6 @@ def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
     assert cast("Any", state.nominal).subject == taken
     assert cast("Any", state.subject) == taken
     assert parts == sorted(parts)
-
-
-def test_of_several_suspects_the_best_goes_on_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One cannot be simulated, one ends early, one falls behind, one wins."""
-    falling = [20.0 - k for k in range(20)]
-    costs: dict[str, list[float]] = {"never": [], "early": [9.0], "slow": [c + 10 for c in falling], "wins": falling}
-    asked, nothing = dict.fromkeys(costs, 0), cast("Any", None)
-
-    def steps(*arguments: Any) -> Iterator[Any]:
-        name = arguments[-1]
-        if not costs[name]:
-            raise CannotBeginError("it cannot be simulated")
-        for cost in costs[name]:
-            asked[name] += 1
-            yield SimpleNamespace(cost=cost)
-
-    def race(*names: str) -> tuple[Any, Any]:
-        (*_, last) = afresh(nothing, nothing, nothing, nothing, cast("Any", names))
-        return last[0], last[1].cost
-
-    monkeypatch.setattr("diagnosis.refit._from_estimates", steps)
-    assert race("never", "slow", "wins") == ("wins", 1.0)
-    assert asked == {"never": 0, "early": 0, "slow": RACE, "wins": 20}
-    assert race("early", "slow") == ("early", 9.0)
-    assert list(afresh(nothing, nothing, nothing, nothing, cast("Any", ("never",)))) == []
 
 
 def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:

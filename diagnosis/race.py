@@ -1,0 +1,118 @@
+"""Fits of suspects from the estimates: several run a race, and those that may still win go on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.linearised import unit_at
+from calibration.problem import Problem, base_genome
+from diagnosis.fit import CRAWLING, UNFIT, Fit, gained_little, thoroughly
+from diagnosis.refit import RIVALRY
+from diagnosis.screen import Trial, size_columns
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 14  # of a fit
+RACE = 5  # of each, before those that leave least go on
+
+
+def afresh(
+    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trials: Sequence[Trial], most: float
+) -> Iterator[tuple[Trial, Fit]]:
+    """The nominal model with the suspect of one of ``trials``, fitted from the estimates, where ``begun`` is.
+
+    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back. All run
+    for RACE steps, those that act at a place from the typical one too; then each that may still overtake the best goes
+    on to its end. A fit ends early where it crawls and leaves RIVALRY times as much as the best, or more than ``most``
+    (m^2 or N^2 beyond the noise). Yields the best after every step; nothing where none can be simulated.
+    """
+    race = _Race(stack, most)
+    for trial in trials:
+        for start in _starts(trial):
+            race.enter(trial, _from_estimates(subject, stack, evaluator, begun, trial, start))
+            yield from race.run(RACE)
+    yield from race.run(STEPS + 1)  # the last is where it ended, with its slopes
+
+
+class _Race:
+    """Fits that compete: each is given up where it crawls and leaves far more than the best, or than ``most``."""
+
+    def __init__(self, stack: Stack, most: float) -> None:
+        self.stack, self.most = stack, most
+        self.runners = list[_Runner]()
+
+    def enter(self, trial: Trial, steps: Iterator[Fit]) -> None:
+        """One more."""
+        self.runners.append(_Runner(trial, steps))
+
+    def run(self, steps: int) -> Iterator[tuple[Trial, Fit]]:
+        """All to as many ``steps``, those that leave least first; yields the best of all after each."""
+        for runner in sorted(self.runners, key=lambda one: one.cost):
+            while runner.taken < steps and not self._given_up(runner) and runner.step():
+                yield self._best()
+
+    def _given_up(self, runner: _Runner) -> bool:
+        if len(runner.fits) < 2:
+            return False
+        before, now = runner.fits
+        most = min(self.most, RIVALRY * min(self._left(one) for one in self.runners))
+        return gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > most
+
+    def _left(self, runner: _Runner) -> float:
+        return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
+
+    def _best(self) -> tuple[Trial, Fit]:
+        best = min(self.runners, key=lambda one: one.cost)
+        return best.trial, best.fits[-1]
+
+
+@dataclass
+class _Runner:
+    """A fit on its way, with its last two steps."""
+
+    trial: Trial
+    steps: Iterator[Fit]
+    fits: list[Fit] = field(default_factory=list)
+    taken: int = 0
+
+    @property
+    def cost(self) -> float:
+        """Of the last step; infinite before the first."""
+        return self.fits[-1].cost if self.fits else np.inf
+
+    def step(self) -> bool:
+        """Whether there was another step."""
+        try:
+            self.fits = [*self.fits[-1:], next(self.steps)]
+        except (StopIteration, *UNFIT):
+            return False
+        self.taken += 1
+        return True
+
+
+def _starts(trial: Trial) -> list[Array]:
+    """Genes [E] of a suspect in parts of their boxes: of typical size where ``trial`` is, and at the typical place."""
+    suspect = trial.suspect
+    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    size = size_columns(suspect)
+    own = trial.unit[0].copy()
+    own[size] = typical[size]
+    return [own, typical] if suspect.places and not np.allclose(own, typical) else [own]
+
+
+def _from_estimates(
+    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trial: Trial, start: Array
+) -> Iterator[Fit]:
+    """Fits of the nominal model with a suspect, whose genes begin at ``start``; CannotBeginError where they cannot."""
+    suspect, base = trial.suspect, begun.problem.base
+    model = subject.extended([suspect.name])
+    free = (*begun.problem.free, *(gene.name for gene in suspect.genes))
+    problem = Problem(model, stack.recordings, free, base_genome(model, base.as_dict()), stack.axes)
+    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, start]), STEPS)

@@ -1,0 +1,70 @@
+"""Which fits go on in a race from the estimates, and where the fits begin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from diagnosis.fit import CannotBeginError
+from diagnosis.race import RACE, afresh
+
+NOTHING = cast("Any", None)
+FALLING = [2000.0 - 100.0 * k for k in range(20)]
+
+
+def stack() -> Any:
+    """One for which a fit's cost is what it leaves, and counts in full."""
+    return SimpleNamespace(excess=lambda c: c, trust=lambda c: 1.0, chi_squared=lambda c: c)  # noqa: ARG005
+
+
+@pytest.fixture
+def race(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Runs a race of fits with costs by step; the winner, its cost, and how many steps of each were asked for."""
+
+    def run(costs: Mapping[str, list[float]], most: float = np.inf) -> tuple[str, float, dict[str, int]]:
+        asked = dict.fromkeys(costs, 0)
+
+        def steps(*arguments: Any) -> Iterator[Any]:
+            name = arguments[-2]
+            if not costs[name]:
+                raise CannotBeginError("it cannot be simulated")
+            for cost in costs[name]:
+                asked[name] += 1
+                yield SimpleNamespace(cost=cost, coefficients=cost)
+
+        monkeypatch.setattr("diagnosis.race._from_estimates", steps)
+        monkeypatch.setattr("diagnosis.race._starts", lambda _: [None])
+        found: Any = list(afresh(NOTHING, stack(), NOTHING, NOTHING, cast("Any", tuple(costs)), most))
+        return (found[-1][0], found[-1][1].cost, asked) if found else ("", np.inf, asked)
+
+    return run
+
+
+def test_one_that_cannot_be_simulated_does_not_hinder_the_others(race: Any) -> None:
+    winner, cost, asked = race({"never": [], "early": [900.0], "wins": FALLING[:15]})
+    assert (winner, cost) == ("wins", 600.0)
+    assert asked == {"never": 0, "early": 1, "wins": 15}
+    assert race({"never": []}) == ("", np.inf, {"never": 0})
+
+
+def test_one_that_fell_behind_at_first_may_still_win(race: Any) -> None:
+    """The leader ends at what makes up for the effect; the effect itself finds its place later."""
+    winner, cost, asked = race(
+        {"leads": [50.0, 20.0, 18.0, 17.0, 16.9, 16.9], "late": [300.0, 50.0, 40.0, 30.0, 20.0, 0.5]}
+    )
+    assert (winner, cost) == ("late", 0.5)
+    assert asked["late"] == 6
+
+
+def test_one_that_crawls_far_behind_is_given_up(race: Any) -> None:
+    _, _, asked = race({"best": [50.0, 5.0, 2.0, 1.0, 0.9, 0.8, 0.7], "crawls": [50.0, 40.0, *[39.99] * 12]})
+    assert asked["crawls"] == 3
+    assert asked["best"] == 7
+    _, _, asked = race({"crawls": [50.0, 40.0, *[39.99] * 12]}, most=30.0)
+    assert asked["crawls"] == 3
+    _, _, asked = race({"falls": FALLING}, most=1.0)
+    assert asked["falls"] > RACE, "one that still falls is not given up, however much it leaves"
