@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
+from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem
 from diagnosis.decide import SURE, Weighed, tolerated
 from diagnosis.finding import Advice
+from diagnosis.fit import PRIOR, STEP, Fit
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -58,27 +60,50 @@ def advised(stack: Stack, weighed: Weighed, apart: Sequence[tuple[float, Conditi
 def _apart(
     subject: Subject, stack: Stack, alive: Sequence[Refit], condition: Condition, evaluator: Evaluator
 ) -> float | None:
-    """Least root mean square difference (in noises) between the first explanation and another under ``condition``."""
+    """Least root mean square (in noises) of what another explanation could not make up for under ``condition``."""
     first = alive[0].fit
     genome = first.problem.genomes(np.array(list(first.values.values())))[0]
     shell = subject.shown(subject.beside(subject.extended(alive[0].names), genome), genome, condition)
     if shell is None:
         return None
-    differences = [_difference(subject, genome, shell, other, evaluator) for other in alive[1:]]
+    differences = [unlike(subject, stack, genome, shell, other.fit, evaluator) for other in alive[1:]]
     known = [one for one in differences if one is not None]
-    return min(known) / stack.noise if known else None
+    return min(known) if known else None
 
 
-def _difference(subject: Subject, genome: Array, shell: Recording, other: Refit, evaluator: Evaluator) -> float | None:
-    fit = other.fit
+def unlike(
+    subject: Subject, stack: Stack, genome: Array, shell: Recording, rival: Fit, evaluator: Evaluator
+) -> float | None:
+    """Root mean square difference (in noises) of a rival from what the first explanation foretells, its genes adapting.
+
+    They adapt as far as the recordings that there are allow. What makes two explanations alike is that their genes
+    differ: where these alone set them apart, a new recording is met by other genes (Atkinson and Fedorov 1975:
+    T-optimality; here with what is known of the genes already).
+    """
     problem = Problem(
-        subject.beside(fit.problem.model, genome), (shell,), fit.problem.free, fit.problem.base, fit.problem.axes
+        subject.beside(rival.problem.model, genome),
+        (shell,),
+        rival.problem.free,
+        rival.problem.base,
+        rival.problem.axes,
     )
-    evaluation = evaluator.evaluate(problem, np.array([list(fit.values.values())]), residuals=True)
+    moves = np.where(rival.unit > 1.0 - STEP, -STEP, STEP)
+    units = np.vstack([rival.unit, rival.unit + np.diag(moves)])
+    evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
     residuals = evaluation.per_recording[0].residuals
-    if evaluation.reasons[0] is not None or residuals is None:
+    if residuals is None or any(reason is not None for reason in evaluation.reasons):
         return None
-    return float(np.sqrt(np.nanmean(residuals[0] ** 2)))
+    seen = np.isfinite(residuals).all(axis=0)
+    white = residuals[:, seen] / stack.noise
+    memory = float(np.clip(np.mean([view.memory for view in stack.views]), 0.0, 0.99))
+    counts = (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
+    slopes, known = (white[1:] - white[0]) / moves[:, None], rival.jacobian / stack.scale[:, None]
+    trust = stack.trust(rival.coefficients)
+    told = trust * known.T @ known + np.eye(len(moves)) / PRIOR**2
+    score = trust * counts * slopes @ white[0]
+    gained = score @ np.linalg.solve(told + trust * counts * slopes @ slopes.T, score)
+    whole = float(white[0] @ white[0]) - float(gained) / (trust * counts)
+    return float(np.sqrt(max(whole, 0.0) / white.shape[1]))
 
 
 def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float, condition: Condition) -> Advice:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
-from calibration.problem import Evaluation, Problem
+from diagnosis.assessment import Assessment
 from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
-from diagnosis.fit import SMALLEST, Fit
+from diagnosis.fit import Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from diagnosis.race import afresh
 from diagnosis.refit import (
@@ -36,7 +35,6 @@ from diagnosis.verdict import decided
 
 SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
 WEAKER = 0.6  # of the best score
-PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
 CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RUNNERS = 3  # suspects that are fitted from the estimates
@@ -44,40 +42,6 @@ RIGHT = 0.15  # root mean square, in parts of the nominal misfit: more is left b
 RIVALS = 3  # explanations to which a partner is sought
 OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
-
-
-@dataclass
-class Assessment:
-    """What is known so far; ``evaluations`` counts individuals.
-
-    ``begun`` is the nominal model at the estimates; ``afresh``: with which model suspects were fitted from there.
-    """
-
-    subject: Subject
-    stack: Stack
-    nominal: Nominal | None = None
-    trials: list[list[Trial]] = field(default_factory=list)
-    refits: list[Refit] = field(default_factory=list)
-    weighed: Weighed | None = None
-    evaluations: int = 0
-    begun: tuple[Subject, Fit] | None = None
-    afresh: Subject | None = None
-
-
-@dataclass(frozen=True)
-class Counted:
-    """An evaluator that counts the individuals it is given in ``of``."""
-
-    inner: Evaluator
-    of: Assessment
-
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """As the inner one."""
-        self.of.evaluations += len(np.atleast_2d(values))
-        return self.inner.evaluate(problem, values, residuals=residuals)
-
-    def close(self) -> None:
-        """Nothing: the inner one is its owner's."""
 
 
 def assess(
@@ -97,26 +61,19 @@ def assess(
     yield 0.85, "fitting the nominal model again"
     better = _elsewhere(state, evaluator)
     if better is not None:
-        _begin(state, replace(_known(state), refit=better))
+        state.begin(replace(state.known, refit=better))
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer division"
     if spec.refine:
-        _refined(state, _known(state), evaluator)
+        _refined(state, state.known, evaluator)
     for stage in _doubted(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
     if state.refits:
-        _solved(state, _known(state), evaluator)
-    yield 0.96, "fitting the best explanation to its end"
-    floor = 0.0 if spec.refine else _known(state).division or 0.0
-    for _ in range(CONTINUED):
-        state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
-        unended = _unended(state.weighed)
-        if unended is None:
-            return
-        _add(state, continued(state.subject, stack, evaluator, unended, LAST))
-    state.weighed = weighed(stack, _known(state).refit, state.refits, floor, len(suspects))
+        _solved(state, state.known, evaluator)
+    floor = 0.0 if spec.refine else state.known.division or 0.0
+    yield from ((0.95, stage) for stage in _ended(state, evaluator, floor, len(suspects)))
 
 
 def _settled(
@@ -125,19 +82,36 @@ def _settled(
     """Suspects beside the nominal ``fit``; where a finer division does better than all of these, beside that one's."""
     nominal = settled(state.subject, state.stack, evaluator, fit, refine=spec.refine)
     if nominal.subject is not state.subject and not beyond_doubt(state.stack, nominal.refit, len(suspects)):
-        _begin(state, settled(state.subject, state.stack, evaluator, fit, refine=False))
+        state.begin(settled(state.subject, state.stack, evaluator, fit, refine=False))
         for fraction, stage in _suspected(state, spec, suspects, evaluator, at_least=nominal.refit):
             yield 0.3 * fraction, stage
     if not any(improves(one, nominal.refit) for one in state.refits):
-        _begin(state, nominal)
+        state.begin(nominal)
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.3 + 0.7 * fraction, stage
 
 
-def _begin(state: Assessment, nominal: Nominal) -> None:
-    """Go on with a nominal fit; nothing is known of suspects beside it yet."""
-    state.nominal, state.subject = nominal, nominal.subject
-    state.trials, state.refits, state.afresh = [], [], None
+def _ended(state: Assessment, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
+    """Weigh what there is, with the best explanation fitted to its end, and what is hard to tell from it as well."""
+    state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
+    yield from _raced(state, evaluator, _alike(state.weighed))
+    yield "fitting the best explanation to its end"
+    for _ in range(CONTINUED):
+        state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
+        unended = _unended(state.weighed)
+        if unended is None:
+            return
+        state.add(continued(state.subject, state.stack, evaluator, unended, LAST))
+    state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
+
+
+def _alike(weighed: Weighed) -> list[Trial]:
+    """Suspects that explain nearly as well each by itself, if several do: the right one's fit may have been caught."""
+    evidence = weighed.evidence[1:]
+    least = max(evidence.max(initial=0.0) - OVERTAKES, 0.0)
+    close = [one for one, found in zip(weighed.refits[1:], evidence, strict=True) if found > least]
+    several = len(close) > 1 and all(len(one.trials) == 1 for one in close)
+    return [one.trials[0] for one in close] if several else []
 
 
 def _unended(weighed: Weighed) -> Refit | None:
@@ -158,7 +132,7 @@ def _doubted(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> It
     if state.afresh is state.subject or not state.refits:
         return
     best = min(state.refits, key=lambda one: one.excess)
-    if best.excess > tolerated(state.stack, 0.0, 0.0) + RIGHT**2 * _known(state).refit.excess:
+    if best.excess > tolerated(state.stack, 0.0, 0.0) + RIGHT**2 * state.known.refit.excess:
         yield from (stage for _, stage in _afresh(state, spec, evaluator, best.names))
 
 
@@ -229,7 +203,7 @@ def _suspected(
     Few or no refits where none does, or promises to do, better than the nominal model of a finer division
     (``at_least``): a division may take up what an effect leaves, as an effect may take up what a division leaves.
     """
-    nominal = _known(state)
+    nominal = state.known
     for k, (suspect, trials) in enumerate(screened(state.subject, state.stack, nominal.refit.fit, evaluator, suspects)):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
@@ -245,18 +219,12 @@ def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
 
     An explanation may lead out of a minimum in which the nominal fit was caught, and is not the cause then.
     """
-    nominal = _known(state).refit
+    nominal = state.known.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
     if best is nominal or not improves(best, nominal):
         return None
     found = resumed(state.subject, state.stack, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
     return found if found is not None and improves(found, nominal) else None
-
-
-def _known(state: Assessment) -> Nominal:
-    if state.nominal is None:
-        raise ValueError("the nominal model has not been fitted")
-    return state.nominal
 
 
 def _refits(
@@ -271,7 +239,7 @@ def _refits(
         return
     if min(one.excess for one in state.refits) > UNKNOWN**2 * nominal.refit.excess:
         yield from _afresh(state, spec, evaluator)
-        if _enough(state, nominal):
+        if state.enough(nominal):
             return
     yield from _together(state, nominal, evaluator)
     yield from _exchanged(state, nominal, evaluator)
@@ -288,7 +256,7 @@ def _alone(
         if _outdone(state, nominal, trial, chosen[0]):
             continue
         yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
-        _add(state, refitted(state.subject, stack, fit, evaluator, [trial]))
+        state.add(refitted(state.subject, stack, fit, evaluator, [trial]))
 
 
 def _afresh(
@@ -305,13 +273,23 @@ def _afresh(
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
-    best: tuple[Trial, Fit] | None = None
     runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
-    most = min(HOPEFUL * _known(state).refit.excess, RIVALRY * min(one.excess for one in state.refits))
-    for best in afresh(state.subject, state.stack, evaluator, begun, runners, most):
-        yield 0.77, f"refit with {best[0].suspect.name} from the estimates"
-    if best is not None:
-        _add(state, judged(state.stack, best[1], [best[0]]))
+    yield from ((0.77, stage) for stage in _raced(state, evaluator, runners))
+
+
+def _raced(state: Assessment, evaluator: Evaluator, runners: Sequence[Trial]) -> Iterator[str]:
+    """Keep what is in front when ``runners`` have been fitted from the estimates."""
+    if state.begun is None:
+        raise ValueError("the nominal model has not been fitted")
+    if not runners:
+        return
+    best = min(one.excess for one in state.refits)
+    most = max(min(HOPEFUL * state.known.refit.excess, RIVALRY * best), tolerated(state.stack, 0.0, 0.0))
+    front: list[tuple[Trial, Fit]] = []
+    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], runners, most):
+        yield f"refit with {front[0][0].suspect.name} from the estimates"
+    for trial, fit in front:
+        state.add(judged(state.stack, fit, [trial]))
 
 
 def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
@@ -324,14 +302,14 @@ def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iter
             if names not in tried:
                 tried.add(names)
                 yield 0.82 + 0.04 * k, f"refit with {' and '.join(sorted(names))}"
-                _add(state, refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
+                state.add(refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
     least = min(stack.chi_squared(one.fit.coefficients) for one in state.refits)
     for two in pairs(stack, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)
             yield 0.94, f"refit with {' and '.join(sorted(names))}"
-            _add(state, refitted(state.subject, stack, fit, evaluator, two))
+            state.add(refitted(state.subject, stack, fit, evaluator, two))
 
 
 def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
@@ -346,26 +324,17 @@ def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Ite
             names = frozenset(one.suspect.name for one in (*others, trial))
             if names not in tried:
                 yield 0.96, f"refit with {' and '.join(sorted(names))}"
-                _add(state, refitted(state.subject, state.stack, nominal.refit.fit, evaluator, [*others, trial]))
+                state.add(refitted(state.subject, state.stack, nominal.refit.fit, evaluator, [*others, trial]))
 
 
 def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:
     """Whether an explanation leaves so little that none needs a partner; the best are continued until one does."""
-    enough = _tolerable(state, nominal)
+    enough = state.tolerable(nominal)
     for k in np.argsort([one.excess for one in state.refits])[:CONTINUED]:
         one = state.refits[k]
         if not one.fit.converged and enough < one.excess < HOPEFUL * nominal.refit.excess:
             state.refits[k] = continued(state.subject, state.stack, evaluator, one)
-    return _enough(state, nominal)
-
-
-def _enough(state: Assessment, nominal: Nominal) -> bool:
-    """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
-    return not state.refits or min(one.excess for one in state.refits) <= _tolerable(state, nominal)
-
-
-def _tolerable(state: Assessment, nominal: Nominal) -> float:
-    return tolerated(state.stack, PART * nominal.refit.excess, 0.0)
+    return state.enough(nominal)
 
 
 def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:
@@ -374,17 +343,6 @@ def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> 
         return False
     left = min(one.excess for one in state.refits)
     return left <= max(SOLVED * nominal.refit.excess, tolerated(state.stack, 0.0, 0.0))
-
-
-def _add(state: Assessment, refit: Refit | None) -> None:
-    """Keep ``refit``, or the better of two with the same suspects."""
-    if refit is None:
-        return
-    for k, known in enumerate(state.refits):
-        if set(known.names) == set(refit.names):
-            state.refits[k] = min(known, refit, key=lambda one: one.fit.cost - SMALLEST * one.fit.converged)
-            return
-    state.refits.append(refit)
 
 
 def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from diagnosis import maps
 from diagnosis.advise import advised, separations
-from diagnosis.assess import Assessment
+from diagnosis.assessment import Assessment
 from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
 from diagnosis.fit import measured
 from diagnosis.nominal import Nominal

@@ -11,7 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from calibration.evaluator import Evaluator
 from calibration.plan import plan, prepared
 from calibration.problem import base_genome
-from diagnosis.assess import Assessment, Counted, assess, suspected
+from diagnosis.assess import assess, suspected
+from diagnosis.assessment import Assessment, Counted
 from diagnosis.conclude import concluded
 from diagnosis.finding import Finding
 from diagnosis.rigs import subject_of

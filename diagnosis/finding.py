@@ -10,6 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+import numpy.typing as npt
+
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
 Numbers = tuple[float, ...]
@@ -315,3 +318,8 @@ class Finding:
     seconds: float = 0.0
     evaluations: int = 0
     versions: dict[str, str] = field(default_factory=dict)
+
+
+def table(values: npt.NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+    """Values [N, M] as a finding keeps them."""
+    return tuple(tuple(row) for row in values.tolist())

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from diagnosis.beatwise import Beatwise
-from diagnosis.finding import MarkerMisfit, Overlay, PhaseMap
+from diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
 from diagnosis.stack import Stack
 from diagnosis.subject import Place, Subject
 
@@ -101,8 +101,8 @@ def phase_map(before: Sequence[Piece], after: Sequence[Piece]) -> PhaseMap:
     return PhaseMap(
         tuple((0.5 * (edges[:-1] + edges[1:])).tolist()),
         tuple((np.arange(PHASES) / PHASES).tolist()),
-        _table(first),
-        _table(then),
+        table(first),
+        table(then),
         float(np.sqrt(noise)),
     )
 
@@ -116,10 +116,6 @@ def _squares(pieces: Sequence[Piece], edges: Array) -> Array:
             total[band] += piece.beat[:, column] ** 2
             count[band] += 1
     return np.asarray(total / np.maximum(count, 1))
-
-
-def _table(values: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(row) for row in values.tolist())
 
 
 def harmonics(stack: Stack, coefficients: Array) -> tuple[float, ...]:

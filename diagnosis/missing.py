@@ -18,7 +18,7 @@ from itertools import groupby
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.finding import Interval, MissingLoad
+from diagnosis.finding import Interval, MissingLoad, table
 from diagnosis.load_kinds import Form, driven, placed, smooth, spreads
 from sim.effects.probe import Probe
 
@@ -74,13 +74,13 @@ class Case:
         seen = np.isfinite(residuals)
         both = np.concatenate([-residuals[..., None], np.nan_to_num(responses), sensitivities], axis=2)
         white = np.concatenate(
-            [_decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) / s for c, s in enumerate(noise)]
+            [decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) / s for c, s in enumerate(noise)]
         )
         P = responses.shape[2]
         return cls(name, white[:, 0], white[:, 1 : 1 + P], white[:, 1 + P :], crossing)
 
 
-def _decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
+def decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
     """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
     if not len(values):
         return values
@@ -296,32 +296,9 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
         values, errors, stations = np.radians(values[:, :1]), np.radians(errors[:, :1]), np.zeros(1)
     unit = "rad" if inferred.driven else "N/m"
     return tuple(
-        MissingLoad(name, tuple(stations.tolist()), tuple(phase.tolist()), _table(v), _table(e), unit)
+        MissingLoad(name, tuple(stations.tolist()), tuple(phase.tolist()), table(v), table(e), unit)
         for name, v, e in zip(inferred.names, values, errors, strict=True)
     )
-
-
-def missing_force(
-    name: str, residuals: Array, phase: Array, noise: float, memory: float, harmonics: int = 8
-) -> MissingLoad:
-    """Of a recording of forces, the missing force itself: what the mean beat of one axis lacks, N.
-
-    ``residuals`` [T] simulated minus recorded (N, NaN where missing) at ``phase`` [T] (beats from the start of the
-    beat); ``noise`` its standard deviation (N) with correlation ``memory`` from sample to sample.
-    """
-    seen = np.isfinite(residuals)
-    series = Probe((0.0, 1.0), harmonics).terms
-    rows = np.concatenate([-residuals[seen, None], series(phase[seen])], axis=1)
-    white = _decorrelated(rows, np.flatnonzero(seen), memory) / noise
-    spread = np.linalg.pinv(white[:, 1:].T @ white[:, 1:])
-    at = np.arange(PHASES) / PHASES
-    values = series(at) @ spread @ white[:, 1:].T @ white[:, 0]
-    errors = np.sqrt(np.einsum("np,pq,nq->n", series(at), spread, series(at)))
-    return MissingLoad(name, (0.0,), tuple(at.tolist()), _table(values[None]), _table(errors[None]), "N")
-
-
-def _table(values: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(row) for row in values.tolist())
 
 
 def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:

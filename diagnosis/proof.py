@@ -12,13 +12,13 @@ from calibration.evaluator import Evaluator
 from calibration.problem import Problem
 from diagnosis.finding import Interval, Proof, RecordingMisfit
 from diagnosis.fit import Fit
+from diagnosis.intervals import CONFIDENCE
 from diagnosis.stack import Stack
 from records import Recording
 
 Array = npt.NDArray[np.float64]
 
 DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
-CONFIDENCE = 0.9
 
 
 @dataclass(frozen=True)

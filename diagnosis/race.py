@@ -11,6 +11,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.linearised import unit_at
 from calibration.problem import Problem, base_genome
+from diagnosis.decide import tolerated
 from diagnosis.fit import CRAWLING, UNFIT, Fit, gained_little, thoroughly
 from diagnosis.refit import RIVALRY
 from diagnosis.screen import Trial, size_columns
@@ -25,13 +26,14 @@ RACE = 5  # of each, before those that leave least go on
 
 def afresh(
     subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trials: Sequence[Trial], most: float
-) -> Iterator[tuple[Trial, Fit]]:
-    """The nominal model with the suspect of one of ``trials``, fitted from the estimates, where ``begun`` is.
+) -> Iterator[list[tuple[Trial, Fit]]]:
+    """The nominal model with the suspect of each of ``trials``, fitted from the estimates, where ``begun`` is.
 
     Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back. All run
     for RACE steps, those that act at a place from the typical one too; then each that may still overtake the best goes
     on to its end. A fit ends early where it crawls and leaves RIVALRY times as much as the best, or more than ``most``
-    (m^2 or N^2 beyond the noise). Yields the best after every step; nothing where none can be simulated.
+    (m^2 or N^2 beyond the noise). Yields all that do not leave as much after every step, the best first; nothing where
+    none can be simulated.
     """
     race = _Race(stack, most)
     for trial in trials:
@@ -52,25 +54,28 @@ class _Race:
         """One more."""
         self.runners.append(_Runner(trial, steps))
 
-    def run(self, steps: int) -> Iterator[tuple[Trial, Fit]]:
-        """All to as many ``steps``, those that leave least first; yields the best of all after each."""
+    def run(self, steps: int) -> Iterator[list[tuple[Trial, Fit]]]:
+        """All to as many ``steps``, those that leave least first; yields what is in front after each."""
         for runner in sorted(self.runners, key=lambda one: one.cost):
             while runner.taken < steps and not self._given_up(runner) and runner.step():
-                yield self._best()
+                yield self._in_front()
 
     def _given_up(self, runner: _Runner) -> bool:
         if len(runner.fits) < 2:
             return False
         before, now = runner.fits
-        most = min(self.most, RIVALRY * min(self._left(one) for one in self.runners))
-        return gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > most
+        return gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > min(self.most, self._behind())
 
     def _left(self, runner: _Runner) -> float:
         return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
 
-    def _best(self) -> tuple[Trial, Fit]:
-        best = min(self.runners, key=lambda one: one.cost)
-        return best.trial, best.fits[-1]
+    def _behind(self) -> float:
+        """What leaves more is no rival of the best; above what noise may make of nothing."""
+        return max(RIVALRY * min(self._left(one) for one in self.runners), tolerated(self.stack, 0.0, 0.0))
+
+    def _in_front(self) -> list[tuple[Trial, Fit]]:
+        begun = sorted((one for one in self.runners if one.fits), key=lambda one: one.cost)
+        return [(one.trial, one.fits[-1]) for one in begun if one is begun[0] or self._left(one) <= self._behind()]
 
 
 @dataclass

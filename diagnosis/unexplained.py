@@ -6,15 +6,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from diagnosis.finding import FreeLaw, Interval, MissingLoad
+from diagnosis.finding import FreeLaw, Interval, MissingLoad, table
 from diagnosis.law import free_law
-from diagnosis.missing import Case, Inferred, LoadPlace, infer, missing_force, missing_loads, place
+from diagnosis.missing import PHASES, Case, Inferred, LoadPlace, decorrelated, infer, missing_loads, place
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 from sim.effects.probe import Probe
 from sim.probing import Probed, StationMotion
+
+Array = npt.NDArray[np.float64]
 
 PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 LARGEST = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
@@ -125,3 +128,22 @@ def missing_forces(subject: Subject, stack: Stack, nominal: Refit) -> tuple[Miss
         memory = float(np.clip(view.memory, 0.0, 0.99))
         found.append(missing_force(recording.name, residuals[:, column], phase, noise, memory))
     return tuple(found)
+
+
+def missing_force(
+    name: str, residuals: Array, phase: Array, noise: float, memory: float, harmonics: int = 8
+) -> MissingLoad:
+    """Of a recording of forces, the missing force itself: what the mean beat of one axis lacks, N.
+
+    ``residuals`` [T] simulated minus recorded (N, NaN where missing) at ``phase`` [T] (beats from the start of the
+    beat); ``noise`` its standard deviation (N) with correlation ``memory`` from sample to sample.
+    """
+    seen = np.isfinite(residuals)
+    series = Probe((0.0, 1.0), harmonics).terms
+    rows = np.concatenate([-residuals[seen, None], series(phase[seen])], axis=1)
+    white = decorrelated(rows, np.flatnonzero(seen), memory) / noise
+    spread = np.linalg.pinv(white[:, 1:].T @ white[:, 1:])
+    at = np.arange(PHASES) / PHASES
+    values = series(at) @ spread @ white[:, 1:].T @ white[:, 0]
+    errors = np.sqrt(np.einsum("np,pq,nq->n", series(at), spread, series(at)))
+    return MissingLoad(name, (0.0,), tuple(at.tolist()), table(values[None]), table(errors[None]), "N")

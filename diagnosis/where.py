@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from diagnosis.finding import Exponent, Interval, Where
+from diagnosis.intervals import CONFIDENCE
 from diagnosis.maps import PHASES, Piece, harmonics
 from diagnosis.stack import Stack
 from records import Condition
@@ -20,7 +21,6 @@ EDGES = (0.05, 0.95)  # of the misfit's mass: the extent that is told
 GATHERED = 0.35  # length of the mean vector of phases from which a misfit lies at a phase
 WIDE = 0.8  # of the span or chord: a misfit that reaches over as much has no place
 APART = 1.05  # ratio of two values of a variable that differ
-CONFIDENCE = 0.9
 
 
 def where(stack: Stack, pieces: Sequence[Piece], coefficients: Array) -> Where:

@@ -15,7 +15,8 @@ import pytest
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis import DiagnosisSpec
-from diagnosis.assess import Assessment, _elsewhere, _settled
+from diagnosis.assess import _elsewhere, _settled
+from diagnosis.assessment import Assessment
 from diagnosis.fit import Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal, promises

@@ -10,7 +10,8 @@ import numpy.typing as npt
 import pytest
 
 from diagnosis.finding import Interval
-from diagnosis.missing import PHASES, Case, LoadPlace, infer, missing_force, missing_loads, place
+from diagnosis.missing import PHASES, Case, LoadPlace, infer, missing_loads, place
+from diagnosis.unexplained import missing_force
 from sim.effects.probe import Probe
 from sim.probing import Probed
 from tests.diagnosis.loaded import (

@@ -18,7 +18,7 @@ FALLING = [2000.0 - 100.0 * k for k in range(20)]
 
 def stack() -> Any:
     """One for which a fit's cost is what it leaves, and counts in full."""
-    return SimpleNamespace(excess=lambda c: c, trust=lambda c: 1.0, chi_squared=lambda c: c)  # noqa: ARG005
+    return SimpleNamespace(excess=lambda c: c, trust=lambda c: 1.0, chi_squared=lambda c: c, noise=0.0, uncertainty=0.0)  # noqa: ARG005
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def race(monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr("diagnosis.race._from_estimates", steps)
         monkeypatch.setattr("diagnosis.race._starts", lambda _: [None])
         found: Any = list(afresh(NOTHING, stack(), NOTHING, NOTHING, cast("Any", tuple(costs)), most))
-        return (found[-1][0], found[-1][1].cost, asked) if found else ("", np.inf, asked)
+        return (found[-1][0][0], found[-1][0][1].cost, asked) if found else ("", np.inf, asked)
 
     return run
 

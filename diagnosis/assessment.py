@@ -1,0 +1,84 @@
+"""What is known so far in the search for what is lacking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.problem import Evaluation, Problem
+from diagnosis.decide import Weighed, tolerated
+from diagnosis.fit import SMALLEST, Fit
+from diagnosis.nominal import Nominal
+from diagnosis.refit import Refit
+from diagnosis.screen import Trial
+from diagnosis.stack import Stack
+from diagnosis.subject import Subject
+
+PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
+
+
+@dataclass
+class Assessment:
+    """What is known so far; ``evaluations`` counts individuals.
+
+    ``begun`` is the nominal model at the estimates; ``afresh``: with which model suspects were fitted from there.
+    """
+
+    subject: Subject
+    stack: Stack
+    nominal: Nominal | None = None
+    trials: list[list[Trial]] = field(default_factory=list)
+    refits: list[Refit] = field(default_factory=list)
+    weighed: Weighed | None = None
+    evaluations: int = 0
+    begun: tuple[Subject, Fit] | None = None
+    afresh: Subject | None = None
+
+    @property
+    def known(self) -> Nominal:
+        """The nominal model; ValueError before it has been fitted."""
+        if self.nominal is None:
+            raise ValueError("the nominal model has not been fitted")
+        return self.nominal
+
+    def begin(self, nominal: Nominal) -> None:
+        """Go on with a nominal fit; nothing is known of suspects beside it yet."""
+        self.nominal, self.subject = nominal, nominal.subject
+        self.trials, self.refits, self.afresh = [], [], None
+
+    def add(self, refit: Refit | None) -> None:
+        """Keep ``refit``, or the better of two with the same suspects."""
+        if refit is None:
+            return
+        for k, known in enumerate(self.refits):
+            if set(known.names) == set(refit.names):
+                self.refits[k] = min(known, refit, key=lambda one: one.fit.cost - SMALLEST * one.fit.converged)
+                return
+        self.refits.append(refit)
+
+    def tolerable(self, nominal: Nominal) -> float:
+        """What an explanation may leave that needs no partner, m^2 or N^2."""
+        return tolerated(self.stack, PART * nominal.refit.excess, 0.0)
+
+    def enough(self, nominal: Nominal) -> bool:
+        """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
+        return not self.refits or min(one.excess for one in self.refits) <= self.tolerable(nominal)
+
+
+@dataclass(frozen=True)
+class Counted:
+    """An evaluator that counts the individuals it is given in ``of``."""
+
+    inner: Evaluator
+    of: Assessment
+
+    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+        """As the inner one."""
+        self.of.evaluations += len(np.atleast_2d(values))
+        return self.inner.evaluate(problem, values, residuals=residuals)
+
+    def close(self) -> None:
+        """Nothing: the inner one is its owner's."""
