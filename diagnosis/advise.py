@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -37,18 +38,30 @@ def rivals(weighed: Weighed) -> list[Refit]:
 def separations(
     subject: Subject, stack: Stack, weighed: Weighed, evaluator: Evaluator
 ) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
-    """How far explanations would lie apart under each condition that might be recorded, with the part that is done.
+    """How far explanations would lie apart under conditions that might be recorded, with the part that is done.
 
-    Nothing where no two explanations are left or no other condition can be run; None for one that cannot be simulated.
+    First as they were fitted, then, where that is far, by what a rival cannot make up for, which is never more: until
+    no other condition can be among the best TOLD. Nothing where no two explanations are left or no other condition can
+    be run.
     """
     alive, able = rivals(weighed), subject.conditions()
     if len(alive) < 2:
         return
     if weighed.probabilities.max() >= DECIDED:
         able = able[:FEW]
+    scenes = list[tuple[float, _Scene]]()
     for k, condition in enumerate(able):
-        apart = _apart(subject, stack, alive, condition, evaluator)
-        yield (k + 1) / len(able), None if apart is None else (apart, condition)
+        scene = _scene(subject, alive[0], condition)
+        least = None if scene is None else _least(subject, stack, scene, alive[1:], evaluator, adapts=False)
+        scenes += [] if scene is None or least is None else [(least, scene)]
+        yield 0.5 * (k + 1) / len(able), None
+    found = list[float]()
+    for k, (most, scene) in enumerate(sorted(scenes, key=lambda pair: -pair[0])):
+        if sum(one >= most for one in found) >= TOLD:
+            return
+        least = _least(subject, stack, scene, alive[1:], evaluator, adapts=True)
+        found += [] if least is None else [least]
+        yield 0.5 + 0.5 * (k + 1) / len(scenes), None if least is None else (least, scene.shell.condition)
 
 
 def advised(stack: Stack, weighed: Weighed, apart: Sequence[tuple[float, Condition]]) -> tuple[Advice, ...]:
@@ -57,28 +70,36 @@ def advised(stack: Stack, weighed: Weighed, apart: Sequence[tuple[float, Conditi
     return tuple(_advice(stack, weighed, alive, size, condition) for size, condition in best)
 
 
-def _apart(
-    subject: Subject, stack: Stack, alive: Sequence[Refit], condition: Condition, evaluator: Evaluator
+@dataclass(frozen=True)
+class _Scene:
+    """A condition with what the first explanation, of ``genome`` [G], shows under it."""
+
+    genome: Array
+    shell: Recording
+
+
+def _scene(subject: Subject, first: Refit, condition: Condition) -> _Scene | None:
+    genome = first.fit.problem.genomes(np.array(list(first.fit.values.values())))[0]
+    shell = subject.shown(subject.beside(subject.extended(first.names), genome), genome, condition)
+    return None if shell is None else _Scene(genome, shell)
+
+
+def _least(
+    subject: Subject, stack: Stack, scene: _Scene, others: Sequence[Refit], evaluator: Evaluator, *, adapts: bool
 ) -> float | None:
-    """Least root mean square (in noises) of what another explanation could not make up for under ``condition``."""
-    first = alive[0].fit
-    genome = first.problem.genomes(np.array(list(first.values.values())))[0]
-    shell = subject.shown(subject.beside(subject.extended(alive[0].names), genome), genome, condition)
-    if shell is None:
-        return None
-    differences = [unlike(subject, stack, genome, shell, other.fit, evaluator) for other in alive[1:]]
-    known = [one for one in differences if one is not None]
-    return min(known) if known else None
+    """Of several rivals; None where none can be simulated."""
+    every = [unlike(subject, stack, scene.genome, scene.shell, one.fit, evaluator, adapts=adapts) for one in others]
+    return min((one for one in every if one is not None), default=None)
 
 
 def unlike(
-    subject: Subject, stack: Stack, genome: Array, shell: Recording, rival: Fit, evaluator: Evaluator
+    subject: Subject, stack: Stack, genome: Array, shell: Recording, rival: Fit, evaluator: Evaluator, *, adapts: bool
 ) -> float | None:
-    """Root mean square difference (in noises) of a rival from what the first explanation foretells, its genes adapting.
+    """Root mean square difference (in noises) of a rival from what the first explanation foretells.
 
-    They adapt as far as the recordings that there are allow. What makes two explanations alike is that their genes
-    differ: where these alone set them apart, a new recording is met by other genes (Atkinson and Fedorov 1975:
-    T-optimality; here with what is known of the genes already).
+    Where it ``adapts``, with its genes moved as far as the recordings that there are allow. What makes two explanations
+    alike is that their genes differ: where these alone set them apart, a new recording is met by other genes (Atkinson
+    and Fedorov 1975: T-optimality; here with what is known of the genes already).
     """
     problem = Problem(
         subject.beside(rival.problem.model, genome),
@@ -87,23 +108,28 @@ def unlike(
         rival.problem.base,
         rival.problem.axes,
     )
-    moves = np.where(rival.unit > 1.0 - STEP, -STEP, STEP)
-    units = np.vstack([rival.unit, rival.unit + np.diag(moves)])
+    moves = np.where(rival.unit > 1.0 - STEP, -STEP, STEP) if adapts else np.empty(0)
+    units = np.vstack([rival.unit, rival.unit + np.diag(moves)]) if adapts else rival.unit[None]
     evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
     residuals = evaluation.per_recording[0].residuals
     if residuals is None or any(reason is not None for reason in evaluation.reasons):
         return None
-    seen = np.isfinite(residuals).all(axis=0)
-    white = residuals[:, seen] / stack.noise
-    memory = float(np.clip(np.mean([view.memory for view in stack.views]), 0.0, 0.99))
-    counts = (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
-    slopes, known = (white[1:] - white[0]) / moves[:, None], rival.jacobian / stack.scale[:, None]
-    trust = stack.trust(rival.coefficients)
-    told = trust * known.T @ known + np.eye(len(moves)) / PRIOR**2
-    score = trust * counts * slopes @ white[0]
-    gained = score @ np.linalg.solve(told + trust * counts * slopes @ slopes.T, score)
-    whole = float(white[0] @ white[0]) - float(gained) / (trust * counts)
+    white = residuals[:, np.isfinite(residuals).all(axis=0)] / stack.noise
+    whole = float(white[0] @ white[0])
+    if adapts:
+        whole -= _made_up_for(stack, rival, white[0], (white[1:] - white[0]) / moves[:, None])
     return float(np.sqrt(max(whole, 0.0) / white.shape[1]))
+
+
+def _made_up_for(stack: Stack, rival: Fit, difference: Array, slopes: Array) -> float:
+    """Of the square of a ``difference`` [n] (in noises): what genes with ``slopes`` [F, n] take, and cost elsewhere."""
+    memory = float(np.clip(np.mean([view.memory for view in stack.views]), 0.0, 0.99))
+    trust = stack.trust(rival.coefficients)
+    counts = trust * (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
+    known = rival.jacobian / stack.scale[:, None]
+    told = trust * known.T @ known + np.eye(len(rival.unit)) / PRIOR**2
+    score = slopes @ difference
+    return float(counts * score @ np.linalg.solve(told + counts * slopes @ slopes.T, score))
 
 
 def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float, condition: Condition) -> Advice:

@@ -12,7 +12,7 @@ from diagnosis.assessment import Assessment
 from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.fit import Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
-from diagnosis.race import afresh
+from diagnosis.race import Entry, afresh, entries
 from diagnosis.refit import (
     LAST,
     RIVALRY,
@@ -39,6 +39,7 @@ CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RUNNERS = 3  # suspects that are fitted from the estimates
 RIGHT = 0.15  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
+PARTNERS = 3  # of the best explanation
 RIVALS = 3  # explanations to which a partner is sought
 OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
@@ -66,7 +67,10 @@ def assess(
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer division"
     if spec.refine:
+        coarse = state.subject
         _refined(state, state.known, evaluator)
+        if state.subject is not coarse:
+            yield from ((0.93, stage) for stage in _beside(state, spec, evaluator))
     for stage in _doubted(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
@@ -93,8 +97,8 @@ def _settled(
 
 def _ended(state: Assessment, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
     """Weigh what there is, with the best explanation fitted to its end, and what is hard to tell from it as well."""
-    state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
-    yield from _raced(state, evaluator, _alike(state.weighed))
+    known = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
+    yield from _raced(state, evaluator, _alike(known) or _exchanges(state, decided(known).best))
     yield "fitting the best explanation to its end"
     for _ in range(CONTINUED):
         state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
@@ -105,13 +109,30 @@ def _ended(state: Assessment, evaluator: Evaluator, floor: float, suspects: int)
     state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
 
 
-def _alike(weighed: Weighed) -> list[Trial]:
+def _alike(weighed: Weighed) -> list[Entry]:
     """Suspects that explain nearly as well each by itself, if several do: the right one's fit may have been caught."""
     evidence = weighed.evidence[1:]
     least = max(evidence.max(initial=0.0) - OVERTAKES, 0.0)
     close = [one for one, found in zip(weighed.refits[1:], evidence, strict=True) if found > least]
     several = len(close) > 1 and all(len(one.trials) == 1 for one in close)
-    return [one.trials[0] for one in close] if several else []
+    return [entry for one in close for entry in entries(one.trials[0])] if several else []
+
+
+def _exchanges(state: Assessment, best: Refit) -> list[Entry]:
+    """An explanation of several that leaves more than noise, with what is known to look like one of them in its place.
+
+    Beside a large effect a score test cannot tell what the nominal genes, and a look-alike, have taken up.
+    """
+    if len(best.trials) < 2 or best.excess <= tolerated(state.stack, 0.0, 0.0):
+        return []
+    found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
+    every = []
+    for part in best.trials:
+        beside = [trial for trial in best.trials if trial is not part]
+        for name in part.suspect.alike:
+            if name in found and name not in best.names:
+                every += entries(found[name], beside, best)
+    return every
 
 
 def _unended(weighed: Weighed) -> Refit | None:
@@ -241,6 +262,10 @@ def _refits(
         yield from _afresh(state, spec, evaluator)
         if state.enough(nominal):
             return
+    for stage in _beside(state, spec, evaluator):
+        yield 0.8, stage
+    if state.enough(nominal):
+        return
     yield from _together(state, nominal, evaluator)
     yield from _exchanged(state, nominal, evaluator)
     yield 0.97, "continuing the best refits"
@@ -274,30 +299,43 @@ def _afresh(
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
     runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
-    yield from ((0.77, stage) for stage in _raced(state, evaluator, runners))
+    every = [entry for trial in runners for entry in entries(trial)]
+    yield from ((0.77, stage) for stage in _raced(state, evaluator, every))
 
 
-def _raced(state: Assessment, evaluator: Evaluator, runners: Sequence[Trial]) -> Iterator[str]:
-    """Keep what is in front when ``runners`` have been fitted from the estimates."""
-    if state.begun is None:
-        raise ValueError("the nominal model has not been fitted")
-    if not runners:
+def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> Iterator[str]:
+    """Keep what is in front when all have been fitted from the estimates."""
+    if not every or state.begun is None:
         return
     best = min(one.excess for one in state.refits)
     most = max(min(HOPEFUL * state.known.refit.excess, RIVALRY * best), tolerated(state.stack, 0.0, 0.0))
-    front: list[tuple[Trial, Fit]] = []
-    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], runners, most):
-        yield f"refit with {front[0][0].suspect.name} from the estimates"
-    for trial, fit in front:
-        state.add(judged(state.stack, fit, [trial]))
+    front: list[tuple[Entry, Fit]] = []
+    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], every, most):
+        yield f"refit with {' and '.join(one.suspect.name for one in front[0][0].trials)} from the estimates"
+    for entry, fit in front:
+        state.add(judged(state.stack, fit, entry.trials))
+
+
+def _beside(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+    """What else is lacking, by score tests about the best explanation, if that leaves little, but more than it may."""
+    best, stack = min(state.refits, key=lambda one: one.excess), state.stack
+    if not state.tolerable(state.known) < best.excess <= UNKNOWN**2 * state.known.refit.excess:
+        return
+    others, found = [one for one in suspected(state.subject, spec) if one.name not in best.names], []
+    for suspect, trials in screened(state.subject, stack, best.fit, evaluator, others, best.names):
+        found.append(trials)
+        yield f"score test of {suspect.name} beside {' and '.join(best.names)}"
+    for trial in partners(stack, best, found)[:PARTNERS]:
+        yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
+        state.add(refitted(state.subject, stack, best.fit, evaluator, [*best.trials, trial], best.fit))
 
 
 def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
     stack, fit = state.stack, nominal.refit.fit
-    tried: set[frozenset[str]] = set()
+    tried = {frozenset(one.names) for one in state.refits}
     best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
     for k, one in enumerate(best):
-        for trial in partners(stack, one, state.trials)[: 3 if k == 0 else 1]:
+        for trial in partners(stack, one, state.trials)[: PARTNERS if k == 0 else 1]:
             names = frozenset((*one.names, trial.suspect.name))
             if names not in tried:
                 tried.add(names)

@@ -13,7 +13,7 @@ from calibration.linearised import unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis.decide import tolerated
 from diagnosis.fit import CRAWLING, UNFIT, Fit, gained_little, thoroughly
-from diagnosis.refit import RIVALRY
+from diagnosis.refit import RIVALRY, Refit
 from diagnosis.screen import Trial, size_columns
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -24,22 +24,41 @@ STEPS = 14  # of a fit
 RACE = 5  # of each, before those that leave least go on
 
 
-def afresh(
-    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trials: Sequence[Trial], most: float
-) -> Iterator[list[tuple[Trial, Fit]]]:
-    """The nominal model with the suspect of each of ``trials``, fitted from the estimates, where ``begun`` is.
+@dataclass(frozen=True)
+class Entry:
+    """The nominal model with the suspects of ``trials``, whose genes begin at ``unit`` [E] in parts of their boxes."""
 
-    Where the nominal fit ended its genes have taken up what they could of the suspect, and may not find back. All run
-    for RACE steps, those that act at a place from the typical one too; then each that may still overtake the best goes
-    on to its end. A fit ends early where it crawls and leaves RIVALRY times as much as the best, or more than ``most``
-    (m^2 or N^2 beyond the noise). Yields all that do not leave as much after every step, the best first; nothing where
-    none can be simulated.
+    trials: tuple[Trial, ...]
+    unit: Array
+
+
+def entries(trial: Trial, beside: Sequence[Trial] = (), refit: Refit | None = None) -> list[Entry]:
+    """A suspect of typical size where ``trial`` is, and at the typical place; ``beside`` it those of a ``refit``."""
+    suspect = trial.suspect
+    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    size = size_columns(suspect)
+    own = trial.unit[0].copy()
+    own[size] = typical[size]
+    starts = [own, typical] if suspect.places and not np.allclose(own, typical) else [own]
+    kept = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
+    known = [kept[gene.name] for one in beside for gene in one.suspect.genes]
+    return [Entry((*beside, trial), np.array([*known, *start])) for start in starts]
+
+
+def afresh(
+    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, every: Sequence[Entry], most: float
+) -> Iterator[list[tuple[Entry, Fit]]]:
+    """``every`` entry fitted from the estimates, where ``begun`` is.
+
+    Where the nominal fit ended its genes have taken up what they could of a suspect, and may not find back. All run for
+    RACE steps; then each that may still overtake the best goes on to its end. A fit ends early where it crawls and
+    leaves RIVALRY times as much as the best, or more than ``most`` (m^2 or N^2 beyond the noise). Yields all that do
+    not leave as much after every step, the best first; nothing where none can be simulated.
     """
     race = _Race(stack, most)
-    for trial in trials:
-        for start in _starts(trial):
-            race.enter(trial, _from_estimates(subject, stack, evaluator, begun, trial, start))
-            yield from race.run(RACE)
+    for entry in every:
+        race.enter(entry, _from_estimates(subject, stack, evaluator, begun, entry))
+        yield from race.run(RACE)
     yield from race.run(STEPS + 1)  # the last is where it ended, with its slopes
 
 
@@ -50,11 +69,11 @@ class _Race:
         self.stack, self.most = stack, most
         self.runners = list[_Runner]()
 
-    def enter(self, trial: Trial, steps: Iterator[Fit]) -> None:
+    def enter(self, entry: Entry, steps: Iterator[Fit]) -> None:
         """One more."""
-        self.runners.append(_Runner(trial, steps))
+        self.runners.append(_Runner(entry, steps))
 
-    def run(self, steps: int) -> Iterator[list[tuple[Trial, Fit]]]:
+    def run(self, steps: int) -> Iterator[list[tuple[Entry, Fit]]]:
         """All to as many ``steps``, those that leave least first; yields what is in front after each."""
         for runner in sorted(self.runners, key=lambda one: one.cost):
             while runner.taken < steps and not self._given_up(runner) and runner.step():
@@ -73,16 +92,16 @@ class _Race:
         """What leaves more is no rival of the best; above what noise may make of nothing."""
         return max(RIVALRY * min(self._left(one) for one in self.runners), tolerated(self.stack, 0.0, 0.0))
 
-    def _in_front(self) -> list[tuple[Trial, Fit]]:
+    def _in_front(self) -> list[tuple[Entry, Fit]]:
         begun = sorted((one for one in self.runners if one.fits), key=lambda one: one.cost)
-        return [(one.trial, one.fits[-1]) for one in begun if one is begun[0] or self._left(one) <= self._behind()]
+        return [(one.entry, one.fits[-1]) for one in begun if one is begun[0] or self._left(one) <= self._behind()]
 
 
 @dataclass
 class _Runner:
     """A fit on its way, with its last two steps."""
 
-    trial: Trial
+    entry: Entry
     steps: Iterator[Fit]
     fits: list[Fit] = field(default_factory=list)
     taken: int = 0
@@ -102,22 +121,10 @@ class _Runner:
         return True
 
 
-def _starts(trial: Trial) -> list[Array]:
-    """Genes [E] of a suspect in parts of their boxes: of typical size where ``trial`` is, and at the typical place."""
-    suspect = trial.suspect
-    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
-    size = size_columns(suspect)
-    own = trial.unit[0].copy()
-    own[size] = typical[size]
-    return [own, typical] if suspect.places and not np.allclose(own, typical) else [own]
-
-
-def _from_estimates(
-    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, trial: Trial, start: Array
-) -> Iterator[Fit]:
-    """Fits of the nominal model with a suspect, whose genes begin at ``start``; CannotBeginError where they cannot."""
-    suspect, base = trial.suspect, begun.problem.base
-    model = subject.extended([suspect.name])
-    free = (*begun.problem.free, *(gene.name for gene in suspect.genes))
-    problem = Problem(model, stack.recordings, free, base_genome(model, base.as_dict()), stack.axes)
-    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, start]), STEPS)
+def _from_estimates(subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, entry: Entry) -> Iterator[Fit]:
+    """Fits of the nominal model with the suspects of ``entry``; CannotBeginError where they cannot begin."""
+    suspects = [trial.suspect for trial in entry.trials]
+    model = subject.extended([suspect.name for suspect in suspects])
+    free = (*begun.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
+    problem = Problem(model, stack.recordings, free, base_genome(model, begun.problem.base.as_dict()), stack.axes)
+    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, entry.unit]), STEPS)

@@ -228,7 +228,7 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
         source=effect.source,
         signature=effect.signature,
         places=places,
-        page=f"docs/effects/{effect.name}.md",
+        alike=effect.confused_with,
         spots=_at_markers(rig) if places and effect.port == "observation" and isinstance(rig, Wing) else (),
     )
 

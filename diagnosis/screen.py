@@ -99,14 +99,22 @@ def size_columns(suspect: Suspect) -> list[int]:
 
 
 def screened(
-    subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, suspects: Sequence[Suspect]
+    subject: Subject,
+    stack: Stack,
+    nominal: Fit,
+    evaluator: Evaluator,
+    suspects: Sequence[Suspect],
+    known: Sequence[str] = (),
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
-    """Try every suspect about the nominal fit; yields its trials, best first (none where it cannot be simulated)."""
+    """Try every suspect about a fit; yields its trials, best first (none where it cannot be simulated).
+
+    The fit is the nominal one, or has in it the suspects that are ``known``; all its genes may adapt.
+    """
     nuisance = Nuisance(stack, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
         genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
-        model = subject.beside(subject.extended([suspect.name]), genome)
+        model = subject.beside(subject.extended([*known, suspect.name]), genome)
         free = tuple(gene.name for gene in suspect.genes)
         problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
         yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance)

@@ -35,7 +35,7 @@ class Suspect:
         typical: values of all its genes at which it is as large as it is met in practice.
         source: where its law is from.
         signature: what it looks like in a recording.
-        page: where one reads more, or "".
+        alike: names of others that look like it.
         spots: values of its shapes that are tried, in their order, where it acts at these only; else any are.
     """
 
@@ -48,7 +48,7 @@ class Suspect:
     source: str
     signature: str
     places: Mapping[Literal["span", "chord"], str]
-    page: str = ""
+    alike: tuple[str, ...] = ()
     spots: tuple[tuple[float, ...], ...] = ()
 
     @property
