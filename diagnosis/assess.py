@@ -9,7 +9,7 @@ import numpy as np
 
 from calibration.evaluator import Evaluator
 from diagnosis.assessment import Assessment
-from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
+from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.fit import Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from diagnosis.race import Entry, afresh, entries
@@ -66,11 +66,8 @@ def assess(
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer division"
-    if spec.refine:
-        coarse = state.subject
-        _refined(state, state.known, evaluator)
-        if state.subject is not coarse:
-            yield from ((0.93, stage) for stage in _beside(state, spec, evaluator))
+    for stage in _completed(state, spec, evaluator):
+        yield 0.93, stage
     for stage in _doubted(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
@@ -251,25 +248,19 @@ def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
 def _refits(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
 ) -> Iterator[tuple[float, str]]:
-    """Suspects one by one, from the estimates where none could be named, then together while none explains enough."""
+    """Suspects one by one, from the estimates where none could be named, and together where that is not enough."""
     yield from _alone(state, nominal, spec, evaluator)
     yield 0.72, "continuing the best refits"
     if _solved(state, nominal, evaluator):
         return
     if at_least is not None and not any(improves(one, at_least) for one in state.refits):
         return
-    if min(one.excess for one in state.refits) > UNKNOWN**2 * nominal.refit.excess:
+    if not state.leaves_little:
         yield from _afresh(state, spec, evaluator)
-        if state.enough(nominal):
-            return
-    for stage in _beside(state, spec, evaluator):
-        yield 0.8, stage
-    if state.enough(nominal):
-        return
-    yield from _together(state, nominal, evaluator)
-    yield from _exchanged(state, nominal, evaluator)
-    yield 0.97, "continuing the best refits"
-    _solved(state, nominal, evaluator)
+    if not state.leaves_little:
+        yield from ((0.82, stage) for stage in _together(state, nominal, evaluator))
+        yield 0.97, "continuing the best refits"
+        _solved(state, nominal, evaluator)
 
 
 def _alone(
@@ -316,11 +307,23 @@ def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> I
         state.add(judged(state.stack, fit, entry.trials))
 
 
+def _completed(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+    """The best explanation at a division that does not limit it, and what else is lacking if it leaves little then.
+
+    In this order: what a division leaves beside an effect may pass for a second one.
+    """
+    coarse = state.subject
+    if spec.refine:
+        _refined(state, state.known, evaluator)
+    if state.leaves_little and not state.enough(state.known):
+        yield from _beside(state, spec, evaluator)
+        if state.subject is coarse and not state.enough(state.known):
+            yield from _together(state, state.known, evaluator)
+
+
 def _beside(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """What else is lacking, by score tests about the best explanation, if that leaves little, but more than it may."""
+    """Partners of the best explanation, by score tests about it."""
     best, stack = min(state.refits, key=lambda one: one.excess), state.stack
-    if not state.tolerable(state.known) < best.excess <= UNKNOWN**2 * state.known.refit.excess:
-        return
     others, found = [one for one in suspected(state.subject, spec) if one.name not in best.names], []
     for suspect, trials in screened(state.subject, stack, best.fit, evaluator, others, best.names):
         found.append(trials)
@@ -330,7 +333,8 @@ def _beside(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
         state.add(refitted(state.subject, stack, best.fit, evaluator, [*best.trials, trial], best.fit))
 
 
-def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
+    """Several at once: partners of the best, pairs of which neither explains much, and each part exchanged."""
     stack, fit = state.stack, nominal.refit.fit
     tried = {frozenset(one.names) for one in state.refits}
     best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
@@ -339,18 +343,19 @@ def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iter
             names = frozenset((*one.names, trial.suspect.name))
             if names not in tried:
                 tried.add(names)
-                yield 0.82 + 0.04 * k, f"refit with {' and '.join(sorted(names))}"
+                yield f"refit with {' and '.join(sorted(names))}"
                 state.add(refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
     least = min(stack.chi_squared(one.fit.coefficients) for one in state.refits)
     for two in pairs(stack, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)
-            yield 0.94, f"refit with {' and '.join(sorted(names))}"
+            yield f"refit with {' and '.join(sorted(names))}"
             state.add(refitted(state.subject, stack, fit, evaluator, two))
+    yield from _exchanged(state, nominal, evaluator)
 
 
-def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
     """Each part of the best explanation exchanged for what can do the same: one of two may have been found first."""
     best = min(state.refits, key=lambda one: one.excess)
     if len(best.trials) < 2:
@@ -361,7 +366,7 @@ def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Ite
         for trial in substitutes(state.stack, evaluator, best, part, state.trials, SUBSTITUTES):
             names = frozenset(one.suspect.name for one in (*others, trial))
             if names not in tried:
-                yield 0.96, f"refit with {' and '.join(sorted(names))}"
+                yield f"refit with {' and '.join(sorted(names))}"
                 state.add(refitted(state.subject, state.stack, nominal.refit.fit, evaluator, [*others, trial]))
 
 

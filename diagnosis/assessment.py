@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
-from diagnosis.decide import Weighed, tolerated
+from diagnosis.decide import UNKNOWN, Weighed, tolerated
 from diagnosis.fit import SMALLEST, Fit
 from diagnosis.nominal import Nominal
 from diagnosis.refit import Refit
@@ -66,6 +66,12 @@ class Assessment:
     def enough(self, nominal: Nominal) -> bool:
         """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
         return not self.refits or min(one.excess for one in self.refits) <= self.tolerable(nominal)
+
+    @property
+    def leaves_little(self) -> bool:
+        """Whether an explanation leaves less than a law would that is not in the library."""
+        least = min((one.excess for one in self.refits), default=np.inf)
+        return least <= UNKNOWN**2 * self.known.refit.excess
 
 
 @dataclass(frozen=True)
