@@ -38,7 +38,6 @@ WEAKER = 0.6  # of the best score
 CONTINUED = 2  # of the best refits, if they have not converged
 HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RUNNERS = 3  # suspects that are fitted from the estimates
-RIGHT = 0.15  # root mean square, in parts of the nominal misfit: more is left by nothing that is right at its best
 PARTNERS = 3  # of the best explanation
 RIVALS = 3  # explanations to which a partner is sought
 OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
@@ -67,8 +66,6 @@ def assess(
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer division"
     for stage in _completed(state, spec, evaluator):
-        yield 0.93, stage
-    for stage in _doubted(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
     if state.refits:
@@ -116,11 +113,12 @@ def _alike(weighed: Weighed) -> list[Entry]:
 
 
 def _exchanges(state: Assessment, best: Refit) -> list[Entry]:
-    """An explanation of several that leaves more than noise, with what is known to look like one of them in its place.
+    """An explanation that leaves more than noise, with what is known to look like a part of it in its place.
 
-    Beside a large effect a score test cannot tell what the nominal genes, and a look-alike, have taken up.
+    A score test cannot tell what the nominal genes, and a look-alike, have taken up: of two that look alike the first
+    to be fitted may hide the other.
     """
-    if len(best.trials) < 2 or best.excess <= tolerated(state.stack, 0.0, 0.0):
+    if best.excess <= tolerated(state.stack, 0.0, 0.0):
         return []
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
     every = []
@@ -143,15 +141,6 @@ def _unended(weighed: Weighed) -> Refit | None:
         if evidence[k] > evidence.max() - OVERTAKES and not rival.fit.converged:
             return rival
     return None
-
-
-def _doubted(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """Rivals from the estimates to an explanation that leaves more than one that is right: its look-alike may be."""
-    if state.afresh is state.subject or not state.refits:
-        return
-    best = min(state.refits, key=lambda one: one.excess)
-    if best.excess > tolerated(state.stack, 0.0, 0.0) + RIGHT**2 * state.known.refit.excess:
-        yield from (stage for _, stage in _afresh(state, spec, evaluator, best.names))
 
 
 def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
@@ -275,22 +264,19 @@ def _alone(
         state.add(refitted(state.subject, stack, fit, evaluator, [trial]))
 
 
-def _afresh(
-    state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator, known: Sequence[str] = ()
-) -> Iterator[tuple[float, str]]:
-    """Suspects that explain most about the estimates, from there; not those that are ``known`` well enough.
+def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
+    """Suspects that explain most about the estimates, from there.
 
     About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
     """
     if state.begun is None:
         raise ValueError("the nominal model has not been fitted")
     subject, begun = state.begun
-    state.afresh, found = state.subject, []
+    found = []
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
-    runners = [trial for trial in worth_a_refit(found, RUNNERS) if trial.suspect.name not in known]
-    every = [entry for trial in runners for entry in entries(trial)]
+    every = [entry for trial in worth_a_refit(found, RUNNERS) for entry in entries(trial)]
     yield from ((0.77, stage) for stage in _raced(state, evaluator, every))
 
 

@@ -24,7 +24,7 @@ PART = 0.25  # of what the form of a law is allowed to leave: more, and a partne
 class Assessment:
     """What is known so far; ``evaluations`` counts individuals.
 
-    ``begun`` is the nominal model at the estimates; ``afresh``: with which model suspects were fitted from there.
+    ``begun`` is the nominal model at the estimates.
     """
 
     subject: Subject
@@ -35,7 +35,6 @@ class Assessment:
     weighed: Weighed | None = None
     evaluations: int = 0
     begun: tuple[Subject, Fit] | None = None
-    afresh: Subject | None = None
 
     @property
     def known(self) -> Nominal:
@@ -47,7 +46,7 @@ class Assessment:
     def begin(self, nominal: Nominal) -> None:
         """Go on with a nominal fit; nothing is known of suspects beside it yet."""
         self.nominal, self.subject = nominal, nominal.subject
-        self.trials, self.refits, self.afresh = [], [], None
+        self.trials, self.refits = [], []
 
     def add(self, refit: Refit | None) -> None:
         """Keep ``refit``, or the better of two with the same suspects."""
