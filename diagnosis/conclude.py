@@ -64,7 +64,7 @@ def _is_load(decision: Decision, best: Refit) -> bool:
 
 def _lacking(state: Assessment, evaluator: Evaluator, *, unnamed: bool) -> Iterator[tuple[float, str, Unexplained]]:
     """What is lacking, recording by recording; of what is ``unnamed`` by a finer division as well, and with a law."""
-    stack, nominal = state.stack, _nominal(state)
+    stack, nominal = state.stack, state.known.refit
     if stack.recordings[0].kind == "forces":
         when = pulse(state.subject, stack, nominal.fit) if unnamed else None
         loads = missing_forces(state.subject, stack, nominal)
@@ -82,20 +82,14 @@ def _lacking(state: Assessment, evaluator: Evaluator, *, unnamed: bool) -> Itera
     yield 1.0, "locating what is missing", unexplained(found, law=unnamed)
 
 
-def _nominal(state: Assessment) -> Refit:
-    if state.nominal is None:
-        raise ValueError("the nominal model has not been fitted")
-    return state.nominal.refit
-
-
 def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplained, evaluator: Evaluator) -> Where:
     """Where the misfit lies; of an effect that is named, where this acts: the fit smears a misfit over the beat."""
-    stack, coefficients = state.stack, _nominal(state).fit.coefficients
+    stack, coefficients = state.stack, state.known.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
         acts = action(stack, evaluator, best)
         stack, coefficients = (stack, coefficients) if acts is None else (stack.noiseless, acts)
     found = where(stack, maps.pieces(state.subject, stack, coefficients), coefficients)
-    held = _nominal(state) if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
+    held = state.known.refit if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
     span, chord = (_placed(held, "span") or lacking.span, _placed(held, "chord") or lacking.chord)
     phase = lacking.phase if decision.verdict != "measurement fault" else None
     return Where(
@@ -187,9 +181,7 @@ def _division(state: Assessment) -> float:
 
 
 def _floors(state: Assessment, division: float) -> Floors:
-    stack, nominal = state.stack, state.nominal
-    if nominal is None:
-        raise ValueError("the nominal model has not been fitted")
+    stack, nominal = state.stack, state.known
     memory = float(np.median([view.memory for view in stack.views]))
     total = float(np.sqrt(stack.noise**2 + division**2 + stack.tolerance**2))
     left = None if nominal.division is None else division

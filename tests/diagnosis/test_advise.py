@@ -16,10 +16,10 @@ RIG, EVALUATOR = PendulumRig(), InProcessEvaluator()
 TRUTH = {"stiffness": 0.2, "damping": 4e-3, "inertia": 1e-3}
 
 
-def fitted(stack: Stack, **values: float) -> Fit:
-    """The pendulum fitted from ``values``; ``gain`` free as well, which is no gene of what is compared with."""
+def fitted(stack: Stack) -> Fit:
+    """The pendulum fitted from TRUTH; ``gain`` free as well, which is no gene of what is compared with."""
     model = Pendulum(("gain",))
-    asked = Problem(model, stack.recordings, model.searched, base_genome(model, {**TRUTH, **values}), stack.axes)
+    asked = Problem(model, stack.recordings, model.searched, base_genome(model, TRUTH), stack.axes)
     genes = free_genes(asked)
     *_, found = thoroughly(
         RIG, stack, asked, EVALUATOR, unit_at(genes, np.array([asked.base[g.name] for g in genes])), 15

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from diagnosis.fit import CannotBeginError
-from diagnosis.race import RACE, afresh
+from diagnosis.race import RACE, afresh, entries
+from diagnosis.screen import Trial
+from tests.diagnosis.pendulum_rig import SUSPECTS
 
 NOTHING = cast("Any", None)
 FALLING = [2000.0 - 100.0 * k for k in range(20)]
@@ -67,3 +69,29 @@ def test_one_that_crawls_far_behind_is_given_up(race: Any) -> None:
     assert asked["crawls"] == 3
     _, _, asked = race({"falls": FALLING}, most=1.0)
     assert asked["falls"] > RACE, "one that still falls is not given up, however much it leaves"
+
+
+def trial(name: str, unit: list[float]) -> Trial:
+    """A suspect of the pendulum at the genes ``unit``, in parts of their boxes."""
+    suspect = next(one for one in SUSPECTS if one.name == name)
+    return Trial(suspect, np.array([unit]), np.zeros((1, 1)), 0.0, np.ones(1), len(unit), 0.0)
+
+
+def test_a_fit_begins_where_the_trial_was_and_at_the_typical_place() -> None:
+    """Of typical size both: 5 g of 30 g; the typical place is 0.7 of the arm."""
+    own, typical = entries(trial("point_mass", [0.9, 0.2]))
+    np.testing.assert_allclose(own.unit, [1 / 6, 0.2])
+    np.testing.assert_allclose(typical.unit, [1 / 6, 0.7])
+    assert len(entries(trial("point_mass", [0.9, 0.7]))) == 1
+    assert len(entries(trial("friction", [0.5]))) == 1
+
+
+def test_what_stays_beside_it_begins_where_it_was_fitted() -> None:
+    free = ("stiffness", "gain.part", "cubic.k3")
+    refit = cast(
+        "Any", SimpleNamespace(fit=SimpleNamespace(problem=SimpleNamespace(free=free), unit=np.array([0.3, 0.6, 0.8])))
+    )
+    cubic = trial("cubic", [0.5])
+    first, _ = entries(trial("point_mass", [0.9, 0.2]), [cubic], refit)
+    assert [one.suspect.name for one in first.trials] == ["cubic", "point_mass"]
+    np.testing.assert_allclose(first.unit, [0.8, 1 / 6, 0.2])
