@@ -18,6 +18,11 @@ Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.9
 
 
+def reach(freedom: float = np.inf) -> float:
+    """Standard errors to either side that an interval of CONFIDENCE has, if they are known with so much ``freedom``."""
+    return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
+
+
 def covariance(stack: Stack, fit: Fit) -> Array:
     """[F, F] of the genes in parts of their boxes.
 
@@ -46,11 +51,11 @@ def gene_values(stack: Stack, fit: Fit, sizes: Mapping[str, float] | None = None
     """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
     errors = np.sqrt(np.diag(covariance(stack, fit)))
     freedom = max(len(stack.recordings) - 1, 1) if _clustered(stack) else np.inf
-    reach = float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
+    wide = reach(freedom)
     off = sizes or {}
     found = []
     for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):
-        low, high = unit - reach * error, unit + reach * error
+        low, high = unit - wide * error, unit + wide * error
         ends = [float(gene.from_unit(x)) if 0.0 <= x <= 1.0 else None for x in (low, high)]
         value = Interval(float(gene.from_unit(unit)), ends[0], ends[1])
         found.append(GeneValue(gene.name, gene.unit, gene.description, value, off.get(gene.name)))

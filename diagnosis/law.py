@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from diagnosis.features import Candidate, Motion, candidates
 from diagnosis.finding import FreeLaw, Interval, Term
+from diagnosis.intervals import reach
 from diagnosis.missing import GENES, Case
 from sim.effects.probe import Probe
 
@@ -29,7 +30,6 @@ GAIN = 0.02  # of the excess misfit, that a term must take away of recordings le
 PLAIN = 0.02  # of it: a plainer term is taken before a better one, if no more is lost
 PREDICTS = 0.1  # of the excess misfit: a law that takes less is none
 FEWEST = 3  # recordings
-_NINETY = 1.6449  # standard errors to either side
 
 
 @dataclass(frozen=True)
@@ -161,11 +161,11 @@ def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: Index, explained:
     every = np.ones(len(sums.power), bool)
     size = sums.size[terms]
     value = sums.fit(terms[None], every)[0] / size
-    error = _jackknife(sums, terms) / size
+    error = reach(len(sums.power) - 1) * _jackknife(sums, terms) / size
     found = tuple(
         Term(
             dictionary[k].name,
-            Interval(float(v), float(v - _NINETY * e), float(v + _NINETY * e)),
+            Interval(float(v), float(v - e), float(v + e)),
             dictionary[k].feature.unit,
         )
         for k, v, e in zip(terms, value, error, strict=True)

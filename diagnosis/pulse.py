@@ -14,6 +14,7 @@ from scipy.stats import chi2
 
 from diagnosis.finding import Interval
 from diagnosis.fit import Fit
+from diagnosis.intervals import reach
 from diagnosis.screen import Nuisance, taken
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -24,7 +25,6 @@ INSTANTS = 144
 WIDTH = 0.015  # of a beat, standard deviation
 TAKES = 0.1  # of the misfit: a pulse that takes less tells no instant
 CHANCE = 0.01  # that noise alone makes one take as much at any of them
-NINETY = 2.706  # chi-squared of one degree
 
 
 def pulse(subject: Subject, stack: Stack, fit: Fit) -> Interval | None:
@@ -41,7 +41,7 @@ def pulse(subject: Subject, stack: Stack, fit: Fit) -> Interval | None:
     if gain[best] < max(TAKES * float(left @ left), by_noise):
         return None
     beyond = max(float(white @ white) - gain[best] - len(white), 0.0)
-    near = gain[best] - gain < NINETY * (1.0 + beyond / stack.pieces)
+    near = gain[best] - gain < reach() ** 2 * (1.0 + beyond / stack.pieces)
     apart = (phase - phase[best] + 0.5) % 1.0 - 0.5
     low, high = (_reach(near, apart, sign) for sign in (-1, 1))
     return Interval(float(phase[best]), float(phase[best] - low), float(phase[best] + high))

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import t as student
 
 from diagnosis.finding import Exponent, Interval, Where
-from diagnosis.intervals import CONFIDENCE
+from diagnosis.intervals import reach
 from diagnosis.maps import PHASES, Piece, harmonics
 from diagnosis.stack import Stack
 from records import Condition
@@ -107,10 +106,10 @@ def _exponents(stack: Stack, coefficients: Array) -> tuple[Exponent, ...]:
     best, *_ = np.linalg.lstsq(design, size, rcond=None)
     left, freedom = size - design @ best, len(size) - design.shape[1]
     cover = np.linalg.inv(design.T @ design) * max(float(left @ left) / freedom, 0.05**2)
-    reach = float(student.ppf(0.5 + CONFIDENCE / 2, freedom)) * np.sqrt(np.diag(cover))
+    errors = reach(freedom) * np.sqrt(np.diag(cover))
     return tuple(
         Exponent(name, Interval(float(b), float(b - d), float(b + d)), *ends, unit)
-        for (name, unit, ends, _), b, d in zip(variables, best[1:], reach[1:], strict=True)
+        for (name, unit, ends, _), b, d in zip(variables, best[1:], errors[1:], strict=True)
     )
 
 

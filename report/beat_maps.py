@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
+from diagnosis.intervals import reach
 from report.layout import figure, panels
 from report.markup import Markup, joined, tag
 from report.svg import (
@@ -33,7 +34,7 @@ WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
-NINETY = 1.645  # standard errors of a two-sided 90 % interval
+NINETY = reach()
 MOST_ROWS, MOST_COLUMNS, MOST_LOADS = 32, 64, 6
 Pool = Callable[[Sequence[float]], float]
 

@@ -131,7 +131,8 @@ def stages(finding: Finding) -> dict[str, str]:
     """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
     if not finding.put_in:
         return {"before": "nominal model, refitted"}
-    return {"before": "before: nominal model, refitted", "after": f"after: with {what_was_put_in(finding)}"}
+    after = "what was found" if finding.named else "the nearest in the library"  # short: titles of maps
+    return {"before": "before: nominal model, refitted", "after": f"after: with {after}"}
 
 
 def what_was_put_in(finding: Finding) -> str:
