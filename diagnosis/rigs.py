@@ -172,6 +172,10 @@ class VehicleSubject:
 
     def finer(self) -> tuple[VehicleSubject, ...]:
         """Twice as many elements and instants; none where this changes no recorded force by CONVERGED, or too many."""
+        return self._finer
+
+    @cached_property
+    def _finer(self) -> tuple[VehicleSubject, ...]:
         finer = replace(self.model, elements=2 * self.model.elements, instants=2 * self.model.instants)
         if finer.elements > MOST_ELEMENTS or not self._changes(finer):
             return ()
