@@ -58,9 +58,15 @@ def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
 
 def prepared(spec: CalibrationSpec, recording: Recording) -> Recording:
     """``recording`` as it is fitted: forces low-passed, unless they have been or are not to be."""
+    through = fitted_through(spec, recording)
+    return recording if through in (None, recording.low_pass) else low_passed(recording, through)
+
+
+def fitted_through(spec: CalibrationSpec, recording: Recording) -> LowPass | None:
+    """The filter through which forces go before they are fitted, or have gone; None for tracks, and where none is."""
     if recording.kind == "tracks" or spec.low_pass == 0 or recording.low_pass is not None:
-        return recording
-    return low_passed(recording, LowPass(spec.low_pass or default_cutoff(recording.condition.flap_frequency)))
+        return recording.low_pass
+    return LowPass(spec.low_pass or default_cutoff(recording.condition.flap_frequency))
 
 
 def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:

@@ -87,9 +87,10 @@ def _scene(subject: Subject, first: Refit, condition: Condition) -> _Scene | Non
 def _least(
     subject: Subject, stack: Stack, scene: _Scene, others: Sequence[Refit], evaluator: Evaluator, *, adapts: bool
 ) -> float | None:
-    """Of several rivals; None where none can be simulated."""
+    """Of several rivals; None where one of them cannot be simulated."""
     every = [unlike(subject, stack, scene.genome, scene.shell, one.fit, evaluator, adapts=adapts) for one in others]
-    return min((one for one in every if one is not None), default=None)
+    known = [one for one in every if one is not None]
+    return min(known) if len(known) == len(others) else None
 
 
 def unlike(
@@ -112,8 +113,10 @@ def unlike(
     units = np.vstack([rival.unit, rival.unit + np.diag(moves)]) if adapts else rival.unit[None]
     evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
     residuals = evaluation.per_recording[0].residuals
-    if residuals is None or any(reason is not None for reason in evaluation.reasons):
+    if residuals is None or evaluation.reasons[0] is not None:
         return None
+    failed = np.array([reason is not None for reason in evaluation.reasons])
+    residuals = np.where(failed[:, None, None], residuals[0], residuals)  # what cannot move makes up for nothing
     white = residuals[:, np.isfinite(residuals).all(axis=0)] / stack.noise
     whole = float(white[0] @ white[0])
     if adapts:

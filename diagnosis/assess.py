@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from calibration.evaluator import Evaluator
 from diagnosis.assessment import Assessment
 from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
-from diagnosis.fit import Fit
+from diagnosis.fit import UNFIT, Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from diagnosis.race import Entry, afresh, entries
 from diagnosis.refit import (
@@ -19,6 +20,7 @@ from diagnosis.refit import (
     Refit,
     again,
     continued,
+    ended,
     judged,
     pairs,
     partners,
@@ -48,10 +50,12 @@ def assess(
     state: Assessment, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     """Fill ``state``; yields the part of the work done and what comes next."""
-    stack = state.stack
+    stack, fixed = state.stack, spec.calibration.fixed
     yield 0.0, "fitting the nominal model"
-    steps = first_fit(state.subject, stack, evaluator, free, spec.start, spec.calibration.fixed)
-    for k, fit in enumerate(steps):
+    if spec.start:
+        with suppress(*UNFIT):
+            state.begun = state.subject, next(first_fit(state.subject, stack, evaluator, free, {}, fixed))
+    for k, fit in enumerate(first_fit(state.subject, stack, evaluator, free, spec.start, fixed)):
         state.begun = state.begun or (state.subject, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.25, "comparing with a finer division"
@@ -156,7 +160,8 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     leading = sorted((one for one in state.refits if one.excess <= most), key=lambda one: one.excess)[:CONTINUED]
     for finer in nominal.subject.finer():
         tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
-        innocent = innocent or any(found is not None and found is not one for one, found in tried)
+        if any(found is not None and found is not one for one, found in tried):
+            innocent = finer.told
         known = [found for one, found in tried if found is not None and found is not one]
         better = min(known, key=lambda one: one.excess, default=best)
         if improves(better, best):
@@ -167,6 +172,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     first = again(finer, stack, evaluator, nominal.refit)
     if first is None:
         return
+    first = ended(finer, stack, evaluator, first)
     most = RIVALRY * better.excess + tolerated(stack, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]

@@ -90,7 +90,8 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
         stack, coefficients = (stack, coefficients) if acts is None else (stack.noiseless, acts)
     found = where(stack, maps.pieces(state.subject, stack, coefficients), coefficients)
     held = state.known.refit if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
-    span, chord = (_placed(held, "span") or lacking.span, _placed(held, "chord") or lacking.chord)
+    own = {gene.name: gene.value for gene in all_genes(state.stack, held)}
+    span, chord = (_placed(held, own, "span") or lacking.span, _placed(held, own, "chord") or lacking.chord)
     phase = lacking.phase if decision.verdict != "measurement fault" else None
     return Where(
         found.words + acting(span, chord, phase, driven=lacking.driven),
@@ -103,14 +104,9 @@ def _where(state: Assessment, decision: Decision, best: Refit, lacking: Unexplai
     )
 
 
-def _placed(best: Refit, along: str) -> Interval | None:
-    """Where the effect itself says that it acts; None where it has no place."""
-    for trial in best.trials:
-        gene = {str(k): v for k, v in trial.suspect.places.items()}.get(along)
-        if gene is not None:
-            value = best.fit.values[gene]
-            return Interval(value, None, None)
-    return None
+def _placed(best: Refit, genes: Mapping[str, Interval], along: Literal["span", "chord"]) -> Interval | None:
+    """Where the effect itself says that it acts, by its own ``genes``; None where it has no place."""
+    return next((genes[one.suspect.places[along]] for one in best.trials if along in one.suspect.places), None)
 
 
 def _finding(
@@ -209,7 +205,7 @@ def _told(stack: Stack, nominal: Refit, best: Refit, place: str, proved: Proof |
 def _innocence(nominal: Nominal) -> tuple[str, ...]:
     if not nominal.innocent:
         return ()
-    return (f"a finer division ({nominal.finer}) was fitted and did no better: the division is not what limits",)
+    return (f"a finer division ({nominal.innocent}) was fitted and hardly did better: the division is not what limits",)
 
 
 def _doubts(stack: Stack) -> tuple[str, ...]:

@@ -100,7 +100,7 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Exponent:
-    """How the misfit that the nominal model leaves grows with one variable of the condition: as its power.
+    """How the misfit, or what was named, grows with one variable of the condition: as its power.
 
     ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` say between which
     values recordings told it.
@@ -115,7 +115,7 @@ class Exponent:
 
 @dataclass(frozen=True)
 class Where:
-    """Where the nominal model and the recordings differ.
+    """Where the nominal model and the recordings differ; where there is a name, by what that does to the recordings.
 
     Attributes:
         words: the same in a sentence or two.
@@ -174,8 +174,8 @@ class MissingLoad:
     """The load that the nominal model lacks, or the motion of its drive, found through its own response.
 
     Under one condition. ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap
-    normal, N/m; where a recording of forces shows it directly, N; what the front rod turns further than it is said to,
-    rad, upward.
+    normal, N/m; where a recording of forces shows it directly, N; what a ``rod`` ("front" or "rear") turns further
+    than it is said to, rad, upward.
     """
 
     recording: str
@@ -184,6 +184,7 @@ class MissingLoad:
     values: Table
     errors: Table
     unit: str
+    rod: str = ""
 
 
 @dataclass(frozen=True)

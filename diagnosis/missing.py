@@ -55,30 +55,6 @@ class Case:
     sensitivities: Array
     crossing: float
 
-    @classmethod
-    def of_samples(
-        cls,
-        name: str,
-        residuals: Array,
-        noise: Array,
-        memory: float,
-        responses: Array,
-        sensitivities: Array,
-        crossing: float,
-    ) -> Case:
-        """From samples whose noise has standard deviation ``noise`` [C] and correlation ``memory`` with the next.
-
-        ``residuals`` [T, C] are simulated minus recorded, NaN where missing, ``responses`` [T, C, P] and
-        ``sensitivities`` [T, C, F] their changes with unit loads and with the genes.
-        """
-        seen = np.isfinite(residuals)
-        both = np.concatenate([-residuals[..., None], np.nan_to_num(responses), sensitivities], axis=2)
-        white = np.concatenate(
-            [decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) / s for c, s in enumerate(noise)]
-        )
-        P = responses.shape[2]
-        return cls(name, white[:, 0], white[:, 1 : 1 + P], white[:, 1 + P :], crossing)
-
 
 def decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
     """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
@@ -288,15 +264,19 @@ def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, 
 def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
     """The load under each condition at the probe's stations and PHASES instants from the start of the beat on.
 
-    Of rods that move otherwise, what the front one turns further, rad.
+    Of rods that move otherwise, what each of these turns further, rad.
     """
-    phase, stations = np.arange(PHASES) / PHASES, np.array(inferred.probe.stations)
-    values, errors = inferred.fields(stations, phase)
-    if inferred.driven:
-        values, errors, stations = np.radians(values[:, :1]), np.radians(errors[:, :1]), np.zeros(1)
-    unit = "rad" if inferred.driven else "N/m"
+    phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
+    values, errors = inferred.fields(np.array(stations), phase)
+    at = tuple(phase.tolist())
+    if not inferred.driven:
+        every = zip(inferred.names, values, errors, strict=True)
+        return tuple(MissingLoad(name, stations, at, table(v), table(e), "N/m") for name, v, e in every)
+    values, errors = np.radians(values), np.radians(errors)
     return tuple(
-        MissingLoad(name, tuple(stations.tolist()), tuple(phase.tolist()), table(v), table(e), unit)
+        MissingLoad(name, (0.0,), at, table(v[k : k + 1]), table(e[k : k + 1]), "rad", rod)
+        for k, rod in enumerate(("front", "rear"))
+        if values[:, k].any()
         for name, v, e in zip(inferred.names, values, errors, strict=True)
     )
 

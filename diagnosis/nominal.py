@@ -12,7 +12,7 @@ from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, unit_at
 from calibration.problem import Problem, base_genome
 from diagnosis.fit import Fit, thoroughly
-from diagnosis.refit import Refit, again, judged
+from diagnosis.refit import Refit, again, ended, judged
 from diagnosis.screen import Nuisance
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -37,7 +37,8 @@ class Nominal:
         refit: its fit.
         division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
         finer: in words.
-        innocent: whether the finer division was fitted and did no better, so that it is not the division that limits.
+        innocent: finer division, in words, that was fitted and hardly did better, so that it is not the division that
+            limits; "" where there is none.
         remarks: for the reader.
     """
 
@@ -46,7 +47,7 @@ class Nominal:
     division: float | None
     finer: str
     remarks: tuple[str, ...]
-    innocent: bool = False
+    innocent: str = ""
 
 
 def first_fit(
@@ -69,16 +70,16 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
     """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
     now, remarks = judged(stack, fit), list[str]()
     for _ in range(ROUNDS):
-        left, finest, better, tried = 0.0, "", None, False
+        left, finest, better, tried = 0.0, "", None, ""
         for finer in subject.finer():
             changes, takes = leaves(finer, stack, evaluator, now)
             if changes <= left:
                 continue
-            left, finest, tried = changes, finer.told, False
+            left, finest, tried = changes, finer.told, ""
             if refine and promises(stack, changes, takes, now):
                 found = again(finer, stack, evaluator, now)
-                better = found if found is not None and improves(found, now) else None
-                tried = found is not None
+                better = ended(finer, stack, evaluator, found) if found and improves(found, now) else None
+                tried = finer.told if found is not None else ""
             if better is not None:
                 break
         if better is None:

@@ -19,6 +19,7 @@ from records import Recording
 Array = npt.NDArray[np.float64]
 
 DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
+FEWEST = 4  # markers to draw from
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def _over(interval: Interval, floor: float) -> Interval:
 def _misfits(
     predicted: Predicted, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
 ) -> tuple[Interval, Interval, bool]:
-    """Root mean squares before and after with intervals over markers, and whether after is surely less."""
+    """Root mean squares before and after with intervals, and whether after is surely less."""
     groups: list[Array] = []
     for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
         width = 3 if kind == "tracks" else 1
@@ -118,7 +119,7 @@ def _misfits(
         rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
         groups.append(rows[:, rows[2] > 0])
     every = np.concatenate(groups, axis=1)
-    if every.shape[1] < 4:  # forces: stretches of time instead of markers
+    if "forces" in kinds or every.shape[1] < FEWEST:  # stretches of time instead of markers
         every = _stretches(predicted, used)
     drawn = np.random.default_rng(0).integers(0, every.shape[1], (DRAWS, every.shape[1]))
     sums = every[:, drawn].sum(axis=2)

@@ -21,7 +21,7 @@ from diagnosis.subject import Subject
 Array = npt.NDArray[np.float64]
 
 STEPS = 14  # of a fit
-RACE = 5  # of each, before those that leave least go on
+RACE = 5  # of each, its start among them, before those that leave least go on
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from calibration.evaluator import Evaluator
 from calibration.linearised import free_genes, values_at
 from calibration.problem import Problem, base_genome
-from diagnosis.fit import PRIOR, UNFIT, Fit, fitted, thoroughly
+from diagnosis.fit import PRIOR, UNFIT, Fit, fitted, measured, thoroughly
 from diagnosis.screen import Nuisance, Trial, off_units, size_columns, taken
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
@@ -115,9 +116,10 @@ def refitted(
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
         astray = stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves
         if len(trials) == 1 and astray and not sizes.all():
-            first = _some(subject, stack, problem, evaluator, start, before, sizes)
-            first = _widened(subject, stack, problem, evaluator, first.unit, first)
-            fit = min((fit, first), key=lambda one: one.cost)
+            with suppress(*UNFIT):
+                first = _some(subject, stack, problem, evaluator, start, before, sizes)
+                first = _widened(subject, stack, problem, evaluator, first.unit, first)
+                fit = min((fit, first), key=lambda one: one.cost)
         return judged(stack, fit, trials)
     return None
 
@@ -178,6 +180,13 @@ def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit
     except UNFIT:
         return refit
     return judged(stack, fit, refit.trials)
+
+
+def ended(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit:
+    """``refit`` to its end, with all slopes measured there: what suspects are tried about."""
+    if not refit.fit.converged:
+        refit = continued(subject, stack, evaluator, refit)
+    return judged(stack, measured(subject, stack, evaluator, refit.fit), refit.trials)
 
 
 def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.effects import sizes
+from calibration.plan import fitted_through
 from calibration.spec import CalibrationSpec, model_for
 from diagnosis.subject import Place, Subject, Suspect
 from records import Condition, Dataset, Recording, Vehicle, Wing
@@ -47,7 +48,7 @@ def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
     model = model_for(dataset, spec)
     if isinstance(model, FlexibleWing):
         return WingSubject(dataset, model)
-    return VehicleSubject(dataset, model)
+    return VehicleSubject(dataset, model, spec)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +136,11 @@ class WingSubject:
 
 @dataclass(frozen=True, eq=False)
 class VehicleSubject:
-    """A flapping vehicle that was recorded as forces."""
+    """A flapping vehicle that was recorded as forces, which are fitted as ``spec`` says."""
 
     dataset: Dataset
     model: BladeElementWing
+    spec: CalibrationSpec
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
@@ -198,8 +200,12 @@ class VehicleSubject:
         return 0.0
 
     def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """Forces along both axes under ``condition``, at the phases of the recording under the most similar one."""
+        """Forces along both axes under ``condition``, at the phases of the recording under the most similar one.
+
+        Low-passed as they would be fitted.
+        """
         blank = _blank(self.dataset, condition, forces=("x", "z"))
+        blank = replace(blank, low_pass=fitted_through(self.spec, blank))
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 

@@ -184,7 +184,7 @@ def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
 
 
 def _spots(suspect: Suspect, typical: Array) -> list[Array]:
-    """Shapes [E'] in parts of their boxes to be tried, the ``typical`` one first."""
+    """Shapes [E'] in parts of their boxes to be tried: its spots if it has any, else the ``typical`` one and others."""
     if suspect.spots:
         genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
         return [unit_at(genes, np.array(spot)) for spot in suspect.spots]

@@ -47,13 +47,22 @@ def _along(pieces: Sequence[Piece], name: str) -> Interval | None:
                 return None
             at.append(value)
             mass.append(one)
-    order = np.argsort(at)
-    where, weight = np.array(at)[order], np.array(mass)[order]
+    places, which = np.unique(at, return_inverse=True)
+    weight = np.bincount(which, weights=mass)
     if weight.sum() <= 0:
         return None
-    total = np.cumsum(weight) / weight.sum()
-    low, middle, high = (float(np.interp(part, total, where)) for part in (EDGES[0], 0.5, EDGES[1]))
+    total = np.concatenate([[0.0], np.cumsum(weight)]) / weight.sum()
+    low, middle, high = (float(np.interp(part, total, _cells(places))) for part in (EDGES[0], 0.5, EDGES[1]))
     return Interval(middle, low, high)
+
+
+def _cells(places: Array) -> Array:
+    """Edges [n + 1] of the parts of the span or chord for which markers at ``places`` [n] stand, in order."""
+    if len(places) < 2:
+        return np.repeat(places, 2)
+    half = 0.5 * (places[1:] + places[:-1])
+    ends = np.clip([2 * places[0] - half[0], 2 * places[-1] - half[-1]], 0.0, 1.0)
+    return np.array([min(ends[0], places[0]), *half, max(ends[1], places[-1])])
 
 
 def _phase(pieces: Sequence[Piece]) -> Interval | None:
@@ -73,7 +82,7 @@ def _phase(pieces: Sequence[Piece]) -> Interval | None:
     middle = float(np.angle(mean) / (2 * np.pi)) % 1.0
     start = round(middle * PHASES) - PHASES // 2
     rolled = np.roll(mass, -start)
-    total = np.cumsum(rolled) / rolled.sum()
+    total = (np.cumsum(rolled) - 0.5 * rolled) / rolled.sum()
     low, high = (float(np.interp(part, total, np.arange(PHASES))) + start for part in EDGES)
     return Interval(middle, low / PHASES, high / PHASES)
 

@@ -66,6 +66,12 @@ def _kind(load: MissingLoad) -> str:
     return "motion of the drive" if load.unit == "rad" else "load"
 
 
+def _name(load: MissingLoad, letters: int) -> str:
+    """Of which rod, if of one, under which recording's condition."""
+    of = f"{load.rod} rod, " if load.rod else ""
+    return of + shortened(load.recording, letters - len(of))
+
+
 def missing_loads(finding: Finding) -> Markup | None:
     """The load, or motion, that the nominal model lacks, under the conditions where it is largest."""
     loads = [m for m in finding.missing if m.stations and m.phase]
@@ -78,7 +84,7 @@ def missing_loads(finding: Finding) -> Markup | None:
         *(_load_curve(load, scale) if len(load.stations) == 1 else _load_map(load, scale) for load in shown)
     )
     left = len(loads) - len(shown)
-    more = f" {left} more conditions, where it is smaller, are in the JSON." if left else ""
+    more = f" {left} more, where it is smaller, are in the JSON." if left else ""
     if single:
         return figure(
             _load_told(shown[0], scale), drawings, legend(("band", "90 % interval")), note=more.strip() or None
@@ -146,7 +152,7 @@ def _load_told(load: MissingLoad, scale: Scale) -> str:
         where += f" and {share(load.stations[i])} of the span"
     size = number(load.values[i][j] * scale.factor)
     error = number(NINETY * load.errors[i][j] * scale.factor, 2)
-    told = f"{size} ± {error} {scale.unit} ({shortened(load.recording, 40)})"
+    told = f"{size} ± {error} {scale.unit} ({_name(load, 40)})"
     return f"The missing {_kind(load)} is clearest at {where}: {told}"
 
 
@@ -165,7 +171,7 @@ def _load_map(load: MissingLoad, scale: Scale) -> Markup:
         [f"d{k}" for k in range(2 * SIDES + 1)],
         f"missing load, {scale.unit}",
     )
-    title = shortened(load.recording, 42)
+    title = _name(load, 42)
     return drawing(WIDTH, BOTTOM + 86, f"Missing load, {title}", _grid(title, stations, classes, faint), bar)
 
 
@@ -176,7 +182,7 @@ def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
     across, up = Axis(0, 1, LEFT, RIGHT), axis([*low, *high], BOTTOM, TOP, zero=True)
     places = [across.at(p) for p in load.phase]
     ends = [*zip(places, low, strict=True), *reversed(list(zip(places, high, strict=True)))]
-    title = shortened(load.recording, 42)
+    title = _name(load, 42)
     return drawing(
         WIDTH,
         BOTTOM + 34,

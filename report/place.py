@@ -8,7 +8,7 @@ from diagnosis.finding import Exponent, Finding, Interval, Where
 from report.layout import figure, panels
 from report.markup import Markup, joined, tag
 from report.svg import Axis, drawing, line, text, whisker, x_axis
-from report.words import Scale, bounds, listed, number, percent, with_unit
+from report.words import Scale, bounds, capital, listed, number, percent, with_unit
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 MOST_HARMONICS = 8
@@ -19,9 +19,10 @@ def place(finding: Finding) -> Markup | None:
     where = finding.where
     if where is None:
         return None
-    drawings = [d for d in (_strips(where), _harmonics(where)) if d is not None]
+    whose = "what the named effect does" if finding.verdict in ("named", "measurement fault") else "the misfit"
+    drawings = [d for d in (_strips(where), _harmonics(where, whose)) if d is not None]
     found = figure(where.words or "Where they differ", panels(*drawings)) if drawings else tag("p", where.words)
-    return joined(found, _powers(where.exponents))
+    return joined(found, _powers(where.exponents, whose))
 
 
 def _strips(where: Where) -> Markup | None:
@@ -42,7 +43,7 @@ def _strips(where: Where) -> Markup | None:
         turns = interval is where.phase
         centre = with_unit(number(interval.value * factor), unit)
         at = along.at(interval.value % 1 if turns else interval.value)
-        extent = f"{name}: {centre}, 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
+        extent = f"{name}: {centre}{_within(interval, factor, unit)}"
         parts += [
             text(LEFT, y - 6, extent, class_="said"),
             tag("rect", x=LEFT, y=y, width=RIGHT - LEFT, height=12.0, class_="trough"),
@@ -58,7 +59,13 @@ def _strips(where: Where) -> Markup | None:
     return drawing(WIDTH, 22 + 54.0 * len(rows) + 4, title, text(LEFT, 14, title, class_="title"), *parts)
 
 
-def _harmonics(where: Where) -> Markup | None:
+def _within(interval: Interval, factor: float, unit: str) -> str:
+    if interval.low is None and interval.high is None:
+        return ""
+    return f", 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
+
+
+def _harmonics(where: Where, whose: str) -> Markup | None:
     shown = where.harmonics[:MOST_HARMONICS]
     if not shown or not any(shown):
         return None
@@ -77,14 +84,14 @@ def _harmonics(where: Where) -> Markup | None:
         bottom + 32,
         title,
         text(LEFT, 14, title, class_="title"),
-        text(LEFT, 29, "part of the misfit's mean square", class_="tick"),
+        text(LEFT, 29, f"part of the mean square of {whose}", class_="tick"),
         *parts,
         line(LEFT, bottom, RIGHT, bottom, "axis"),
         text((LEFT + RIGHT) / 2, bottom + 28, "harmonic", anchor="middle", class_="label"),
     )
 
 
-def _powers(exponents: tuple[Exponent, ...]) -> Markup | None:
+def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
     if not exponents:
         return None
     ends = [v for e in exponents for v in (e.power.value, e.power.low, e.power.high) if v is not None]
@@ -101,23 +108,23 @@ def _powers(exponents: tuple[Exponent, ...]) -> Markup | None:
         span = f"{number(e.low)} to {with_unit(number(e.high), e.unit)}"
         parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="said"))
         parts.append(whisker(along, y, (e.power.low, e.power.high), e.power.value, "after"))
-    told = _scaling(exponents)
+    told = _scaling(exponents, whose)
     return figure(
         told,
         panels(drawing(WIDTH, bottom + 30, told, *parts)),
-        note="Power with which the nominal model's misfit grows with each variable, 90 % intervals; in brackets the "
-        "range of the recordings.",
+        note=f"Power with which {whose} grows with each variable, 90 % intervals; in brackets the range of the "
+        "recordings.",
     )
 
 
-def _scaling(exponents: tuple[Exponent, ...]) -> str:
+def _scaling(exponents: tuple[Exponent, ...], whose: str) -> str:
     """In words what grows, and how surely."""
     sure = [
         e for e in exponents if e.power.low is not None and e.power.high is not None and e.power.low * e.power.high > 0
     ]
     if not sure:
-        return "How the misfit scales cannot be told from these conditions"
-    return "The misfit goes as " + listed(f"{e.variable} to the power {number(e.power.value, 2)}" for e in sure)
+        return f"How {whose} scales cannot be told from these conditions"
+    return f"{capital(whose)} goes as " + listed(f"{e.variable} to the power {number(e.power.value, 2)}" for e in sure)
 
 
 def _pieces(interval: Interval, *, turns: bool) -> list[tuple[float, float]]:

@@ -54,8 +54,8 @@ def told(finding: Finding) -> str:
 
 
 def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
-    names, effects = set(finding.named), set(hypothesis.effects)
-    named = bool(effects) and (effects == names or (finding.verdict == "ambiguous" and effects <= names))
+    told = finding.alike if finding.verdict == "ambiguous" else [finding.named]
+    named = bool(hypothesis.effects) and any(set(hypothesis.effects) == set(names) for names in told)
     scale = channel_scale(finding)
     evidence = hypothesis.evidence / top if top > 0 else 0.0
     sure = hypothesis.refitted or not hypothesis.effects

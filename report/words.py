@@ -121,10 +121,10 @@ def listed(items: Iterable[str], last: str = "and") -> str:
 
 
 def best_of(finding: Finding) -> Hypothesis | None:
-    """The hypothesis that the verdict names, else the most probable one that is not the nominal model."""
+    """The hypothesis that was put in, else the most probable one that is not the nominal model."""
     others = [h for h in finding.hypotheses if h.effects]
-    named = [h for h in others if set(h.effects) == set(finding.named)]
-    return next(iter([*named, *others]), None)
+    put_in = [h for h in others if set(h.effects) == set(finding.put_in)]
+    return next(iter([*put_in, *others]), None)
 
 
 def stages(finding: Finding) -> dict[str, str]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.missing import Case
+from diagnosis.missing import Case, decorrelated
 from records import Condition, Recording
 from sim.effects.probe import Probe
 from sim.flexible_wing import FlexibleWing
@@ -63,16 +64,18 @@ def pushed(
     return genome
 
 
-def hurried(wing: FlexibleWing, condition: Condition, when: float, turn_deg: float, lasting: float = 0.05) -> Array:
-    """Genome of ``wing``, whose probe drives: its rods are further on for a moment, ``when`` beats after rising."""
+def hurried(
+    wing: FlexibleWing, condition: Condition, when: float, turns_deg: Sequence[float], lasting: float = 0.05
+) -> Array:
+    """Genome of ``wing``, whose probe drives: front and rear rod are further on, ``when`` beats after rising."""
     probe, blank, genome = wing.probe, blank_recording(wing.wing, condition), nominal(wing)
     assert probe is not None
     phase = np.arange(256) / 256
     for _ in range(2):  # that moves the crossing a little
         start = crossing(wing, blank, wing.beat(genome, blank).tracks)
         during = (phase - when - start + 0.5) % 1.0 - 0.5
-        series = np.linalg.pinv(probe.terms(phase)) @ (turn_deg * np.exp(-0.5 * (during / lasting) ** 2))
-        genome[-2 * len(series) :] = np.tile(series, 2)
+        series = np.linalg.pinv(probe.terms(phase)) @ np.exp(-0.5 * (during / lasting) ** 2)
+        genome[-2 * len(series) :] = np.kron(turns_deg, series)
     return genome
 
 
@@ -109,13 +112,26 @@ def sensitivities(wing: FlexibleWing, genome: Array, recording: Recording) -> tu
     return seen[0] - recording.values, np.moveaxis((seen[1::2] - seen[2::2]) / (2 * _STEP), 0, -1)
 
 
+def of_samples(
+    name: str, residuals: Array, memory: float, responses: Array, sensitivities: Array, crossing: float
+) -> Case:
+    """A case of samples whose noise has standard deviation NOISE and correlation ``memory`` with the next.
+
+    ``residuals`` [T, C] are simulated minus recorded, NaN where missing, ``responses`` [T, C, P] and ``sensitivities``
+    [T, C, F] their changes with unit loads and with the genes.
+    """
+    seen = np.isfinite(residuals)
+    both = np.concatenate([-residuals[..., None], np.nan_to_num(responses), sensitivities], axis=2) / NOISE
+    white = np.concatenate(
+        [decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) for c in range(residuals.shape[1])]
+    )
+    P = responses.shape[2]
+    return Case(name, white[:, 0], white[:, 1 : 1 + P], white[:, 1 + P :], crossing)
+
+
 def case(wing: FlexibleWing, recording: Recording, probe: Probe) -> tuple[Case, Probed]:
     """Of the nominal wing."""
     genome = nominal(wing)
     answers = probed(wing, genome, recording, probe)
     residuals, slopes = sensitivities(wing, genome, recording)
-    sigma = np.full(residuals.shape[1], NOISE)
-    return (
-        Case.of_samples(recording.name, residuals, sigma, MEMORY, answers.responses, slopes, answers.crossing),
-        answers,
-    )
+    return of_samples(recording.name, residuals, MEMORY, answers.responses, slopes, answers.crossing), answers

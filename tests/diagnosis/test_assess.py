@@ -8,11 +8,16 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
-from diagnosis.assess import OVERTAKES, _alike, _exchanges
+from diagnosis import DiagnosisSpec
+from diagnosis.assess import OVERTAKES, _alike, _exchanges, assess
+from diagnosis.assessment import Assessment
 from diagnosis.race import Entry
 from diagnosis.screen import Trial
-from tests.diagnosis.pendulum_rig import SUSPECTS
+from diagnosis.stack import Stack
+from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
+from workers.in_process import InProcessEvaluator
 
 
 def trial(name: str, *, alike: tuple[str, ...] = ()) -> Trial:
@@ -71,3 +76,13 @@ def test_what_leaves_no_more_than_noise_is_not_exchanged() -> None:
     cubic, gain = trial("cubic", alike=("gain",)), trial("gain")
     assert names(_exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
     assert _exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
+
+
+def test_fits_from_the_estimates_begin_there_whatever_a_calibration_ended_with() -> None:
+    rig = PendulumRig()
+    known = Assessment(rig, Stack.of(recorded({})))
+    steps = assess(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
+    next(steps)
+    next(steps)
+    assert known.begun is not None
+    assert known.begun[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})

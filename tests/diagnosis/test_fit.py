@@ -17,7 +17,7 @@ from calibration.problem import Problem, base_genome
 from diagnosis import DiagnosisSpec
 from diagnosis.assess import _elsewhere, _settled
 from diagnosis.assessment import Assessment
-from diagnosis.fit import Fit, _Look, _measured, _step, thoroughly
+from diagnosis.fit import CannotBeginError, Fit, _Look, _measured, _step, thoroughly
 from diagnosis.intervals import covariance
 from diagnosis.nominal import Nominal, promises
 from diagnosis.refit import judged, left_out, refitted, substitutes
@@ -256,3 +256,20 @@ def test_a_part_of_an_explanation_is_exchanged_only_for_what_can_do_the_same() -
     offered = [*found, [twin]]
     assert substitutes(stack, EVALUATOR, both, best["delay"], offered, 2) == [twin]
     assert substitutes(stack, EVALUATOR, both, best["friction"], offered, 2) == []
+
+
+def test_a_way_round_that_cannot_be_simulated_ends_no_refit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a refit that went astray the size is fitted first: where that cannot begin, the refit stays as it is."""
+    stack = stacked(point_mass_mass=5e-3, point_mass_station=0.5)
+    nominal = fit(stack)
+    ((_, trials),) = screened(RIG, stack, nominal, EVALUATOR, [one for one in RIG.suspects if one.name == "point_mass"])
+    asked = []
+
+    def fails(*arguments: Any) -> Fit:
+        asked.append(arguments)
+        raise CannotBeginError("it flutters")
+
+    monkeypatch.setattr("diagnosis.refit.BROKEN", 0.0)
+    monkeypatch.setattr("diagnosis.refit._some", fails)
+    assert refitted(RIG, stack, nominal, EVALUATOR, trials[:1]) is not None
+    assert asked

@@ -17,7 +17,6 @@ from sim.probing import Probed
 from tests.diagnosis.loaded import (
     CONDITIONS,
     MEMORY,
-    NOISE,
     case,
     chord_at,
     filmed,
@@ -25,6 +24,7 @@ from tests.diagnosis.loaded import (
     model,
     noise,
     nominal,
+    of_samples,
     pushed,
 )
 
@@ -47,28 +47,44 @@ def cases() -> tuple[tuple[Case, Probed], ...]:
 
 
 @cache
-def hurried_cases() -> tuple[tuple[Case, Probed], ...]:
-    """The same, not pushed: its rods are a degree further on for a moment."""
+def hurried_cases(*turns_deg: float) -> tuple[tuple[Case, Probed], ...]:
+    """The same, not pushed: its front and rear rod are so much further on for a moment."""
     plant, found = replace(model("6x1"), probe=Probe((0.0, 1.0), 12, driving=True)), []
     for k, condition in enumerate(CONDITIONS):
-        recording = filmed(plant, hurried(plant, condition, WHEN, 1.0), condition, np.random.default_rng(k))
+        recording = filmed(plant, hurried(plant, condition, WHEN, turns_deg), condition, np.random.default_rng(k))
         found.append(case(model("6x1"), recording, DRIVING))
     return tuple(found)
 
 
 def test_a_drive_that_hurries_is_no_load() -> None:
-    inferred = infer([one for one, _ in hurried_cases()], DRIVING)
+    inferred = infer([one for one, _ in hurried_cases(1.0, 1.0)], DRIVING)
     found = place(inferred)
     assert inferred.driven
     assert found is not None
     assert found.span is found.chord is None
     assert found.phase is not None
     assert abs(found.phase.value - WHEN) < 10.0 / 360.0
-    for motion in missing_loads(inferred):
+    motions = missing_loads(inferred)
+    assert [motion.rod for motion in motions] == [*["front"] * len(CONDITIONS), *["rear"] * len(CONDITIONS)]
+    for motion in motions:
         values = np.degrees(motion.values[0])
         assert motion.unit == "rad"
         assert abs(motion.phase[int(np.argmax(values))] - WHEN) < 10.0 / 360.0
         assert values.max() - values.mean() == pytest.approx(0.87, abs=0.15)  # of the degree, the mean apart
+
+
+def test_a_rear_rod_that_hurries_alone_is_told() -> None:
+    inferred = infer([one for one, _ in hurried_cases(0.0, 1.0)], DRIVING)
+    assert inferred.driven
+    motions = missing_loads(inferred)
+    rear = [motion for motion in motions if motion.rod == "rear"]
+    assert [motion.recording for motion in rear] == list(inferred.names)
+    for motion in rear:
+        values = np.degrees(motion.values[0])
+        assert abs(motion.phase[int(np.argmax(values))] - WHEN) < 10.0 / 360.0
+        assert values.max() - values.mean() == pytest.approx(0.87, abs=0.15)
+    for motion in (one for one in motions if one.rod != "rear"):
+        assert np.abs(np.degrees(motion.values)).max() < 0.3
 
 
 def test_a_push_is_no_drive_that_hurries() -> None:
@@ -187,7 +203,7 @@ def test_coloured_noise_is_made_white() -> None:
     residuals = noise((400, 6), rng)
     residuals[rng.uniform(size=residuals.shape) < 0.2] = np.nan
     nothing = np.zeros((400, 6, 1))
-    white = Case.of_samples("", residuals, np.full(6, NOISE), MEMORY, nothing, nothing, 0.0).lacking
+    white = of_samples("", residuals, MEMORY, nothing, nothing, 0.0).lacking
     assert len(white) == np.isfinite(residuals).sum()
     assert abs(np.std(white) - 1.0) < 0.05
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06

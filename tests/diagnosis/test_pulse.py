@@ -11,7 +11,8 @@ import pytest
 
 from diagnosis.pulse import pulse
 from diagnosis.stack import Stack
-from records import Condition, Recording
+from records import Condition, LowPass, Recording
+from sim.filtering import default_cutoff, low_passed
 
 Array = npt.NDArray[np.float64]
 
@@ -19,7 +20,7 @@ NOISE, ORIGIN = 0.01, 0.7  # N; rad of the drive at which a beat begins
 SUBJECT = cast("Any", SimpleNamespace(origin=lambda _: ORIGIN))
 
 
-def stack(when: float | None, rng: np.random.Generator) -> Stack:
+def stack(when: float | None, rng: np.random.Generator, *, filtered: bool = False) -> Stack:
     """Four recordings of a push and half a pull a little later; sizes and directions differ."""
     recordings = []
     for k, frequency in enumerate((10.3, 11.7, 12.5, 13.3)):
@@ -31,7 +32,8 @@ def stack(when: float | None, rng: np.random.Generator) -> Stack:
                 apart = (phase - at + 0.5) % 1.0 - 0.5
                 values += 0.2 * (1 + k) * size * np.exp(-0.5 * (apart / width) ** 2)[:, None] * [0.8, -0.3]
         condition = Condition(frequency, 0.0, 101_325.0, 293.15, 1.0, 0.5)
-        recordings.append(Recording(f"r{k}", "wind_tunnel", condition, times, (), values, forces=("x", "z")))
+        one = Recording(f"r{k}", "wind_tunnel", condition, times, (), values, forces=("x", "z"))
+        recordings.append(low_passed(one, LowPass(default_cutoff(frequency))) if filtered else one)
     return Stack.of(recordings, ("x", "z"))
 
 
@@ -55,6 +57,15 @@ def test_a_push_is_told_when_it_acts_though_genes_have_taken_its_slow_part(when:
     assert found.high - found.low < 0.2
 
 
+@pytest.mark.parametrize("when", [0.05, 0.3, 0.98])
+def test_a_push_that_a_low_pass_has_spread_is_told(when: float) -> None:
+    found = told(stack(when, np.random.default_rng(1), filtered=True))
+    apart = (found.value - when + 0.5) % 1.0 - 0.5
+    assert abs(apart) < 15.0 / 360.0
+    assert found.low < found.value - apart < found.high
+
+
+@pytest.mark.parametrize("filtered", [False, True])
 @pytest.mark.parametrize("seed", range(4))
-def test_noise_has_no_instant(seed: int) -> None:
-    assert told(stack(None, np.random.default_rng(seed))) is None
+def test_noise_has_no_instant(seed: int, filtered: bool) -> None:
+    assert told(stack(None, np.random.default_rng(seed), filtered=filtered)) is None

@@ -14,10 +14,11 @@ from calibration.spec import CalibrationSpec
 from diagnosis import DiagnosisSpec, check
 from diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
 from diagnosis.subject import Subject
-from records import Dataset, Wing
+from records import Dataset, LowPass, Wing
 from sim.balance import TRIALS, delfly
 from sim.balance import blank_recording as blank_forces
 from sim.effects.markers import nearest
+from sim.filtering import default_cutoff
 from sim.flexible_wing import FlexibleWing
 from sim.model import Array
 from sim.rig import SMALL, blank_recording, name_of, robird_wing
@@ -366,3 +367,14 @@ def test_the_pendulum_is_fast_and_hardly_ever_fails() -> None:
     spent = (time.process_time() - begun) / (len(FREQUENCIES) * len(batch))
     assert all(reason is None for each in reasons for reason in each)
     assert spent < 5e-3, "a millisecond on a free core"
+
+
+def test_forces_are_shown_as_they_would_be_fitted(vehicle: Dataset) -> None:
+    through, whole = (subject_of(vehicle, CalibrationSpec(low_pass=low_pass)) for low_pass in (None, 0.0))
+    condition, genome = through.conditions()[0], nominal(through)[0]
+    filtered, plain = (one.shown(one.model, genome, condition) for one in (through, whole))
+    assert filtered is not None
+    assert plain is not None
+    assert plain.low_pass is None
+    assert filtered.low_pass == LowPass(default_cutoff(condition.flap_frequency))
+    assert np.std(filtered.values, axis=0)[1] < 0.99 * np.std(plain.values, axis=0)[1]

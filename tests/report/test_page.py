@@ -230,4 +230,4 @@ def test_what_is_left_out_of_the_page_is_counted() -> None:
     finding = wing_finding()
     shown = page(replace(finding, overlays=finding.overlays * 3, missing=finding.missing * 4)).text
     assert "6 more in the JSON." in shown
-    assert "2 more conditions, where it is smaller, are in the JSON." in shown
+    assert "2 more, where it is smaller, are in the JSON." in shown

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from diagnosis.finding import Interval
 from report.markup import Markup, tag
-from report.place import _pieces
+from report.place import _pieces, place
+from report.ranking import ranking
 from report.svg import Axis, axis, level, side
-from report.words import Scale, bounds, listed, number, percent, scale_for, shortened
+from report.words import Scale, best_of, bounds, listed, number, percent, scale_for, shortened
+from tests.report.findings import BOTH, wing_finding
 
 
 @pytest.mark.parametrize(
@@ -107,3 +111,23 @@ def test_markup_escapes_all_that_is_not_markup() -> None:
         tag("p", "<b>", Markup("<i>x</i>"), title='"&', class_=None) == '<p title="&quot;&amp;">&lt;b&gt;<i>x</i></p>'
     )
     assert tag("line", x1=1.234567, stroke_width=2) == '<line x1="1.23" stroke-width="2"/>'
+
+
+def test_of_an_ambiguous_verdict_the_one_that_was_put_in_is_credited() -> None:
+    """And not what is named together: that is "or", and a hypothesis that has both is another one."""
+    finding = replace(
+        wing_finding(), verdict="ambiguous", named=BOTH, put_in=BOTH[:1], alike=tuple((name,) for name in BOTH)
+    )
+    best = best_of(finding)
+    assert best is not None
+    assert best.effects == BOTH[:1]
+    ranked = str(ranking(finding))
+    assert ranked.count('<li class="named">') == 2
+
+
+def test_a_place_without_an_interval_has_none() -> None:
+    finding = wing_finding()
+    assert finding.where is not None
+    bare = replace(finding, where=replace(finding.where, span=Interval(0.7, None, None)))
+    assert "not bounded" not in str(place(bare))
+    assert "span: 70" in str(place(bare))

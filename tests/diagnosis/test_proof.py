@@ -1,0 +1,31 @@
+"""What held-out recordings say, and how surely."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import numpy as np
+
+from diagnosis.proof import Predicted, _misfits
+
+
+def test_forces_are_drawn_in_stretches_of_time_however_many_there_are() -> None:
+    """Both axes of both recordings are off alike, at one time more than at another: drawing axes would tell nothing."""
+    off = np.repeat(np.linspace(1.0, 3.0, 48)[:, None], 2, axis=1)
+    pair = Predicted(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
+    before, after, better = _misfits(pair, [np.ones(2, bool)] * 2, ["forces", "forces"])
+    assert before.value == 2.0 * after.value
+    assert better
+    assert before.low is not None
+    assert before.high is not None
+    assert before.low < 0.97 * before.value
+    assert before.high > 1.03 * before.value
+
+
+def test_tracks_are_drawn_marker_by_marker() -> None:
+    rng = np.random.default_rng(1)
+    off = np.repeat(rng.uniform(1.0, 3.0, 20), 3) * np.ones((30, 60))
+    before, _, _ = _misfits(Predicted(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
+    assert before.low is not None
+    assert before.high is not None
+    assert before.low < before.value < before.high
