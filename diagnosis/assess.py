@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.evaluator import Evaluator
 from diagnosis.assessment import Assessment
-from diagnosis.decide import Weighed, beyond_doubt, tolerated, weighed
+from diagnosis.decide import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
 from diagnosis.fit import UNFIT, Fit
 from diagnosis.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from diagnosis.race import Entry, afresh, entries
@@ -282,8 +282,15 @@ def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
-    every = [entry for trial in worth_a_refit(found, RUNNERS) for entry in entries(trial)]
+    every = [entry for trial in _runners(found) for entry in entries(trial)]
     yield from ((0.77, stage) for stage in _raced(state, evaluator, every))
+
+
+def _runners(found: Sequence[list[Trial]]) -> list[Trial]:
+    """The strongest, and all that act at a place: a score test at a few places tells little of these."""
+    strongest = worth_a_refit(found, RUNNERS)
+    placed = [trials[0] for trials in found if trials and trials[0].suspect.places and not trials[0].suspect.spots]
+    return [*strongest, *(trial for trial in placed if all(trial is not one for one in strongest))]
 
 
 def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> Iterator[str]:
@@ -291,10 +298,12 @@ def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> I
     if not every or state.begun is None:
         return
     best = min(one.excess for one in state.refits)
-    most = max(min(HOPEFUL * state.known.refit.excess, RIVALRY * best), tolerated(state.stack, 0.0, 0.0))
+    noisy = tolerated(state.stack, 0.0, 0.0)
+    most = max(min(HOPEFUL * state.known.refit.excess, RIVALRY * best), noisy)
+    wanted = max(UNKNOWN**2 * state.known.refit.excess, noisy)
     front: list[tuple[Entry, Fit]] = []
-    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], every, most):
-        yield f"refit with {' and '.join(one.suspect.name for one in front[0][0].trials)} from the estimates"
+    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], every, most, wanted):
+        yield f"refit with {' and '.join(front[0][0].names)} from the estimates"
     for entry, fit in front:
         state.add(judged(state.stack, fit, entry.trials))
 

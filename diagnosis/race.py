@@ -22,6 +22,8 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 14  # of a fit
 RACE = 5  # of each, its start among them, before those that leave least go on
+FASTER = 3.0  # times as fast as its last step was: more is not expected of a fit
+SAME = 0.05  # of a box: fits of the same suspects as near as this are one
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,11 @@ class Entry:
 
     trials: tuple[Trial, ...]
     unit: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the suspects."""
+        return tuple(trial.suspect.name for trial in self.trials)
 
 
 def entries(trial: Trial, beside: Sequence[Trial] = (), refit: Refit | None = None) -> list[Entry]:
@@ -46,16 +53,24 @@ def entries(trial: Trial, beside: Sequence[Trial] = (), refit: Refit | None = No
 
 
 def afresh(
-    subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, every: Sequence[Entry], most: float
+    subject: Subject,
+    stack: Stack,
+    evaluator: Evaluator,
+    begun: Fit,
+    every: Sequence[Entry],
+    most: float,
+    wanted: float = np.inf,
 ) -> Iterator[list[tuple[Entry, Fit]]]:
     """``every`` entry fitted from the estimates, where ``begun`` is.
 
     Where the nominal fit ended its genes have taken up what they could of a suspect, and may not find back. All run for
     RACE steps; then each that may still overtake the best goes on to its end. A fit ends early where it crawls and
-    leaves RIVALRY times as much as the best, or more than ``most`` (m^2 or N^2 beyond the noise). Yields all that do
-    not leave as much after every step, the best first; nothing where none can be simulated.
+    leaves RIVALRY times as much as the best, or more than ``most`` (m^2 or N^2 beyond the noise). One that does not
+    lead also ends where it would do so, or leave more than is ``wanted``, in the end, though it gained FASTER; and
+    where another has come to the same.
+    Yields all that do not leave as much after every step, the best first; nothing where none can be simulated.
     """
-    race = _Race(stack, most)
+    race = _Race(stack, most, wanted)
     for entry in every:
         race.enter(entry, _from_estimates(subject, stack, evaluator, begun, entry))
         yield from race.run(RACE)
@@ -65,8 +80,8 @@ def afresh(
 class _Race:
     """Fits that compete: each is given up where it crawls and leaves far more than the best, or than ``most``."""
 
-    def __init__(self, stack: Stack, most: float) -> None:
-        self.stack, self.most = stack, most
+    def __init__(self, stack: Stack, most: float, wanted: float) -> None:
+        self.stack, self.most, self.wanted = stack, most, wanted
         self.runners = list[_Runner]()
 
     def enter(self, entry: Entry, steps: Iterator[Fit]) -> None:
@@ -83,7 +98,18 @@ class _Race:
         if len(runner.fits) < 2:
             return False
         before, now = runner.fits
-        return gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > min(self.most, self._behind())
+        if gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > min(self.most, self._behind()):
+            return True
+        if runner.taken < RACE or self._left(runner) <= min(self._left(one) for one in self.runners):
+            return False
+        return self._foreseen(runner) > min(self.wanted, self._behind()) or any(
+            self._left(other) <= self._left(runner) and other.at_the_same(runner) for other in self.runners
+        )
+
+    def _foreseen(self, runner: _Runner) -> float:
+        """What a fit leaves in the end if it gains FASTER from now on than it did in its last step."""
+        before, now = (self.stack.excess(fit.coefficients) for fit in runner.fits)
+        return now * min(now / before, 1.0) ** (FASTER * (STEPS + 1 - runner.taken)) if now > 0.0 else now
 
     def _left(self, runner: _Runner) -> float:
         return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
@@ -110,6 +136,12 @@ class _Runner:
     def cost(self) -> float:
         """Of the last step; infinite before the first."""
         return self.fits[-1].cost if self.fits else np.inf
+
+    def at_the_same(self, other: _Runner) -> bool:
+        """Whether two fits of the same suspects have come to the same."""
+        if self is other or not self.fits or not other.fits or self.entry.names != other.entry.names:
+            return False
+        return bool(np.abs(self.fits[-1].unit - other.fits[-1].unit).max() <= SAME)
 
     def step(self) -> bool:
         """Whether there was another step."""

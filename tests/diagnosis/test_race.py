@@ -25,22 +25,28 @@ def stack() -> Any:
 
 @pytest.fixture
 def race(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Runs a race of fits with costs by step; the winner, its cost, and how many steps of each were asked for."""
+    """Runs a race of fits with costs by step; the winner, its cost, and how many steps of each were asked for.
 
-    def run(costs: Mapping[str, list[float]], most: float = np.inf) -> tuple[str, float, dict[str, int]]:
+    A fit's only gene is a thousandth of its cost; those with names that begin with the same word are of one suspect.
+    """
+
+    def run(
+        costs: Mapping[str, list[float]], most: float = np.inf, wanted: float = np.inf
+    ) -> tuple[str, float, dict[str, int]]:
         asked = dict.fromkeys(costs, 0)
+        entered: Any = tuple(SimpleNamespace(name=name, names=(name.split()[0],)) for name in costs)
 
         def steps(*arguments: Any) -> Iterator[Any]:
-            name = arguments[-1]
+            name = arguments[-1].name
             if not costs[name]:
                 raise CannotBeginError("it cannot be simulated")
             for cost in costs[name]:
                 asked[name] += 1
-                yield SimpleNamespace(cost=cost, coefficients=cost)
+                yield SimpleNamespace(cost=cost, coefficients=cost, unit=np.array([1e-3 * cost]))
 
         monkeypatch.setattr("diagnosis.race._from_estimates", steps)
-        found: Any = list(afresh(NOTHING, stack(), NOTHING, NOTHING, cast("Any", tuple(costs)), most))
-        return (found[-1][0][0], found[-1][0][1].cost, asked) if found else ("", np.inf, asked)
+        found: Any = list(afresh(NOTHING, stack(), NOTHING, NOTHING, entered, most, wanted))
+        return (found[-1][0][0].name, found[-1][0][1].cost, asked) if found else ("", np.inf, asked)
 
     return run
 
@@ -69,6 +75,23 @@ def test_one_that_crawls_far_behind_is_given_up(race: Any) -> None:
     assert asked["crawls"] == 3
     _, _, asked = race({"falls": FALLING}, most=1.0)
     assert asked["falls"] > RACE, "one that still falls is not given up, however much it leaves"
+
+
+def test_one_that_would_not_come_to_what_is_wanted_is_given_up(race: Any) -> None:
+    """It gains a tenth with every step, and might gain a quarter: in ten steps that leaves a twentieth."""
+    slow = [1e4 * 0.9**k for k in range(16)]
+    leads = [900.0 - k for k in range(6)]
+    assert race({"slow": slow, "leads": leads}, wanted=3e3)[2]["slow"] == 15
+    assert race({"slow": slow, "leads": leads}, wanted=50.0)[2]["slow"] == RACE
+    assert race({"slow": slow}, wanted=50.0)[2]["slow"] == 15, "what leads goes on"
+    assert race({"slow": slow, "done": [5e3, 500.0, 5.0, 1.0, 1.0, 1.0]})[2]["slow"] == RACE
+
+
+def test_of_two_that_have_come_to_the_same_one_goes_on(race: Any) -> None:
+    one = [1e3 * 0.7**k for k in range(16)]
+    other = [2 * cost for cost in one]
+    assert race({"mass here": one, "mass there": other})[2] == {"mass here": 15, "mass there": 11}
+    assert race({"mass here": one, "damage there": other})[2] == {"mass here": 15, "damage there": 15}
 
 
 def trial(name: str, unit: list[float]) -> Trial:
