@@ -147,7 +147,7 @@ def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
     names = tuple(" and ".join(one.names) or "nothing lacking" for one in alive)
-    told = [" and ".join(trial.suspect.title.lower() for trial in one.trials) or "nothing lacking" for one in alive]
+    told = [" with ".join(trial.suspect.title.lower() for trial in one.trials) or "nothing lacking" for one in alive]
     return Advice(
         f"record at {where}: {' or '.join(told)} would differ by {apart:.2g} times the noise",
         condition.flap_frequency,

@@ -80,6 +80,7 @@ def beatwise(recording: Recording, compared: npt.NDArray[np.bool_] | None = None
     advance, place = _apparent(recording)
     kept, beats = _harmonics(recording, advance), int(advance * (place[-1] + 1) + 0.05)
     _check_moves(recording, seen)
+    seen = seen & ~_still(recording)
     basis, order, trend = _basis(recording, kept, beats)
     inverse, spread, used = _inverses(basis, seen, recording.name)
     values = np.where(seen, recording.values, 0.0)
@@ -115,6 +116,21 @@ def _check_moves(recording: Recording, seen: npt.NDArray[np.bool_]) -> None:
             f"recording {recording.name!r}: nothing moves, each channel holds one value in all {len(seen)} samples; "
             "check its export, or leave the recording out"
         )
+
+
+def still_markers(recording: Recording) -> tuple[str, ...]:
+    """Markers that were recorded at one and the same place throughout: they were not tracked, and are not used."""
+    found = _still(recording)[::3]
+    return tuple(name for name, one in zip(recording.markers, found, strict=True) if one)
+
+
+def _still(recording: Recording) -> npt.NDArray[np.bool_]:
+    """Channels [C] of markers none of whose coordinates ever changes."""
+    if recording.kind != "tracks":
+        return np.zeros(recording.values.shape[1], bool)
+    places, known = recording.positions, np.isfinite(recording.positions)
+    last, first = np.where(known, places, -np.inf).max(axis=0), np.where(known, places, np.inf).min(axis=0)
+    return np.repeat((first == last).all(axis=1), 3)
 
 
 def _apparent(recording: Recording) -> tuple[float, npt.NDArray[np.int64]]:

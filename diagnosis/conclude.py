@@ -13,7 +13,8 @@ from calibration.evaluator import Evaluator
 from diagnosis import maps
 from diagnosis.advise import advised, separations
 from diagnosis.assessment import Assessment
-from diagnosis.finding import Advice, Finding, Floors, Interval, Proof, Where
+from diagnosis.beatwise import still_markers
+from diagnosis.finding import Advice, Finding, Floors, GeneValue, Interval, Proof, RecordingMisfit, Where
 from diagnosis.fit import measured
 from diagnosis.nominal import Nominal
 from diagnosis.proof import Predicted, predicted, proof, recording_misfits
@@ -27,6 +28,8 @@ from records import Recording
 
 Array = npt.NDArray[np.float64]
 Step = tuple[float, str, Finding | None]
+
+WORSE = 1.1  # times the misfit before: a recording that is fitted worse is told
 
 
 def concluded(state: Assessment, name: str, held_out: Sequence[Recording], evaluator: Evaluator) -> Iterator[Step]:
@@ -134,7 +137,7 @@ def _finding(
         proved = proof(seen, division, unit, put_in=bool(best.names))
         shown += maps.overlays(subject, seen.stack, seen.before, seen.after, held_out=True)
     before, after = (maps.pieces(subject, stack, one.fit.coefficients) for one in (nominal, best))
-    suspects = {suspect.name: suspect for suspect in subject.suspects}
+    suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(stack, best)
     told = replace(weighed, refits=tuple(best if one.names == best.names else one for one in weighed.refits))
     return Finding(
         dataset=name,
@@ -150,18 +153,24 @@ def _finding(
         floors=_floors(state, division),
         hypotheses=hypotheses(stack, told, state.trials),
         alike=decision.alike,
-        where=lies,
+        where=lies if decision.verdict != "adequate" else None,
         markers=maps.markers(before, after),
         phase_map=maps.phase_map(before, after),
         missing=lacking.loads,
         recordings=rows,
         proof=proved,
         overlays=tuple(shown),
-        genes=all_genes(stack, best),
+        genes=genes,
         law=lacking.law,
         advice=advice,
         outline=subject.outline,
-        remarks=(*state.nominal.remarks, *_innocence(state.nominal), *_doubts(stack)),
+        remarks=(
+            *state.nominal.remarks,
+            *_innocence(state.nominal),
+            *_doubts(stack),
+            *_untold(genes, best),
+            *_worsened(rows, best, unit),
+        ),
     )
 
 
@@ -210,9 +219,33 @@ def _innocence(nominal: Nominal) -> tuple[str, ...]:
 
 def _doubts(stack: Stack) -> tuple[str, ...]:
     untold = [r.name for r, v in zip(stack.recordings, stack.views, strict=True) if not v.told]
-    if not untold:
-        return ()
-    return (
-        f"{', '.join(untold)}: less than two beats in the order of the frames, so that noise is known only from what "
-        "no harmonic of the beat explains; slow noise may pass for misfit",
-    )
+    still = {r.name: still_markers(r) for r in stack.recordings}
+    doubts = [
+        f"{name}: the recorded place of {', '.join(markers)} never changes; left out: check how tracks are exported"
+        for name, markers in still.items()
+        if markers
+    ]
+    if untold:
+        doubts.append(
+            f"{', '.join(untold)}: less than two beats in the order of the frames, so that noise is known only from "
+            "what no harmonic of the beat explains; slow noise may pass for misfit"
+        )
+    return tuple(doubts)
+
+
+def _untold(genes: Sequence[GeneValue], best: Refit) -> tuple[str, ...]:
+    """Sizes of what was put in that may lie anywhere in their boxes."""
+    sizes = {name for trial in best.trials for name in trial.suspect.sizes}
+    open_ = [one.name for one in genes if one.name in sizes and one.value.low is None and one.value.high is None]
+    return (f"these recordings do not tell how large {', '.join(open_)} is",) if open_ else ()
+
+
+def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
+    """Recordings that what was put in makes worse."""
+    name = "mm" if unit == "m" else "mN"
+    worse = [
+        f"{row.name} from {1e3 * row.before.value:.3g} to {1e3 * row.after.value:.3g} {name}"
+        for row in rows
+        if best.names and row.after.value > WORSE * row.before.value
+    ]
+    return (f"with what was found the misfit grows in {', '.join(worse)}",) if worse else ()

@@ -59,6 +59,7 @@ def diagnose_subject(
     """Diagnose any rig that meets the protocol; ``free`` are the nominal genes to fit (default: those searched)."""
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
+    held_out, copies = _unseen(fitted, held_out)
     state = Assessment(subject, Stack.of(fitted, axes))
     counted = Counted(evaluator, state)
     for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), counted):
@@ -70,8 +71,22 @@ def diagnose_subject(
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     spent = time.monotonic() - began
-    finding = replace(finding, seconds=spent, evaluations=state.evaluations, versions=_versions())
+    remarks = (*finding.remarks, *copies)
+    finding = replace(finding, remarks=remarks, seconds=spent, evaluations=state.evaluations, versions=_versions())
     yield Progress(1.0, "done", state.evaluations, finding)
+
+
+def _unseen(
+    fitted: Sequence[Recording], held_out: Sequence[Recording]
+) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    """Those held out that are no copies of one that is fitted, and remarks on the others: they prove nothing."""
+    known = {one.values.tobytes(): one.name for one in reversed(fitted)}
+    copies = {one.name: known[one.values.tobytes()] for one in held_out if one.values.tobytes() in known}
+    told = [
+        f"{name} is held out and has the very values of {other}, which is fitted: it proves nothing and was left out"
+        for name, other in copies.items()
+    ]
+    return tuple(one for one in held_out if one.name not in copies), tuple(told)
 
 
 def _versions() -> dict[str, str]:

@@ -97,8 +97,12 @@ def proof(predicted: Predicted, floor: float, unit: str, *, put_in: bool) -> Pro
     change = f"{told[0] * before.value:.3g} {told[1]}"
     if put_in:
         change += f" before, {told[0] * after.value:.3g} {told[1]} after"
-    words = f"{len(stack.recordings)} held-out recordings: {change}, {after.value / least:.2f} times the floor"
-    return Proof(_over(before, least), _over(after, least), least, better and not predicted.broken, words)
+    better = better and not predicted.broken
+    several = "s" if len(stack.recordings) > 1 else ""
+    words = f"{len(stack.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
+    if put_in and not better:
+        words += "; that it is better is not sure"
+    return Proof(_over(before, least), _over(after, least), least, better, words)
 
 
 def _over(interval: Interval, floor: float) -> Interval:

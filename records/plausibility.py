@@ -25,6 +25,7 @@ from records.wing import Wing
 Array = npt.NDArray[np.float64]
 Locate = Callable[[int], str]
 _SHOWN = 3
+ABSURD = 1e6  # weights: no unit makes a force of one weight so large a number
 
 
 def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
@@ -49,7 +50,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         faults.add(where, None, f"there is no {quantity} at all; leave the recording out")
         return
     if isinstance(rig, Wing):
-        _check_positions(values, rig, where, faults)
+        _check_positions(values, recording.markers, rig, where, faults)
         return
     _check_forces(recording, rig, where, faults)
     if increasing and frames >= MIN_FRAMES:
@@ -72,11 +73,10 @@ def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
     return not back.size
 
 
-def _check_positions(values: Array, wing: Wing, where: str, faults: Faults) -> None:
-    """Markers stay within about a span of the hinge; typical ones further out are in another unit or frame."""
+def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where: str, faults: Faults) -> None:
+    """Markers stay within about a span of the hinge; those further out are in another unit or frame."""
     from_hinge = values.reshape(len(values), -1, 3) - np.array([0.0, wing.hinge.y, wing.hinge.z])
-    along_axes = [np.abs(axis[np.isfinite(axis)]) for axis in np.moveaxis(from_hinge, 2, 0)]
-    distance = max(float(np.median(axis)) for axis in along_axes if axis.size)
+    distance = _typical(from_hinge.reshape(-1, 3))
     limit = IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
         far = distance / wing.span
@@ -89,6 +89,20 @@ def _check_positions(values: Array, wing: Wing, where: str, faults: Faults) -> N
             "convert to metres, in the wing frame"
         )
         faults.add(where, f"{distance:.4g}", message)
+        return
+    each = np.array([_typical(marker) for marker in np.moveaxis(from_hinge, 1, 0)])
+    for k in np.flatnonzero(each > limit)[:_SHOWN]:
+        message = (
+            f"marker {markers[k]} is typically {each[k]:.4g} m from the hinge, the others {distance:.4g} m (limit "
+            f"{limit:.4g} m): convert it to metres, in the wing frame, or leave it out"
+        )
+        faults.add(where, f"{each[k]:.4g}", message)
+
+
+def _typical(places: Array) -> float:
+    """Largest median distance along an axis [T, 3]; 0 where none is known."""
+    along_axes = [np.abs(axis[np.isfinite(axis)]) for axis in places.T]
+    return max((float(np.median(axis)) for axis in along_axes if axis.size), default=0.0)
 
 
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
@@ -99,8 +113,8 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
         if not found.size:
             faults.add(where, None, f"force_{name}_n has no value at all; remove the column")
             continue
-        with np.errstate(over="ignore"):
-            sizes[f"force_{name}_n"] = float(np.sqrt(np.mean(found**2)))
+        most = float(np.abs(found).max())  # squares of huge values would overflow
+        sizes[f"force_{name}_n"] = most * float(np.sqrt(np.mean((found / (most or 1.0)) ** 2)))
     if not any(sizes.values()):
         which = " and ".join(sizes) + (" are" if len(sizes) > 1 else " is")
         faults.add(where, 0.0, f"{which} zero throughout; check the channel, or leave the recording out")
@@ -122,6 +136,8 @@ def _unit(weights: float) -> str:
     """The unit in which a force of so many weights would be nearest to one weight."""
     if weights < 1:
         return "a much larger unit"
+    if weights > ABSURD:
+        return "no unit of force"
     gram_force, millinewtons = 1000 / STANDARD_GRAVITY, 1000.0  # in a newton
     halfway = np.sqrt(gram_force * millinewtons)
     return "gram-force (1 gf = 0.00980665 N)" if weights < halfway else "millinewtons (1 mN = 0.001 N)"

@@ -48,7 +48,7 @@ class Settings:
         _in_range("WINGFIT_PORT", self.port, 0, 65535)
         _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
         if self.workers is not None:
-            _in_range("WINGFIT_WORKERS", self.workers, 1, 4096)
+            _in_range("WINGFIT_WORKERS", self.workers, 1, 256)
         if self.evaluator not in get_args(EvaluatorKind):
             raise SettingsError(
                 f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"

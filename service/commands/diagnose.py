@@ -69,7 +69,9 @@ def diagnose(
     report: ReportFile = None,
     as_json: FindingJson = False,
     local: Annotated[bool, typer.Option("--local", help="Compute here, without a server; DATASET is a path.")] = False,
-    workers: Annotated[int | None, typer.Option(help="With --local: processes; one per processor if left out.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=256, help="With --local: processes; one per processor if left out.")
+    ] = None,
     url: Url = DEFAULT_URL,
 ) -> None:
     """Find the physics that a model left out: where, what, how sure, and the proof on held-out recordings.

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from diagnosis.beatwise import HARMONICS, beatwise
+from diagnosis.beatwise import HARMONICS, beatwise, still_markers
 from diagnosis.stack import Stack
 from records import Condition, LowPass, Recording
 
@@ -113,7 +113,15 @@ def test_a_recording_in_which_nothing_moves_is_refused_and_a_stuck_marker_is_not
     with pytest.raises(ValueError, match=r"nothing moves, .* all 124 samples; check"):
         beatwise(recording(values))
     values[:, :3] += noise(124, 0.5, 1, 3)
-    assert np.isfinite(beatwise(recording(values)).variance).all()
+    found = beatwise(recording(values))
+    assert np.isfinite(found.variance).all()
+    assert found.used.tolist() == [True] * 3 + [False] * 3, "a marker that never moves was not tracked"
+    assert still_markers(recording(values)) == ("m1",)
+
+
+def test_a_marker_that_was_never_seen_is_not_one_that_stands_still() -> None:
+    values = np.concatenate([noise(124, 0.5, 1, 3), np.full((124, 3), np.nan)], axis=1)
+    assert still_markers(recording(values)) == ()
 
 
 def test_no_recording_is_refused() -> None:

@@ -141,6 +141,30 @@ def test_without_held_out_recordings_nothing_is_proved_and_the_summary_says_so()
     assert "nothing proves it" in found.summary
 
 
+def test_a_held_out_copy_of_what_is_fitted_proves_nothing() -> None:
+    fitted = recorded({**NOMINAL, "gain.part": 0.02}, noise=5e-4)
+    found = diagnosed(fitted, (replace(fitted[2], name="copy"),))
+    assert found.proof is None
+    assert any("copy is held out and has the very values of" in remark for remark in found.remarks)
+
+
+def test_a_marker_that_stands_still_is_left_out_and_told() -> None:
+    """What it would show is no missing physics."""
+    fitted = recorded({**NOMINAL, "friction.torque": 2e-3}, noise=5e-4)
+    stuck = []
+    for one in fitted:
+        values = one.values.copy()
+        values[:, 3:6] = [0.0, 0.17, 0.01]
+        stuck.append(replace(one, values=values))
+    found = diagnosed(tuple(stuck))
+    assert found.named == ("friction",)
+    assert any("the recorded place of middle never changes" in remark for remark in found.remarks)
+
+
+def test_an_adequate_model_has_no_place_of_its_misfit() -> None:
+    assert finding({}).where is None
+
+
 def test_a_suspect_that_there_is_not_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown suspect 'ghost'"):
         finding({}, spec=DiagnosisSpec(suspects=("ghost",)))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 
+from diagnosis.conclude import _worsened
+from diagnosis.finding import Interval, RecordingMisfit
 from diagnosis.proof import Predicted, _misfits
 
 
@@ -29,3 +32,15 @@ def test_tracks_are_drawn_marker_by_marker() -> None:
     assert before.low is not None
     assert before.high is not None
     assert before.low < before.value < before.high
+
+
+def test_a_recording_that_is_fitted_worse_is_told() -> None:
+    def row(name: str, before: float, after: float) -> RecordingMisfit:
+        return RecordingMisfit(
+            name, False, 3.0, 0.0, 10.0, 0.0, Interval(before, None, None), Interval(after, None, None), 1e-3
+        )
+
+    rows = [row("good", 5e-3, 1e-3), row("bad", 2e-3, 3e-3)]
+    put_in, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
+    assert _worsened(rows, put_in, "m") == ("with what was found the misfit grows in bad from 2 to 3 mm",)
+    assert _worsened(rows, nothing, "m") == ()

@@ -16,9 +16,11 @@ GOOD = good_files()[TRACKS]
 HEADER = GOOD.decode().splitlines()[0]
 
 
-def _scaled(factor: float) -> Files:
+def _scaled(factor: float, columns: tuple[int, ...] = tuple(range(1, 37))) -> Files:
     header, *rows = GOOD.decode().splitlines()
-    scaled = [[c if k == 0 or not c else repr(float(c) * factor) for k, c in enumerate(r.split(","))] for r in rows]
+    scaled = [
+        [repr(float(c) * factor) if k in columns and c else c for k, c in enumerate(row.split(","))] for row in rows
+    ]
     return {**good_files(), TRACKS: "\n".join([header, *(",".join(r) for r in scaled), ""]).encode()}
 
 
@@ -68,6 +70,11 @@ CASES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "nul": (lambda: edited(5, 2, "\0"), ["line 5"], []),
     "stray quote": (lambda: edited(5, 2, '"1'), [TRACKS], []),
     "millimetres": (lambda: _scaled(1000.0), [TRACKS], ["millimetres", "span", "convert to metres"]),
+    "one marker in millimetres": (
+        lambda: _scaled(1000.0, (4, 5, 6)),
+        [TRACKS],
+        ["marker m2 is typically", "m from the hinge, the others 0.", "leave it out"],
+    ),
     "centimetres": (lambda: _scaled(100.0), [TRACKS], ["looks like centimetres"]),
     "feet": (lambda: _scaled(3.28084), [TRACKS], ["looks like feet"]),
     "all empty": (

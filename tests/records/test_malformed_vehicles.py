@@ -131,6 +131,7 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "values in gf": (lambda: _scaled(101.97), [FORCES], ["force_x_n is typically", "looks like gram-force"]),
     "weak values in gf": (lambda: _scaled(0.2 * 101.97), [FORCES], ["looks like gram-force"]),
     "one axis in gf": (lambda: _axis(101.97), [FORCES], ["force_z_n is typically 3.", "looks like gram-force"]),
+    "huge values": (lambda: _scaled(1e200), [FORCES], ["e+199 N (root mean square)", "looks like no unit of force"]),
     "values in MN": (lambda: _scaled(1e-7), [FORCES], ["a much larger unit", "weighs 0.1706 N"]),
     "zero": (
         lambda: _scaled(0.0),
