@@ -120,8 +120,8 @@ def _check_moves(recording: Recording, seen: npt.NDArray[np.bool_]) -> None:
 
 def still_markers(recording: Recording) -> tuple[str, ...]:
     """Markers that were recorded at one and the same place throughout: they were not tracked, and are not used."""
-    found = _still(recording)[::3]
-    return tuple(name for name, one in zip(recording.markers, found, strict=True) if one)
+    still = _still(recording)
+    return tuple(name for k, name in enumerate(recording.markers) if still[3 * k])
 
 
 def _still(recording: Recording) -> npt.NDArray[np.bool_]:

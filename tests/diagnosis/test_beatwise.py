@@ -124,6 +124,11 @@ def test_a_marker_that_was_never_seen_is_not_one_that_stands_still() -> None:
     assert still_markers(recording(values)) == ()
 
 
+def test_forces_have_no_markers_that_stand_still() -> None:
+    one = replace(recording(noise(124, 0.5, 1, 3)), markers=(), values=np.zeros((124, 2)), forces=("x", "z"))
+    assert still_markers(one) == ()
+
+
 def test_no_recording_is_refused() -> None:
     with pytest.raises(ValueError, match="no recording to diagnose"):
         Stack.of([])
