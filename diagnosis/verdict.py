@@ -151,10 +151,7 @@ def _measured(refit: Refit) -> bool:
 
 def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
     """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
-    names, nearest = (
-        " and ".join(suspects[name].title.lower() for name in found if name in suspects)
-        for found in (decision.named, decision.best.names)
-    )
+    names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
     start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
     if decision.verdict == "adequate":
         return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
@@ -165,10 +162,22 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[s
             else "No effect takes as much of it as it costs, and none was put in."
         )
     if decision.verdict == "ambiguous":
+        either = " or ".join(_titles(suspects, found, " with ") for found in decision.alike) or names
         return (
-            f"Something is lacking, and these recordings cannot tell which: {names}. {start} The best leaves "
+            f"Something is lacking, and these recordings cannot tell which: {either}. {start} The best leaves "
             f"{told['after']}. {told['held_out']}"
         )
     kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
     link = ": " if decision.verdict == "measurement fault" else " "
-    return f"{kind}{link}{names}. {start} With it the misfit is {told['after']}. {told['held_out']}"
+    wider, others = (
+        [one for one in decision.alike if (set(decision.named) <= set(one)) is holds] for holds in (True, False)
+    )
+    besides = dict.fromkeys(name for one in wider for name in one if name not in decision.named)
+    instead = [_titles(suspects, one, " with ") for one in others]
+    more = f" Whether {_titles(suspects, list(besides), ' or ')} is lacking besides is open." if besides else ""
+    more += f" Less probable, but possible instead: {' or '.join(instead)}." if instead else ""
+    return f"{kind}{link}{names}.{more} {start} With it the misfit is {told['after']}. {told['held_out']}"
+
+
+def _titles(suspects: Mapping[str, Suspect], names: Sequence[str], between: str = " and ") -> str:
+    return between.join(suspects[name].title.lower() for name in names if name in suspects)

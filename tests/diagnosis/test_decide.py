@@ -14,7 +14,7 @@ from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, weighed
 from diagnosis.finding import Interval
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
-from diagnosis.verdict import _part, decided
+from diagnosis.verdict import _part, decided, summary
 from diagnosis.where import _variables, acting
 from records import Condition
 
@@ -69,6 +69,18 @@ def test_explanations_are_alike_where_one_of_them_is_right_and_only_there() -> N
     open_ = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
     assert set(open_.alike) == {("a",), ("b",)}
     assert decided(weighed(stack(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alike == ()
+
+
+def test_the_summary_says_which_are_alike_and_what_may_lack_besides() -> None:
+    suspects = cast("Any", {name: SimpleNamespace(title=f"The {name}") for name in "abc"})
+    told = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
+    alike = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
+    nested = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
+    either, more = (summary(decided(weighed(stack(), refit(2.0), r, 0.0, 40)), suspects, told) for r in (alike, nested))
+    assert "cannot tell which: the a with the c or the a with the b." in either
+    assert "The model lacks the a. Whether the b is lacking besides is open." in more
+    rival = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.30, ("b",), 2)], 0.0, 40))
+    assert "The model lacks the a. Less probable, but possible instead: the b." in summary(rival, suspects, told)
 
 
 def test_where_a_cause_acts_is_told_with_its_interval() -> None:
