@@ -109,7 +109,9 @@ class _Race:
     def _foreseen(self, runner: _Runner) -> float:
         """What a fit leaves in the end if it gains FASTER from now on than it did in its last step."""
         before, now = (self.stack.excess(fit.coefficients) for fit in runner.fits)
-        return now * min(now / before, 1.0) ** (FASTER * (STEPS + 1 - runner.taken)) if now > 0.0 else now
+        if now <= 0.0 or now >= before:
+            return now
+        return float(now * (now / before) ** (FASTER * (STEPS + 1 - runner.taken)))
 
     def _left(self, runner: _Runner) -> float:
         return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
