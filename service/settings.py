@@ -11,6 +11,7 @@ from typing import Literal, get_args
 
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
+MOST_WORKERS = 256  # each takes some hundred megabytes
 YES = frozenset({"1", "true", "yes", "on"})
 
 
@@ -48,7 +49,7 @@ class Settings:
         _in_range("WINGFIT_PORT", self.port, 0, 65535)
         _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
         if self.workers is not None:
-            _in_range("WINGFIT_WORKERS", self.workers, 1, 256)
+            _in_range("WINGFIT_WORKERS", self.workers, 1, MOST_WORKERS)
         if self.evaluator not in get_args(EvaluatorKind):
             raise SettingsError(
                 f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"

@@ -8,9 +8,6 @@ from calibration.evaluator import Evaluator
 
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 
-MOST_WORKERS = 256
-"""On one machine. Each takes some hundred megabytes."""
-
 
 class RunningEvaluator(Evaluator, Protocol):
     """An evaluator that also says what it is, for the health page."""
@@ -33,8 +30,8 @@ def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str
     "auto") joins a standing Ray cluster, which then decides the number of workers; without it, Ray starts on
     this machine.
     """
-    if workers is not None and not 1 <= workers <= MOST_WORKERS:
-        raise ValueError(f"workers is {workers}; it must be 1 to {MOST_WORKERS}, or absent for one per processor")
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers is {workers}; it must be at least 1, or absent for one per processor")
     if address is not None and kind != "ray":
         raise ValueError(f"a Ray address ({address}) needs the evaluator 'ray', not {kind!r}")
     if address is not None and "://" in address:

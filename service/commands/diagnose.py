@@ -15,6 +15,7 @@ from service.commands.loads import check_file
 from service.commands.output import AsJson, Url, duration, moment, note, print_json, progress, say, table
 from service.commands.simulate import read_genome
 from service.diagnosis_answers import Diagnosis
+from service.settings import MOST_WORKERS
 
 app = typer.Typer(no_args_is_help=True, help="List, watch, cancel and delete diagnoses.")
 
@@ -70,7 +71,8 @@ def diagnose(
     as_json: FindingJson = False,
     local: Annotated[bool, typer.Option("--local", help="Compute here, without a server; DATASET is a path.")] = False,
     workers: Annotated[
-        int | None, typer.Option(min=1, max=256, help="With --local: processes; one per processor if left out.")
+        int | None,
+        typer.Option(min=1, max=MOST_WORKERS, help="With --local: processes; one per processor if left out."),
     ] = None,
     url: Url = DEFAULT_URL,
 ) -> None:

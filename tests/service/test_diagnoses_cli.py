@@ -106,6 +106,8 @@ def test_options_reach_the_server(wingfit: Wingfit, server: ServerProcess) -> No
         (("ds_none", "--suspect", "a,,b"), 2, "a name is empty"),
         (("ds_none", "--fixed", "damping=much"), 2, "--fixed"),
         (("nowhere", "--local"), 1, "does not exist; give a folder"),
+        (("nowhere", "--local", "--workers", "0"), 2, "greater than or equal to 1"),
+        (("nowhere", "--local", "--workers", "100000"), 2, "less than or equal to 256"),
         (("--local", "--run", "run_1"), 2, "leave --run or --local out"),
     ],
 )
