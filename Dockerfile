@@ -36,8 +36,7 @@ RUN if [ -f sim/warm.py ]; then python -m sim.warm; fi
 
 ENV WINGFIT_DATA=/data \
     WINGFIT_HOST=0.0.0.0 \
-    WINGFIT_PORT=8321 \
-    WINGFIT_ALLOW_REMOTE=1
+    WINGFIT_PORT=8321
 EXPOSE 8321
 HEALTHCHECK --interval=15s --timeout=5s --start-period=60s \
     CMD ["python", "-c", "import urllib.request as u; u.urlopen('http://127.0.0.1:8321/v1/health', timeout=4)"]

@@ -20,8 +20,9 @@ from service import problems
 from service.database import Database
 from service.diagnoser import Diagnoser
 from service.engine import Engine
+from service.gate import Gate
 from service.guard import Guard
-from service.routes import datasets, diagnoses, effects, forces, outcomes, runs, system
+from service.routes import datasets, diagnoses, effects, forces, keys, outcomes, runs, system
 from service.schemas import ProblemOut
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
@@ -36,6 +37,7 @@ ROUTERS = (
     forces.router,
     diagnoses.router,
     effects.router,
+    keys.router,
 )
 METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
 DESCRIPTION = (
@@ -78,6 +80,8 @@ def create_app(
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
     _document_problems(app)
     _mount_pages(app)
+    if settings.keys:
+        app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)
     return app
 

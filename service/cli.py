@@ -11,7 +11,19 @@ import sys
 import typer
 
 from service.client import WingfitError
-from service.commands import datasets, diagnose, effects, force_runs, freeflight, kinematics, rig, runs, serve, simulate
+from service.commands import (
+    datasets,
+    diagnose,
+    effects,
+    force_runs,
+    freeflight,
+    keys,
+    kinematics,
+    rig,
+    runs,
+    serve,
+    simulate,
+)
 from service.commands.output import note
 
 ERROR = 1
@@ -35,6 +47,7 @@ app.add_typer(diagnose.app, name="diagnoses")
 app.command()(simulate.simulate)
 app.command()(force_runs.models)
 app.command()(effects.effects)
+app.add_typer(keys.app, name="keys")
 
 
 def main() -> None:

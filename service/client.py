@@ -24,6 +24,7 @@ from service import answers as a
 from service import force_answers as f
 from service.diagnosis_client import DiagnosisCalls
 from service.effect_answers import Effect
+from service.key_client import KeyCalls
 from service.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -40,7 +41,7 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(DiagnosisCalls):
+class Client(DiagnosisCalls, KeyCalls):
     """Talks to one server; usable as a context manager."""
 
     def health(self) -> a.Health:

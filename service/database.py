@@ -24,6 +24,8 @@ from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool, StaticPool
 
+from service.access import OwnSession
+
 FILE_NAME = "wingfit.sqlite3"
 LOCK_NAME = "wingfit.lock"
 BUSY_TIMEOUT_MS = 10_000
@@ -100,19 +102,19 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """One transaction, the only one that writes at this time; durable when the block has ended."""
+        """One transaction, the only one that writes at this time; durable when the block has ended. As :meth:`read`."""
         with self._guard:
             if self._closed:
                 raise DatabaseClosedError("the service is stopping")
-            with Session(self._writer, expire_on_commit=False) as session, session.begin():
+            with OwnSession(self._writer, expire_on_commit=False) as session, session.begin():
                 yield session
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """One consistent snapshot."""
+        """One consistent snapshot, of what :data:`service.access.CALLER` may see."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
-        with Session(self._readers, expire_on_commit=False) as session:
+        with OwnSession(self._readers, expire_on_commit=False) as session:
             yield session
 
     def close(self) -> None:

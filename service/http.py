@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response
 
 from service import problems, store
+from service.access import CALLER
 from service.database import Database
 
 Limit = Annotated[int, Query(ge=1, le=200, description="items on a page")]
@@ -40,7 +41,7 @@ def errors(*statuses: int) -> Responses:
         status: {"description": HTTPStatus(status).phrase, "content": content} for status in (422, *statuses)
     }
     documented["default"] = {
-        "description": "host (400), foreign origin (403), too large (413), internal (500), stopping (503)",
+        "description": "host (400), key (401), scope or origin (403), too large (413), internal (500), stopping (503)",
         "content": content,
     }
     return documented
@@ -50,7 +51,9 @@ def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | Non
     """What makes a request the same as an earlier one with the same key."""
     if key is None:
         return None
-    return store.Repeat(request.url.path, key, hashlib.sha256(json.dumps(parts).encode()).hexdigest())
+    caller = CALLER.get()
+    path = f"{request.url.path} of {caller.owner}" if caller else request.url.path
+    return store.Repeat(path, key, hashlib.sha256(json.dumps(parts).encode()).hexdigest())
 
 
 def created(

@@ -35,10 +35,11 @@ NICENESS = 10
 
 
 class Known(NamedTuple):
-    """A job and its kind."""
+    """A job, its kind, and whose it is."""
 
     work: Work
     id: str
+    owner: str | None
 
     def __str__(self) -> str:
         return f"{self.work.what} {self.id}"
@@ -47,11 +48,16 @@ class Known(NamedTuple):
 class Runner:
     """Owns the threads that compute jobs."""
 
-    def __init__(self, database: Database, changes: Changes, kinds: Sequence[Work], at_once: int) -> None:
-        self._database, self._changes, self._kinds, self._at_once = database, changes, kinds, at_once
+    def __init__(
+        self, database: Database, changes: Changes, kinds: Sequence[Work], at_once: int, of_one: int | None = None
+    ) -> None:
+        """``at_once`` jobs are computed at a time, of them ``of_one`` of one owner."""
+        self._database, self._changes, self._kinds = database, changes, kinds
+        self._at_once, self._of_one = at_once, of_one or at_once
         self._lock = threading.RLock()
         self._waiting: deque[Known] = deque()
         self._threads: dict[str, threading.Thread] = {}
+        self._computed: dict[str, Known] = {}
         self._evaluator: Evaluator | None = None
         self._stopping = False
 
@@ -62,7 +68,7 @@ class Runner:
         with self._lock:
             with self._database.write() as session:
                 left = [
-                    (row, Known(work, row.id))
+                    (row, Known(work, row.id, row.owner))
                     for state in (jobs.State.RUNNING, jobs.State.QUEUED)
                     for row, work in self._unfinished(session, state)
                 ]
@@ -76,16 +82,16 @@ class Runner:
             self._evaluator = evaluator
         self._dispatch()
 
-    def enqueue(self, work: Work, job_id: str) -> None:
+    def enqueue(self, work: Work, job_id: str, owner: str | None) -> None:
         """A new job was stored as QUEUED."""
-        self._obey(Known(work, job_id), (Instruction.ENQUEUE, Instruction.PUBLISH))
+        self._obey(Known(work, job_id, owner), (Instruction.ENQUEUE, Instruction.PUBLISH))
 
     def control(self, work: Work, job_id: str, event: jobs.Event) -> JobRow:
         """Apply a user's event; a 409 with the state when the job does not admit it."""
-        job = Known(work, job_id)
         with self._lock:
             with self._database.write() as session:
                 row = work.row(session, job_id)
+                job = Known(work, job_id, row.owner)
                 try:
                     instructions = _step(row, event)
                 except jobs.IllegalTransition as error:
@@ -126,14 +132,22 @@ class Runner:
     def _dispatch(self) -> None:
         with self._lock:
             while self._evaluator and not self._stopping and len(self._threads) < self._at_once:
-                # A job that was paused and resumed waits until its earlier thread has ended.
-                job = next((waiting for waiting in self._waiting if waiting.id not in self._threads), None)
+                job = next((waiting for waiting in self._waiting if self._may_start(waiting)), None)
                 if job is None:
                     return
                 self._waiting.remove(job)
+                self._computed[job.id] = job
                 thread = threading.Thread(target=self._work, args=(job, self._evaluator), name=job.id, daemon=True)
                 self._threads[job.id] = thread
                 thread.start()
+
+    def _may_start(self, job: Known) -> bool:
+        """Whether no more than his share of its owner's jobs are computed, and none of this one's earlier threads.
+
+        A job that was paused and resumed waits until its earlier thread has ended.
+        """
+        beside = sum(other.owner == job.owner for other in self._computed.values())
+        return job.id not in self._threads and beside < self._of_one
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
@@ -150,6 +164,7 @@ class Runner:
         finally:
             with self._lock:
                 self._threads.pop(job.id, None)
+                self._computed.pop(job.id, None)
             self._dispatch()
 
     def _compute(self, job: Known, evaluator: Evaluator) -> None:

@@ -13,6 +13,7 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
+from service import keys
 from service.app import create_app
 from service.database import Database, DataFolderError
 from service.diagnoser import Diagnoser
@@ -67,7 +68,9 @@ def serve(
         listening.close()
         raise ServeError(str(error)) from None
     settings = replace(settings, port=listening.getsockname()[1])
-    if not is_loopback(settings.host):
+    if settings.keys:
+        _need_a_key(settings, database, listening)
+    elif not is_loopback(settings.host):
         LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
     app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator, diagnoser=diagnoser)
     config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE_SECONDS, server_header=False)
@@ -80,6 +83,19 @@ def serve(
         # A thread is still computing what will be computed again after the next start; do not wait for it.
         logging.shutdown()
         os._exit(0)
+
+
+def _need_a_key(settings: Settings, database: Database, listening: socket.socket) -> None:
+    """ServeError while there is no key that can manage keys: nobody could get in."""
+    with database.read() as session:
+        known = any(row.revoked_at is None and "admin" in row.scopes for row in keys.every(session))
+    if not known:
+        database.close()
+        listening.close()
+        raise ServeError(
+            f"a server on {settings.host} asks for API keys, and there is none that can manage keys yet; make one: "
+            f"wingfit keys create NAME --scope admin --data {settings.data}"
+        )
 
 
 def main() -> None:

@@ -30,8 +30,11 @@ class Settings:
         evaluator: what evaluates individuals (``WINGFIT_EVALUATOR``): in_process, processes or ray.
         workers: number of worker processes (``WINGFIT_WORKERS``); None lets the evaluator choose.
         ray_address: address of a standing Ray cluster (``WINGFIT_RAY_ADDRESS``); None starts one of our own.
-        max_runs: runs computed at the same time (``WINGFIT_MAX_RUNS``).
-        allow_remote: listen on other addresses than loopback, without keys (``WINGFIT_ALLOW_REMOTE=1``).
+        max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
+        max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
+        max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
+        require_keys: ask for an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
+        allow_remote: listen on other addresses than loopback without keys (``WINGFIT_ALLOW_REMOTE=1``).
         allowed_hosts: host names that requests may carry (loopback names and ``WINGFIT_ALLOWED_HOSTS``).
     """
 
@@ -42,23 +45,27 @@ class Settings:
     workers: int | None = None
     ray_address: str | None = None
     max_runs: int = 2
+    max_runs_per_owner: int | None = None
+    max_active: int = 200
+    require_keys: bool = False
     allow_remote: bool = False
     allowed_hosts: tuple[str, ...] = LOOPBACK_NAMES
 
     def __post_init__(self) -> None:
         _in_range("WINGFIT_PORT", self.port, 0, 65535)
         _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
+        _in_range("WINGFIT_MAX_ACTIVE", self.max_active, 1, 100_000)
+        if self.max_runs_per_owner is not None:
+            _in_range("WINGFIT_MAX_RUNS_PER_OWNER", self.max_runs_per_owner, 1, 64)
         if self.workers is not None:
             _in_range("WINGFIT_WORKERS", self.workers, 1, MOST_WORKERS)
         if self.evaluator not in get_args(EvaluatorKind):
             raise SettingsError(
                 f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"
             )
-        if not self.allow_remote and not is_loopback(self.host):
+        if self.allow_remote and self.require_keys:
             raise SettingsError(
-                f"WINGFIT_HOST is {self.host!r}, which other machines can reach, and there are no keys: "
-                "whoever reaches it can read and delete everything. Use 127.0.0.1, or set "
-                "WINGFIT_ALLOW_REMOTE=1 if a network of your own protects it"
+                "WINGFIT_ALLOW_REMOTE=1 is for a server without keys, WINGFIT_REQUIRE_KEYS=1 for one with: unset one"
             )
 
     @classmethod
@@ -72,12 +79,20 @@ class Settings:
             host=read.get("WINGFIT_HOST", cls.host),
             port=_integer(read, "WINGFIT_PORT", cls.port),
             evaluator=read.get("WINGFIT_EVALUATOR", cls.evaluator),  # type: ignore[arg-type]  # checked above
-            workers=_integer(read, "WINGFIT_WORKERS", 0) if "WINGFIT_WORKERS" in read else None,
+            workers=_some(read, "WINGFIT_WORKERS"),
             ray_address=read.get("WINGFIT_RAY_ADDRESS"),
             max_runs=_integer(read, "WINGFIT_MAX_RUNS", cls.max_runs),
-            allow_remote=read.get("WINGFIT_ALLOW_REMOTE", "").lower() in YES,
+            max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
+            max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
+            require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),
+            allow_remote=_yes(read, "WINGFIT_ALLOW_REMOTE"),
             allowed_hosts=LOOPBACK_NAMES + extra,
         )
+
+    @property
+    def keys(self) -> bool:
+        """Whether calls need an API key: wherever other machines can reach the server, unless told otherwise."""
+        return self.require_keys or not (self.allow_remote or is_loopback(self.host))
 
     @property
     def url(self) -> str:
@@ -94,6 +109,14 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+def _yes(read: Mapping[str, str], name: str) -> bool:
+    return read.get(name, "").lower() in YES
+
+
+def _some(read: Mapping[str, str], name: str) -> int | None:
+    return _integer(read, name, 1) if name in read else None
 
 
 def _integer(read: Mapping[str, str], name: str, default: int) -> int:

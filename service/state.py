@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
 from service import store
+from service.access import KeyRing
 from service.calibrating import Calibrating
 from service.changes import Changes
 from service.database import Database
@@ -24,6 +25,7 @@ from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
 from service.tables import DiagnosisRow, RunRow
+from service.work import Work
 
 LOG = logging.getLogger("wingfit")
 STOP_SECONDS = 3.0
@@ -45,19 +47,33 @@ class Service:
         self.settings, self.database = settings, database
         self.engine: Engine = engine or ModelEngine()
         self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
+        self.keys = KeyRing()
         self.changes = Changes()
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
-        self.runner = Runner(database, self.changes, (self.calibrating, self.diagnosing), settings.max_runs)
+        kinds = (self.calibrating, self.diagnosing)
+        self.runner = Runner(database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
 
     def start(self) -> None:
         """Take up what was left and start the evaluator."""
         with self.database.write() as session:
             store.forget_answers(session)
+        self.load_keys()
         self.runner.recover()
         self._pool.start()
+
+    def enqueue(self, work: Work, job_id: str) -> None:
+        """Compute a job that was stored, when its turn comes."""
+        with self.database.read() as session:
+            owner = work.row(session, job_id).owner
+        self.runner.enqueue(work, job_id, owner)
+
+    def load_keys(self) -> None:
+        """Take the keys that are good now."""
+        with self.database.read() as session:
+            self.keys.load(session)
 
     def begin_stop(self) -> None:
         """Let go of whoever watches, start nothing more. Safe in a signal handler."""

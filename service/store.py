@@ -15,7 +15,7 @@ from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
 from calibration.search import CalibrationSpec
-from service.problems import conflict, error_item, invalid, not_found
+from service.problems import ProblemError, conflict, error_item, invalid, not_found
 from service.tables import (
     AnswerRow,
     ArchiveRow,
@@ -172,6 +172,24 @@ def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | Non
 def active(session: Session, table: type[JobRow]) -> int:
     """Number of jobs that have not ended."""
     return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE))) or 0
+
+
+def admitted(session: Session, dataset_id: str, most: int) -> str | None:
+    """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
+    owner = dataset(session, dataset_id).owner
+    count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
+    if count >= most:
+        raise ProblemError(
+            429,
+            "too-many",
+            f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them",
+        )
+    return owner
+
+
+def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
+    his = table.owner.is_(None) if owner is None else table.owner == owner
+    return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE), his)) or 0
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:

@@ -22,7 +22,32 @@ class Table(DeclarativeBase):
     type_annotation_map = {dict[str, Any]: JSON, list[dict[str, Any]]: JSON}  # noqa: RUF012  # read by SQLAlchemy
 
 
-class DatasetRow(Table):
+class OwnedRow:
+    """What belongs to someone: the owner of the key that made it; None where no key was asked for.
+
+    A job belongs to whom its dataset belongs to.
+    """
+
+    owner: Mapped[str | None] = mapped_column(index=True)
+
+
+class KeyRow(Table):
+    """An API key. ``sha256`` is of its secret, which is stored nowhere; a key that was revoked stays, to be told of."""
+
+    __tablename__ = "key"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    owner: Mapped[str]
+    scopes: Mapped[list[str]] = mapped_column(JSON)
+    sha256: Mapped[str] = mapped_column(unique=True)
+    created_at: Mapped[str]
+    revoked_at: Mapped[str | None]
+
+
+class DatasetRow(OwnedRow, Table):
     """An uploaded dataset: what lists show; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
@@ -50,7 +75,7 @@ class ArchiveRow(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
-class JobRow:
+class JobRow(OwnedRow):
     """What every job has; state, wish, generations, progress and error are the job of :mod:`workers.jobs`."""
 
     number: Mapped[int] = mapped_column(primary_key=True)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import math
+import os
 import time
 import zipfile
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ import httpx
 from service import answers as a
 
 DEFAULT_URL = "http://127.0.0.1:8321"
+KEY_VARIABLE = "WINGFIT_API_KEY"
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 # A fixed time stamp makes the archive of an unchanged folder the same bytes, hence the same digest.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
@@ -73,12 +75,14 @@ class Transport:
     ``retries`` is how often a call is repeated when the connection fails or the server says 502, 503 or 504.
     A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
     Answers that the server simulates for may take ``simulating_s``: one given up too early would be computed again.
+    ``api_key`` is by default that of the environment (``WINGFIT_API_KEY``).
     """
 
     def __init__(
         self,
         base_url: str = DEFAULT_URL,
         *,
+        api_key: str | None = None,
         timeout_s: float = 60.0,
         simulating_s: float = 600.0,
         retries: int = 2,
@@ -94,7 +98,12 @@ class Transport:
         if url.scheme not in ("http", "https") or not url.host:
             raise WingfitError("bad server address", f"{base_url!r}; it must look like {DEFAULT_URL}")
         # A proxy from the environment must not catch calls to a server on this machine.
-        self._http = httpx.Client(base_url=self.base_url, timeout=timeout_s, trust_env=url.host not in LOOPBACK)
+        self._http = httpx.Client(
+            base_url=self.base_url,
+            timeout=timeout_s,
+            trust_env=url.host not in LOOPBACK,
+            headers=_authorization(api_key or os.environ.get(KEY_VARIABLE, "").strip()),
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -242,6 +251,14 @@ def _checked(response: httpx.Response) -> httpx.Response:
 def is_passing(error: WingfitError) -> bool:
     """Whether the same call may succeed in a moment."""
     return isinstance(error, ServerAwayError) or error.status in (502, 503, 504)
+
+
+def _authorization(api_key: str) -> dict[str, str]:
+    if not api_key:
+        return {}
+    if not (api_key.isascii() and api_key.isprintable() and " " not in api_key):
+        raise WingfitError("bad API key", f"{KEY_VARIABLE} must be a key as 'wingfit keys create' prints it")
+    return {"Authorization": f"Bearer {api_key}"}
 
 
 def _reason(cause: Exception) -> str:

@@ -12,6 +12,7 @@ from starlette.responses import Response
 
 from records import Dataset
 from service import http, store, views
+from service.access import owner_of_new
 from service.guard import UPLOAD_LIMIT
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import DatasetOut, Page
@@ -125,6 +126,7 @@ def _load(service: Service, data: bytes, filename: str) -> Dataset:
 def _row(loaded: Dataset, name: str | None, filename: str, digest: str, size: int) -> DatasetRow:
     return DatasetRow(
         id=store.new_id("ds"),
+        owner=owner_of_new(),
         name=name or loaded.name,
         kind=loaded.kind,
         description=loaded.description,

@@ -44,7 +44,7 @@ data: {"id": "dx_7d20c14be5a9f386", "state": "SUCCEEDED", "verdict": "named"}
     "",
     status_code=202,
     response_model=DiagnosisOut,
-    responses={202: {"headers": http.LOCATION}, **http.errors()},
+    responses={202: {"headers": http.LOCATION}, **http.errors(429)},
     summary="Submit a diagnosis",
 )
 def submit(
@@ -65,8 +65,8 @@ def submit(
     name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"[: spec_views.LONGEST_NAME]
 
     def create(session: Session) -> store.Answer:
-        store.dataset(session, dataset_id)
-        row = DiagnosisRow(id=store.new_id("dx"), name=name, dataset_id=dataset_id, kind=dataset.kind)
+        owner = store.admitted(session, dataset_id, service.settings.max_active)
+        row = DiagnosisRow(id=store.new_id("dx"), owner=owner, name=name, dataset_id=dataset_id, kind=dataset.kind)
         row.run_id, row.spec = body.run_id, diagnosis_specs.plain(spec)
         row.created_at, row.evaluations, row.elapsed_seconds = store.now(), 0, 0.0
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
@@ -75,7 +75,7 @@ def submit(
 
     answered, new = http.created(service.database, again, create)
     if new:
-        service.runner.enqueue(service.diagnosing, answered.body["id"])
+        service.enqueue(service.diagnosing, answered.body["id"])
     return http.sent(answered)
 
 

@@ -26,7 +26,7 @@ router = APIRouter(prefix="/v1/runs", tags=["runs"])
     "",
     status_code=202,
     response_model=RunOut,
-    responses={202: {"headers": http.LOCATION}, **http.errors()},
+    responses={202: {"headers": http.LOCATION}, **http.errors(429)},
     summary="Submit a calibration",
 )
 def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: http.RepeatKey = None) -> Response:
@@ -46,8 +46,8 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
     name = body.name or spec_views.run_name(dataset, spec)
 
     def create(session: Session) -> store.Answer:
-        store.dataset(session, body.dataset_id)
-        row = RunRow(id=store.new_id("run"), name=name, dataset_id=body.dataset_id, kind=dataset.kind)
+        owner = store.admitted(session, body.dataset_id, service.settings.max_active)
+        row = RunRow(id=store.new_id("run"), owner=owner, name=name, dataset_id=body.dataset_id, kind=dataset.kind)
         row.spec = store.spec_json(spec)
         row.created_at, row.evaluations, row.elapsed_seconds = store.now(), 0, 0.0
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
@@ -56,7 +56,7 @@ def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: 
 
     answer, new = http.created(service.database, again, create)
     if new:
-        service.runner.enqueue(service.calibrating, answer.body["id"])
+        service.enqueue(service.calibrating, answer.body["id"])
     return http.sent(answer)
 
 

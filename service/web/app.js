@@ -1,5 +1,6 @@
 // The page: lists, the selected run (#run=ID) or diagnosis (#diagnosis=ID), the state of the server.
 
+import { askForKey, isRefused, setUpAccess } from "./access.js";
 import { get } from "./api.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./diagnosis.js";
 import { $, plural, toast } from "./format.js";
@@ -52,7 +53,8 @@ async function poll() {
     showHealth(health);
     drawLists();
   } catch (error) {
-    if (error.away) setAway(true);
+    if (isRefused(error)) askForKey();
+    else if (error.away) setAway(true);
     else toast(error.message);
   }
   clearTimeout(polling);
@@ -110,8 +112,10 @@ setUpSubmit({
   },
 });
 $("new-run").addEventListener("click", () => openSubmit(datasets));
-window.addEventListener("hashchange", route);
-document.addEventListener("visibilitychange", () => document.hidden || poll());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
-poll();
-route();
+if (await setUpAccess()) {
+  window.addEventListener("hashchange", route);
+  document.addEventListener("visibilitychange", () => document.hidden || poll());
+  poll();
+  route();
+}

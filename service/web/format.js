@@ -80,9 +80,12 @@ export const $ = (id) => document.getElementById(id);
 
 const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
+let keyInCurl = "";
+export const askKeyInCurl = (asked) => { keyInCurl = asked ? ' -H "Authorization: Bearer $WINGFIT_API_KEY"' : ""; };
+
 export function curl(path, body) {
   const url = new URL(`v1/${path}`, document.baseURI).href;
-  return `curl -X POST ${quote(url)} -H 'Content-Type: application/json' -d ${quote(JSON.stringify(body))}`;
+  return `curl -X POST ${quote(url)}${keyInCurl} -H 'Content-Type: application/json' -d ${quote(JSON.stringify(body))}`;
 }
 
 let toastTimer = null;
