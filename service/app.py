@@ -22,7 +22,7 @@ from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
-from service.routes import datasets, diagnoses, effects, forces, keys, outcomes, runs, system
+from service.routes import backup, datasets, diagnoses, effects, forces, keys, outcomes, runs, system
 from service.schemas import ProblemOut
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
@@ -38,6 +38,7 @@ ROUTERS = (
     diagnoses.router,
     effects.router,
     keys.router,
+    backup.router,
 )
 METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
 DESCRIPTION = (

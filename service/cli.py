@@ -12,6 +12,7 @@ import typer
 
 from service.client import WingfitError
 from service.commands import (
+    backup,
     datasets,
     diagnose,
     effects,
@@ -48,6 +49,8 @@ app.command()(simulate.simulate)
 app.command()(force_runs.models)
 app.command()(effects.effects)
 app.add_typer(keys.app, name="keys")
+app.command()(backup.backup)
+app.command()(backup.restore)
 
 
 def main() -> None:

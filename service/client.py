@@ -48,6 +48,10 @@ class Client(DiagnosisCalls, KeyCalls):
         """Ask whether the server is up, for its version, evaluator and load."""
         return cast(a.Health, self._json("GET", "/v1/health"))
 
+    def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
+        """Write a checked copy of everything on the server to ``path``, as :meth:`download` does."""
+        return self._file("/v1/backup", Path(path), "wingfit.sqlite3", on_bytes)
+
     # -- datasets ------------------------------------------------------------
 
     def upload_dataset(
@@ -88,22 +92,7 @@ class Client(DiagnosisCalls, KeyCalls):
 
         ``on_bytes(received, total)`` is called as they come in; total is 0 where the server does not say.
         """
-        target = Path(path)
-        with self._stream("GET", f"/v1/datasets/{part(dataset_id)}/archive") as response:
-            if target.is_dir():
-                target = target / _attachment_name(response, f"{dataset_id}.zip")
-            partial = target.with_name(target.name + ".part")
-            try:
-                with partial.open("wb") as stream:
-                    for block in response.iter_bytes():
-                        stream.write(block)
-                        if on_bytes:
-                            on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
-            except httpx.TransportError as error:
-                partial.unlink(missing_ok=True)
-                raise ServerAwayError(self.base_url, error) from error
-        partial.replace(target)
-        return target
+        return self._file(f"/v1/datasets/{part(dataset_id)}/archive", Path(path), f"{dataset_id}.zip", on_bytes)
 
     def delete_dataset(self, dataset_id: str) -> None:
         """Delete a dataset; the server refuses while runs refer to it."""
@@ -318,11 +307,3 @@ class Client(DiagnosisCalls, KeyCalls):
 
 def _run(run_id: str) -> str:
     return f"/v1/runs/{part(run_id)}"
-
-
-def _attachment_name(response: httpx.Response, fallback: str) -> str:
-    """File name from Content-Disposition, without any folder that it may name."""
-    disposition = response.headers.get("content-disposition", "")
-    _, found, rest = disposition.partition('filename="')
-    name = Path(rest.partition('"')[0].replace("\\", "/")).name if found else ""
-    return name if name and not name.startswith(".") else fallback

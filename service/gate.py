@@ -16,7 +16,7 @@ from service.problems import ProblemError, response
 
 COOKIE = "wingfit_key"
 API = "/v1/"
-KEYS = "/v1/keys"
+ADMINISTRATION = ("/v1/keys", "/v1/backup")
 OPEN = frozenset({"/v1/health", "/v1/session"})  # says little, and lets a browser in
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
@@ -72,6 +72,6 @@ def _refusal(scope: Scope, caller: Caller | None) -> ProblemError | None:
 
 def needed_for(method: str, path: str) -> KeyScope:
     """What a key must be good for."""
-    if path == KEYS or path.startswith(f"{KEYS}/"):
+    if any(path == root or path.startswith(f"{root}/") for root in ADMINISTRATION):
         return "admin"
     return "read" if method in READING else "write"

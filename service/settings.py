@@ -33,6 +33,7 @@ class Settings:
         max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
         max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
         max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
+        keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
         require_keys: ask for an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
         allow_remote: listen on other addresses than loopback without keys (``WINGFIT_ALLOW_REMOTE=1``).
         allowed_hosts: host names that requests may carry (loopback names and ``WINGFIT_ALLOWED_HOSTS``).
@@ -47,6 +48,7 @@ class Settings:
     max_runs: int = 2
     max_runs_per_owner: int | None = None
     max_active: int = 200
+    keep_days: int | None = None
     require_keys: bool = False
     allow_remote: bool = False
     allowed_hosts: tuple[str, ...] = LOOPBACK_NAMES
@@ -57,6 +59,8 @@ class Settings:
         _in_range("WINGFIT_MAX_ACTIVE", self.max_active, 1, 100_000)
         if self.max_runs_per_owner is not None:
             _in_range("WINGFIT_MAX_RUNS_PER_OWNER", self.max_runs_per_owner, 1, 64)
+        if self.keep_days is not None:
+            _in_range("WINGFIT_KEEP_DAYS", self.keep_days, 1, 36_500)
         if self.workers is not None:
             _in_range("WINGFIT_WORKERS", self.workers, 1, MOST_WORKERS)
         if self.evaluator not in get_args(EvaluatorKind):
@@ -84,6 +88,7 @@ class Settings:
             max_runs=_integer(read, "WINGFIT_MAX_RUNS", cls.max_runs),
             max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
             max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
+            keep_days=_some(read, "WINGFIT_KEEP_DAYS"),
             require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),
             allow_remote=_yes(read, "WINGFIT_ALLOW_REMOTE"),
             allowed_hosts=LOOPBACK_NAMES + extra,

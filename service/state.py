@@ -13,6 +13,7 @@ from fastapi import Depends, Request
 from calibration.evaluator import Evaluator
 from service import store
 from service.access import KeyRing
+from service.backup import forget_snapshots
 from service.calibrating import Calibrating
 from service.changes import Changes
 from service.database import Database
@@ -20,6 +21,7 @@ from service.datasets import Datasets
 from service.diagnoser import Diagnoser, ModelDiagnoser
 from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
+from service.housekeeping import Housekeeping
 from service.pool import Pool
 from service.runner import Runner
 from service.schemas import HealthOut
@@ -54,14 +56,15 @@ class Service:
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
         kinds = (self.calibrating, self.diagnosing)
         self.runner = Runner(database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner)
+        self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
 
     def start(self) -> None:
         """Take up what was left and start the evaluator."""
-        with self.database.write() as session:
-            store.forget_answers(session)
         self.load_keys()
+        forget_snapshots(self.settings.data)
         self.runner.recover()
+        self._housekeeping.start()
         self._pool.start()
 
     def enqueue(self, work: Work, job_id: str) -> None:
@@ -78,6 +81,7 @@ class Service:
     def begin_stop(self) -> None:
         """Let go of whoever watches, start nothing more. Safe in a signal handler."""
         self.runner.begin_stop()
+        self._housekeeping.stop()
         self.changes.close()
 
     def stop(self) -> bool:

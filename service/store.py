@@ -40,7 +40,12 @@ Row = TypeVar("Row", DatasetRow, RunRow, DiagnosisRow)
 
 def now() -> str:
     """Give the time, RFC 3339 in UTC."""
-    return datetime.now(UTC).isoformat(timespec="microseconds").replace("+00:00", "Z")
+    return timestamp(datetime.now(UTC))
+
+
+def timestamp(moment: datetime) -> str:
+    """A time in UTC as it is stored: RFC 3339, so that texts are in the order of the times."""
+    return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def new_id(prefix: str) -> str:
@@ -291,5 +296,4 @@ def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None
 
 def forget_answers(session: Session) -> None:
     """Drop answers that nobody will ask for again."""
-    oldest = (datetime.now(UTC) - ANSWERS_KEPT).isoformat(timespec="microseconds").replace("+00:00", "Z")
-    session.execute(delete(AnswerRow).where(AnswerRow.created_at < oldest))
+    session.execute(delete(AnswerRow).where(AnswerRow.created_at < timestamp(datetime.now(UTC) - ANSWERS_KEPT)))

@@ -166,6 +166,24 @@ class Transport:
         finally:
             context.__exit__(None, None, None)
 
+    def _file(self, path: str, target: Path, name: str, on_bytes: OnBytes | None) -> Path:
+        """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it."""
+        with self._stream("GET", path) as response:
+            if target.is_dir():
+                target = target / _attachment_name(response, name)
+            partial = target.with_name(target.name + ".part")
+            try:
+                with partial.open("wb") as stream:
+                    for block in response.iter_bytes():
+                        stream.write(block)
+                        if on_bytes:
+                            on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
+            except httpx.TransportError as error:
+                partial.unlink(missing_ok=True)
+                raise ServerAwayError(self.base_url, error) from error
+        partial.replace(target)
+        return target
+
     def _events_once(self, path: str, last_event_id: str | None) -> Iterator[a.Event]:
         headers = {"Accept": "text/event-stream"} | given(**{"Last-Event-ID": last_event_id})
         with self._stream("GET", path, headers=headers) as response:
@@ -179,6 +197,14 @@ def _refuse_not_finite(body: Any, where: str = "") -> None:
             _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
     elif isinstance(body, float) and not math.isfinite(body):
         raise WingfitError("not sent", f"{where} is {body}; it must be a finite number")
+
+
+def _attachment_name(response: httpx.Response, fallback: str) -> str:
+    """File name from Content-Disposition, without any folder that it may name."""
+    disposition = response.headers.get("content-disposition", "")
+    _, found, rest = disposition.partition('filename="')
+    name = Path(rest.partition('"')[0].replace("\\", "/")).name if found else ""
+    return name if name and not name.startswith(".") else fallback
 
 
 class CountedFile(io.FileIO):
