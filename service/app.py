@@ -22,6 +22,7 @@ from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
+from service.observing import Observer
 from service.routes import backup, datasets, diagnoses, effects, forces, keys, outcomes, runs, system
 from service.schemas import ProblemOut
 from service.settings import Settings
@@ -84,6 +85,7 @@ def create_app(
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(Observer)
     return app
 
 

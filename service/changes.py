@@ -31,6 +31,12 @@ class Changes:
                 if not watchers:
                     del self._watchers[run_id]
 
+    @property
+    def watchers(self) -> int:
+        """How many watch."""
+        with self._lock:
+            return sum(len(group) for group in self._watchers.values())
+
     def publish(self, run_id: str) -> None:
         """The run changed."""
         with self._lock:

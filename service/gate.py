@@ -17,7 +17,7 @@ from service.problems import ProblemError, response
 COOKIE = "wingfit_key"
 API = "/v1/"
 ADMINISTRATION = ("/v1/keys", "/v1/backup")
-OPEN = frozenset({"/v1/health", "/v1/session"})  # says little, and lets a browser in
+OPEN = frozenset({"/v1/health", "/v1/ready", "/v1/session"})  # says little, and lets a browser in
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
 

@@ -18,6 +18,7 @@ from service.app import create_app
 from service.database import Database, DataFolderError
 from service.diagnoser import Diagnoser
 from service.engine import Engine
+from service.observing import set_up_log
 from service.settings import Settings, SettingsError, is_loopback
 from service.state import MakeEvaluator
 
@@ -59,8 +60,7 @@ def serve(
     diagnoser: Diagnoser | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    logging.getLogger("alembic").setLevel(logging.WARNING)
+    set_up_log(settings.log)
     listening = _listen(settings)
     try:
         database = Database(settings.data)

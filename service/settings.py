@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 MOST_WORKERS = 256  # each takes some hundred megabytes
@@ -34,6 +35,7 @@ class Settings:
         max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
         max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
         keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
+        log: text, or json, one object a line and requests as well (``WINGFIT_LOG``).
         require_keys: ask for an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
         allow_remote: listen on other addresses than loopback without keys (``WINGFIT_ALLOW_REMOTE=1``).
         allowed_hosts: host names that requests may carry (loopback names and ``WINGFIT_ALLOWED_HOSTS``).
@@ -49,6 +51,7 @@ class Settings:
     max_runs_per_owner: int | None = None
     max_active: int = 200
     keep_days: int | None = None
+    log: LogFormat = "text"
     require_keys: bool = False
     allow_remote: bool = False
     allowed_hosts: tuple[str, ...] = LOOPBACK_NAMES
@@ -67,6 +70,8 @@ class Settings:
             raise SettingsError(
                 f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"
             )
+        if self.log not in get_args(LogFormat):
+            raise SettingsError(f"WINGFIT_LOG is {self.log!r}; it must be one of {', '.join(get_args(LogFormat))}")
         if self.allow_remote and self.require_keys:
             raise SettingsError(
                 "WINGFIT_ALLOW_REMOTE=1 is for a server without keys, WINGFIT_REQUIRE_KEYS=1 for one with: unset one"
@@ -89,6 +94,7 @@ class Settings:
             max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
             max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
             keep_days=_some(read, "WINGFIT_KEEP_DAYS"),
+            log=read.get("WINGFIT_LOG", cls.log),  # type: ignore[arg-type]  # checked above
             require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),
             allow_remote=_yes(read, "WINGFIT_ALLOW_REMOTE"),
             allowed_hosts=LOOPBACK_NAMES + extra,

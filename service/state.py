@@ -16,12 +16,13 @@ from service.access import KeyRing
 from service.backup import forget_snapshots
 from service.calibrating import Calibrating
 from service.changes import Changes
-from service.database import Database
+from service.database import FILE_NAME, Database
 from service.datasets import Datasets
 from service.diagnoser import Diagnoser, ModelDiagnoser
 from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
 from service.housekeeping import Housekeeping
+from service.observing import Gauges, Metrics
 from service.pool import Pool
 from service.runner import Runner
 from service.schemas import HealthOut
@@ -50,6 +51,7 @@ class Service:
         self.engine: Engine = engine or ModelEngine()
         self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
         self.keys = KeyRing()
+        self.metrics = Metrics(self.gauges)
         self.changes = Changes()
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
@@ -91,6 +93,23 @@ class Service:
         closed = self._pool.close()
         self.database.close()
         return ended and closed
+
+    def gauges(self) -> Gauges:
+        """Standing of the service as numbers."""
+        with self.database.read() as session:
+            jobs: dict[tuple[tuple[str, str], ...], float] = {
+                (("kind", work.what), ("state", state)): float(count)
+                for work in (self.calibrating, self.diagnosing)
+                for state, count in store.states(session, work.table)
+            }
+        size = sum(path.stat().st_size for path in self.settings.data.glob(f"{FILE_NAME}*"))
+        return {
+            "wingfit_jobs": ("Calibrations and diagnoses by state.", jobs),
+            "wingfit_evaluator_up": ("Whether jobs are computed.", {(): float(self._pool.status == "ok")}),
+            "wingfit_workers": ("Workers of the evaluator.", {(): float(self._pool.workers or 0)}),
+            "wingfit_watchers": ("Open event streams.", {(): float(self.changes.watchers)}),
+            "wingfit_database_bytes": ("Size of the database and its log.", {(): float(size)}),
+        }
 
     def health(self) -> HealthOut:
         """Standing of the service."""

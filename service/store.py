@@ -197,6 +197,13 @@ def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> 
     return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE), his)) or 0
 
 
+def states(session: Session, table: type[JobRow]) -> list[tuple[str, int]]:
+    """How many jobs are in which state."""
+    rows = session.execute(select(table.state, func.count()).group_by(table.state))
+    found: dict[str, int] = {row[0]: row[1] for row in rows}
+    return [(state.value, found.get(state.value, 0)) for state in State]
+
+
 def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:
     """Jobs in ``state``, oldest first."""
     return session.scalars(select(table).where(table.state == state.value).order_by(table.number)).all()

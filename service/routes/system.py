@@ -6,9 +6,11 @@ from html import escape
 from typing import Any
 
 from fastapi import APIRouter, Request
-from starlette.responses import HTMLResponse
+from prometheus_client import CONTENT_TYPE_LATEST
+from starlette.responses import HTMLResponse, PlainTextResponse
 
 from service import http
+from service.problems import ProblemError
 from service.schemas import HealthOut
 from service.state import ServiceDep
 
@@ -19,6 +21,27 @@ router = APIRouter(tags=["service"])
 def health(service: ServiceDep) -> HealthOut:
     """Say whether the service is up, and whether it can compute."""
     return service.health()
+
+
+@router.get("/v1/ready", responses=http.errors(503), summary="Readiness")
+def ready(service: ServiceDep) -> HealthOut:
+    """Say whether jobs are computed: 200 once the evaluator is ready, else 503."""
+    health = service.health()
+    if health.status != "ok":
+        detail = health.detail or "the evaluator is starting; jobs are accepted, and wait"
+        raise ProblemError(503, "not-ready", detail)
+    return health
+
+
+@router.get(
+    "/v1/metrics",
+    response_class=PlainTextResponse,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **http.errors()},
+    summary="Metrics",
+)
+def metrics(service: ServiceDep) -> PlainTextResponse:
+    """Return counters and gauges for Prometheus."""
+    return PlainTextResponse(service.metrics.text(), media_type=CONTENT_TYPE_LATEST)
 
 
 @router.get("/v1/schemas/dataset", responses=http.errors(), summary="Schema of dataset.yaml")
