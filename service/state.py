@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import sqlite3
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, cast
 
@@ -28,6 +28,7 @@ from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
 from service.tables import DiagnosisRow, RunRow
+from service.turns import Turns
 from service.work import Work
 
 LOG = logging.getLogger("wingfit")
@@ -53,6 +54,7 @@ class Service:
         self.keys = KeyRing()
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
+        self.turns = Turns()
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
@@ -149,3 +151,15 @@ def _service(request: Request) -> Service:
 
 
 ServiceDep = Annotated[Service, Depends(_service)]
+
+
+async def _in_turn(service: ServiceDep) -> AsyncIterator[None]:
+    await service.turns.take()
+    try:
+        yield
+    finally:
+        service.turns.give_back()
+
+
+# Of a route that simulates: it begins when its turn comes.
+IN_TURN = Depends(_in_turn)

@@ -226,8 +226,12 @@ def _here(
     from report import finding_json, html  # what computes waits until it is needed
     from service.local import diagnose as diagnose_here
 
-    with progress("diagnosing") as tell:
-        found = diagnose_here(path, asked, workers, tell)
+    try:
+        with progress("diagnosing") as tell:
+            found = diagnose_here(path, asked, workers, tell)
+    except KeyboardInterrupt:
+        note("\nthe diagnosis was given up; nothing was kept")
+        raise typer.Exit(INTERRUPTED) from None
     if report:
         _save(report, html(found))
     plain = finding_json(found)

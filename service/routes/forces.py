@@ -11,7 +11,7 @@ from service import force_views, http, sources, store
 from service.force_schemas import ForcesOut, ModelsOut, PredictionIn, PredictionOut, Source
 from service.problems import conflict
 from service.routes.outcomes import check_recording, failed, run_row
-from service.state import ServiceDep
+from service.state import IN_TURN, ServiceDep
 
 router = APIRouter(prefix="/v1", tags=["forces"])
 
@@ -23,7 +23,11 @@ def models() -> ModelsOut:
 
 
 @router.get(
-    "/runs/{run_id}/forces", response_model=ForcesOut, responses=http.errors(404, 409), summary="Forces over the beat"
+    "/runs/{run_id}/forces",
+    response_model=ForcesOut,
+    responses=http.errors(404, 409),
+    summary="Forces over the beat",
+    dependencies=[IN_TURN],
 )
 def forces(
     service: ServiceDep,
@@ -54,6 +58,7 @@ def forces(
     response_model=PredictionOut,
     responses=http.errors(404, 409),
     summary="Predict forces under any condition",
+    dependencies=[IN_TURN],
 )
 def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
     """Return the forces over a beat that the run's global model predicts; nothing is stored."""

@@ -31,7 +31,7 @@ from service.schemas import (
     SimulationOut,
     WingIn,
 )
-from service.state import Service, ServiceDep
+from service.state import IN_TURN, Service, ServiceDep
 from service.tables import RunRow
 from sim.outputs import Outputs
 from workers.jobs import State
@@ -98,6 +98,7 @@ def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
     response_model=ComparisonOut,
     responses=http.errors(404, 409),
     summary="Tracks",
+    dependencies=[IN_TURN],
 )
 def comparison(
     service: ServiceDep,
@@ -114,7 +115,13 @@ def comparison(
     return JSONResponse(views.comparison(tracks))
 
 
-@router.get("/runs/{run_id}/loads", response_model=LoadsOut, responses=http.errors(404, 409), summary="Loads")
+@router.get(
+    "/runs/{run_id}/loads",
+    response_model=LoadsOut,
+    responses=http.errors(404, 409),
+    summary="Loads",
+    dependencies=[IN_TURN],
+)
 def loads(
     service: ServiceDep,
     run_id: str,
@@ -155,6 +162,7 @@ def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) 
     response_model=SimulationOut | ForceSimulationOut,
     responses=http.errors(409),
     summary="Simulate one recording's condition",
+    dependencies=[IN_TURN],
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
@@ -172,7 +180,13 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
         raise failed(error) from None
 
 
-@router.post("/loads", response_model=LoadsOut, responses=http.errors(409), summary="Simulate any condition's loads")
+@router.post(
+    "/loads",
+    response_model=LoadsOut,
+    responses=http.errors(409),
+    summary="Simulate any condition's loads",
+    dependencies=[IN_TURN],
+)
 def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     """Simulate a genome of the caller's for its loads, under any condition; nothing is stored."""
     dataset = load(service, body.dataset_id)

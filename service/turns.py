@@ -1,0 +1,34 @@
+"""Lets a few simulations in at a time; the others wait without a thread, so that reading goes on meanwhile."""
+
+from __future__ import annotations
+
+import asyncio
+
+from service.problems import ProblemError
+
+AT_ONCE = 4
+MOST_WAITING = 64
+
+
+class Turns:
+    """``at_once`` may work, ``most_waiting`` may wait; who comes then is told to come later."""
+
+    def __init__(self, at_once: int = AT_ONCE, most_waiting: int = MOST_WAITING) -> None:
+        self._free = asyncio.Semaphore(at_once)
+        self._most, self._waiting = most_waiting, 0
+
+    async def take(self) -> None:
+        """Wait for a turn; a 503 where too many do."""
+        if self._free.locked() and self._waiting >= self._most:
+            raise ProblemError(
+                503, "busy", f"{self._waiting} simulations wait already, the most that may; try again in some seconds"
+            )
+        self._waiting += 1
+        try:
+            await self._free.acquire()
+        finally:
+            self._waiting -= 1
+
+    def give_back(self) -> None:
+        """Let the next one in."""
+        self._free.release()
