@@ -24,6 +24,7 @@ from sqlalchemy import Engine, create_engine, event
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool, StaticPool
 
+from service import fail_points
 from service.access import OwnSession
 
 FILE_NAME = "wingfit.sqlite3"
@@ -108,6 +109,8 @@ class Database:
                 raise DatabaseClosedError("the service is stopping")
             with OwnSession(self._writer, expire_on_commit=False) as session, session.begin():
                 yield session
+                fail_points.passing("commit")
+            fail_points.passing("committed")
 
     @contextmanager
     def read(self) -> Iterator[Session]:

@@ -21,6 +21,7 @@ from prometheus_client.registry import Collector
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service import fail_points
 from service.settings import LogFormat
 
 LOG = logging.getLogger("wingfit.access")
@@ -94,6 +95,7 @@ class Observer:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
+                fail_points.passing("answer")
                 MutableHeaders(scope=message)[REQUEST_ID] = request
             await send(message)
 

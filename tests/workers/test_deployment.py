@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.workers.nodes import REPOSITORY
+from benchmarks.ray_nodes import REPOSITORY
 
 # Head, object manager and node manager (by convention), client, dashboard, its agents, and the range of workers.
 RAY_PORTS = {6379, 8076, 8077, 8265, 10001, 52365, *range(10002, 20000)}

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.ray_nodes import REPOSITORY, Node, environment, free_port
 from tests.workers import pendulum
 from tests.workers.driver import ANSWER, digest
-from tests.workers.nodes import REPOSITORY, Node, environment, free_port
 from workers import make_evaluator
 
 START_SECONDS = 90.0

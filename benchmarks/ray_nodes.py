@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-REPOSITORY = Path(__file__).parents[2]
+REPOSITORY = Path(__file__).parents[1]
 MARK = "WINGFIT_TEST_NODE"
 # A dead node is noticed after about three seconds instead of Ray's fifteen or so.
 IMPATIENT = {
@@ -38,6 +38,8 @@ def environment(token: Path, **more: str) -> dict[str, str]:
 
 
 class Process(NamedTuple):
+    """One of this machine."""
+
     name: str
     state: str
     parent: int
@@ -75,13 +77,14 @@ class Node:
         ]  # fmt: skip
         self.log = log
         with log.open("w") as out:
-            self._process = subprocess.Popen(
+            self._process = subprocess.Popen(  # noqa: S603  # our own words
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True,
                 env=environment(token, **{MARK: self.mark}, **IMPATIENT),
             )  # fmt: skip
 
     @property
     def running(self) -> bool:
+        """Whether ``ray start`` lives."""
         return self._process.poll() is None
 
     def pids(self) -> dict[int, str]:
@@ -97,6 +100,7 @@ class Node:
         return {pid: everyone[pid].name for pid in found if everyone[pid].state != "Z"}
 
     def raylet(self) -> int | None:
+        """Its scheduler."""
         return next((pid for pid, name in self.pids().items() if name == "raylet"), None)
 
     def kill(self) -> None:
@@ -111,8 +115,10 @@ class Node:
             everyone = _processes()
             victims = {p: n for p, n in victims.items() if p in everyone and everyone[p].state != "Z"} | self.pids()
         self._process.wait(10.0)
-        assert not victims
+        if victims:
+            raise RuntimeError(f"processes of a Ray node do not die: {victims}")
 
     def remove(self) -> None:
+        """Kill it, and remove what it wrote."""
         self.kill()
         self.folder.cleanup()

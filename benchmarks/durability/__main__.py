@@ -1,0 +1,231 @@
+"""``python -m benchmarks.durability --json``: deaths of the server, of workers, of nodes and of all at once.
+
+Visitors upload, submit, watch, pause, resume and cancel meanwhile, and note every answer. In the end all that was
+acknowledged must be there, every run must have ended as an undisturbed one does, and the database must be whole.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import sqlite3
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+
+from benchmarks import machine
+from benchmarks.durability.ledger import Ledger
+from benchmarks.durability.visitors import FINAL, Visitor, outcome, settle
+from benchmarks.durability.works import WORKS, archive
+from benchmarks.durability.world import Cluster, Server
+from service.database import FILE_NAME
+
+Json = dict[str, Any]
+KILLS = {"server": 300, "workers": 60, "nodes": 20, "stack": 20}
+VISITORS = 2
+LONGEST_LIFE = 2.5  # s
+PLACES = ("commit", "committed", "answer")
+QUIET_SECONDS = 600.0
+EVALUATORS = {"server": "in_process", "workers": "processes", "nodes": "ray", "stack": "ray"}
+
+
+def main() -> None:
+    """Run all kinds of deaths, and print one JSON object as the last line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.durability", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
+    parser.add_argument("--kills", type=int, default=KILLS["server"], help="of the server; of the others in proportion")
+    parser.add_argument("--only", choices=sorted(KILLS), help="one kind of death")
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    began, part = time.monotonic(), asked.kills / KILLS["server"]
+    kinds = [asked.only] if asked.only else list(KILLS)
+    with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
+        expected = undisturbed(Path(scratch) / "undisturbed")
+        found = {
+            kind: season(kind, max(1, round(part * KILLS[kind])), asked.seed, Path(scratch) / kind, expected)
+            for kind in kinds
+        }
+    results, identical = (sum(one[name] for one in found.values()) for name in ("results", "identical"))
+    told = {
+        "kills": {kind: one["kills"] for kind, one in found.items()},
+        "lost": sum(len(one["lost"]) for one in found.values()),
+        "stuck": sum(one["stuck"] for one in found.values()),
+        "integrity": "ok" if all(one["integrity"] == "ok" for one in found.values()) else "damaged",
+        "identical_percent": 100.0 * identical / results if results else 0.0,
+        "by_kind": found,
+        "seconds": round(time.monotonic() - began, 1),
+        "processor": machine.cpu(),
+        "commit": machine.commit(),
+    }
+    print(json.dumps(told))
+    sys.exit(0 if not told["lost"] and not told["stuck"] and told["integrity"] == "ok" and identical == results else 1)
+
+
+def undisturbed(folder: Path) -> dict[str, Json]:
+    """How each work ends where nothing dies."""
+    folder.mkdir()
+    server, ends = Server(folder, "in_process"), {}
+    server.start()
+    with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
+        uploaded = {
+            example: http.post("/v1/datasets", files={"file": (f"{example}.zip", archive(example))}).json()["id"]
+            for example in {work.example for work in WORKS}
+        }
+        for work in WORKS:
+            run = http.post("/v1/runs", json=work.body | {"dataset_id": uploaded[work.example]}).json()["id"]
+            while (now := http.get(f"/v1/runs/{run}").json())["state"] not in FINAL:
+                time.sleep(0.05)
+            if now["state"] != "SUCCEEDED":
+                raise RuntimeError(f"{work.name} {now['state']}: {now['error']}")
+            ends[work.name] = outcome(run, lambda path: http.get(path).json())
+    server.stop()
+    return ends
+
+
+def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
+    """Deaths of one kind under visitors, then quiet, then the reckoning."""
+    folder.mkdir()
+    cluster = Cluster(folder) if EVALUATORS[kind] == "ray" else None
+    server = Server(folder, EVALUATORS[kind], cluster.token if cluster else None, cluster.address if cluster else "")
+    server.start()
+    ledger, rng = Ledger(), np.random.default_rng([seed, kills])
+    visitors = [Visitor(number, seed, server.port, ledger, expected) for number in range(VISITORS)]
+    for visitor in visitors:
+        visitor.start()
+    began = time.monotonic()
+    for number in range(kills):
+        DEATHS[kind](server, cluster, rng)
+        failed = next((visitor.error for visitor in visitors if visitor.error), None)
+        if failed:
+            raise failed
+        _progress(kind, number + 1, kills, began)
+    for visitor in visitors:
+        visitor.leave()
+        visitor.join(60)
+    if server.fail_point:
+        server.kill()
+        server.start()
+    stuck = _quiet(server, ledger, expected)
+    server.stop()
+    if cluster:
+        cluster.kill()
+    return {
+        "kills": kills,
+        "acknowledged": ledger.acknowledged,
+        "runs": len(ledger.runs),
+        "results": ledger.results,
+        "identical": ledger.identical,
+        "different": ledger.different,
+        "lost": ledger.lost,
+        "stuck": stuck,
+        "integrity": _integrity(folder / "data" / FILE_NAME),
+    }
+
+
+# -- deaths -------------------------------------------------------------------------------------------------
+
+
+def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
+    """At any time, or at a commit or an answer, as was settled at its birth; then a new life."""
+    server.died(4 * LONGEST_LIFE if server.fail_point else rng.uniform(0.0, LONGEST_LIFE))
+    server.kill()
+    armed = f"{PLACES[rng.integers(len(PLACES))]}:{rng.integers(1, 60)}"
+    server.start(armed if rng.random() < 0.5 else "")
+
+
+def _of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
+    """Of one that evaluates, while the server lives."""
+    time.sleep(rng.uniform(0.2, LONGEST_LIFE))
+    workers = server.workers()
+    while not workers:
+        time.sleep(0.1)
+        workers = server.workers()
+    with suppress(ProcessLookupError):
+        os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
+
+
+def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
+    """Of the only node that computes; another one joins."""
+    assert cluster is not None  # noqa: S101  # of this kind
+    time.sleep(rng.uniform(1.0, 2 * LONGEST_LIFE))
+    cluster.kill_node()
+    cluster.start_node()
+
+
+def _of_all(server: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
+    """Of server, head and node at once."""
+    assert cluster is not None  # noqa: S101  # of this kind
+    time.sleep(rng.uniform(1.0, 4 * LONGEST_LIFE))
+    server.kill_all()
+    cluster.kill()
+    cluster.start()
+    server.start()
+
+
+DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], None]] = {
+    "server": _of_server,
+    "workers": _of_worker,
+    "nodes": _of_node,
+    "stack": _of_all,
+}
+
+
+# -- the reckoning ------------------------------------------------------------------------------------------
+
+
+def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
+    """Let everything end undisturbed, and judge it; the number of runs that do not end."""
+    with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
+
+        def fetch(path: str) -> Json | None:
+            answer = http.get(path)
+            return dict(answer.json()) if answer.status_code == 200 else None
+
+        deadline, left = time.monotonic() + QUIET_SECONDS, [r for r, k in ledger.runs.items() if k.final is None]
+        while left and time.monotonic() < deadline:
+            for run in list(left):
+                now = fetch(f"/v1/runs/{run}")
+                if now is None:
+                    ledger.lose(f"run {run} is unknown")
+                elif now["state"] == "PAUSED" or now["wish"] == "PAUSE":
+                    http.post(f"/v1/runs/{run}/resume")
+                    continue
+                elif now["state"] in FINAL:
+                    settle(ledger, run, now, fetch, expected)
+                else:
+                    continue
+                left.remove(run)
+            time.sleep(0.2)
+        for run in ledger.runs:
+            items = fetch(f"/v1/runs/{run}/history?limit=10000")
+            ledger.history(run, items["items"] if items else [])
+    return len(left)
+
+
+def _integrity(path: Path) -> str:
+    connection = sqlite3.connect(path)
+    try:
+        (found,) = connection.execute("PRAGMA integrity_check").fetchone()
+        broken = connection.execute("PRAGMA foreign_key_check").fetchall()
+    finally:
+        connection.close()
+    return "ok" if found == "ok" and not broken else f"{found}, {len(broken)} broken references"
+
+
+def _progress(kind: str, done: int, total: int, began: float) -> None:
+    left = (time.monotonic() - began) / done * (total - done)
+    end = "\n" if done == total else ""
+    print(f"\rdeaths of {kind}: {done} of {total}, about {left:.0f} s left   ", end=end, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,176 @@
+"""Those who use a server while it dies: they repeat a request until it is answered, and note what it acknowledged."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import httpx
+import numpy as np
+
+from benchmarks.durability.ledger import KnownRun, Ledger, without_times
+from benchmarks.durability.works import WORKS, Work, archive
+
+Json = dict[str, Any]
+FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
+ACTIVE = 3  # runs of one visitor at a time
+MOST_DATASETS = 3
+WAIT_SECONDS = 0.02
+ANSWERED = frozenset(range(200, 500))
+
+
+class OverError(Exception):
+    """The visit is over."""
+
+
+class Visitor(threading.Thread):
+    """One user with runs of its own, so that what it asked for has an order."""
+
+    def __init__(self, number: int, seed: int, port: int, ledger: Ledger, expected: Mapping[str, Json]) -> None:
+        super().__init__(name=f"visitor-{number}", daemon=True)
+        self._rng, self._ledger, self._expected = np.random.default_rng([seed, number]), ledger, expected
+        self._base, self._over, self._asked = f"http://127.0.0.1:{port}", threading.Event(), 0
+        self._datasets: dict[str, list[str]] = {work.example: [] for work in WORKS}
+        self._mine: list[str] = []
+        self.error: BaseException | None = None
+
+    def leave(self) -> None:
+        """Ask for nothing more."""
+        self._over.set()
+
+    def run(self) -> None:
+        """Visit until told to leave."""
+        try:
+            with httpx.Client(base_url=self._base, timeout=30.0) as self._http:
+                while not self._over.is_set():
+                    self._act()
+                    time.sleep(WAIT_SECONDS)
+        except OverError:
+            pass
+        except BaseException as error:
+            self.error = error
+            raise
+
+    # -- what a visitor does ---------------------------------------------------------------------------------
+
+    def _act(self) -> None:
+        open_ = [run for run in self._mine if self._ledger.runs[run].final is None]
+        if len(open_) < ACTIVE:
+            self._submit(WORKS[self._rng.integers(len(WORKS))])
+            return
+        run = open_[self._rng.integers(len(open_))]
+        acts: list[tuple[Callable[[str], None], float]] = [
+            (self._look, 0.75),
+            (self._pause_and_resume, 0.13),
+            (self._cancel, 0.07),
+            (self._read_dataset, 0.05),
+        ]
+        choice = int(self._rng.choice(len(acts), p=[weight for _, weight in acts]))
+        acts[choice][0](run)
+
+    def _submit(self, work: Work) -> None:
+        dataset = self._dataset(work.example)
+        answer = self._ask("POST", "/v1/runs", json=work.body | {"dataset_id": dataset}, repeated=True)
+        if answer.status_code != 202:
+            raise AssertionError(f"a good run was refused: {answer.text}")
+        run = answer.json()["id"]
+        with self._ledger.lock:
+            self._ledger.runs[run] = KnownRun(work.name)
+        self._mine.append(run)
+        self._ledger.acknowledge()
+
+    def _dataset(self, example: str) -> str:
+        known = self._datasets[example]
+        if len(known) < MOST_DATASETS and (not known or self._rng.random() < 0.1):
+            body = archive(example)
+            answer = self._ask("POST", "/v1/datasets", files={"file": (f"{example}.zip", body)}, repeated=True)
+            if answer.status_code != 201:
+                raise AssertionError(f"a good dataset was refused: {answer.text}")
+            known.append(answer.json()["id"])
+            with self._ledger.lock:
+                self._ledger.datasets[known[-1]] = hashlib.sha256(body).hexdigest()
+            self._ledger.acknowledge()
+        return known[self._rng.integers(len(known))]
+
+    def _look(self, run: str) -> None:
+        now = self._fetch(f"/v1/runs/{run}")
+        if now is None:
+            self._ledger.lose(f"run {run} is unknown")
+            self._ledger.runs[run].final = "LOST"
+            return
+        items = self._fetch(f"/v1/runs/{run}/history?limit=10000")
+        self._ledger.history(run, items["items"] if items else [])
+        if now["state"] in FINAL:
+            settle(self._ledger, run, now, self._fetch, self._expected)
+
+    def _pause_and_resume(self, run: str) -> None:
+        if self._ask("POST", f"/v1/runs/{run}/pause").status_code == 202:
+            self._ledger.acknowledge()
+        for _ in range(int(self._rng.integers(1, 20))):
+            self._look(run)
+        # Of a request that was carried out the answer may be lost: the state says what is left to ask.
+        while (now := self._fetch(f"/v1/runs/{run}")) and (now["state"] == "PAUSED" or now["wish"] == "PAUSE"):
+            if self._ask("POST", f"/v1/runs/{run}/resume").status_code == 202:
+                self._ledger.acknowledge()
+
+    def _cancel(self, run: str) -> None:
+        known = self._ledger.runs[run]
+        known.endings = (*known.endings, "CANCELLED")
+        if self._ask("POST", f"/v1/runs/{run}/cancel").status_code == 202:
+            known.endings = ("CANCELLED",)
+            self._ledger.acknowledge()
+
+    def _read_dataset(self, _run: str) -> None:
+        with self._ledger.lock:
+            known = list(self._ledger.datasets.items())
+        dataset, digest = known[self._rng.integers(len(known))]
+        answer = self._ask("GET", f"/v1/datasets/{dataset}/archive")
+        if answer.status_code != 200 or hashlib.sha256(answer.content).hexdigest() != digest:
+            self._ledger.lose(f"dataset {dataset}: {answer.status_code}, {len(answer.content)} bytes")
+
+    # -- asking until there is an answer ---------------------------------------------------------------------
+
+    def _fetch(self, path: str) -> Json | None:
+        answer = self._ask("GET", path)
+        return dict(answer.json()) if answer.status_code == 200 else None
+
+    def _ask(self, method: str, path: str, *, repeated: bool = False, **more: Any) -> httpx.Response:
+        if repeated:
+            self._asked += 1
+            more["headers"] = {"Idempotency-Key": f"{self.name}-{self._asked}"}
+        while not self._over.is_set():
+            try:
+                answer = self._http.request(method, path, **more)
+                if answer.status_code in ANSWERED:
+                    return answer
+                if answer.status_code not in (502, 503, 504):
+                    self._ledger.lose(f"{method} {path}: {answer.status_code} {answer.text[:300]}")
+            except httpx.TransportError:
+                pass
+            time.sleep(WAIT_SECONDS)
+        raise OverError
+
+
+def settle(
+    ledger: Ledger, run: str, now: Json, fetch: Callable[[str], Json | None], expected: Mapping[str, Json]
+) -> None:
+    """Judge a run that has ended."""
+    known = ledger.runs[run]
+    if now["state"] not in known.endings:
+        ledger.lose(f"run {run} is {now['state']}, must be {' or '.join(known.endings)}: {now['error']}")
+    if now["state"] == "SUCCEEDED":
+        ledger.result(run, outcome(run, fetch), expected[known.work])
+    known.final = now["state"]
+
+
+def outcome(run: str, fetch: Callable[[str], Json | None]) -> Json:
+    """All numbers of a run that has succeeded, without times."""
+    history = fetch(f"/v1/runs/{run}/history?limit=10000") or {"items": []}
+    return {
+        "history": [without_times(item) for item in history["items"]],
+        "genome": fetch(f"/v1/runs/{run}/genome"),
+        "result": fetch(f"/v1/runs/{run}/result"),
+    }

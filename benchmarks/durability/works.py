@@ -1,0 +1,53 @@
+"""What the runs compute: small calibrations of either kind, each with the end that an undisturbed server gives it."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.ray_nodes import REPOSITORY
+
+Json = dict[str, Any]
+EXAMPLES = REPOSITORY / "examples"
+
+
+@dataclass(frozen=True)
+class Work:
+    """A run to submit on the dataset called ``example``."""
+
+    name: str
+    example: str
+    body: Json = field(hash=False)
+
+
+def _search(name: str, seed: int, **more: Any) -> Work:
+    wing = {"division": "4", "population": 8, "max_generations": 10, "stall": 10, "seed": seed}
+    return Work(f"{name} {seed}", "robird", wing | {"recordings": ["vac-0010mbar-lag0-2.0hz"], "mode": "joint"} | more)
+
+
+WORKS = (
+    *(_search("genetic", seed) for seed in (1, 2, 3)),
+    _search("CMA-ES", 4, method="cma_es"),
+    Work("forces, Gauss-Newton", "delfly", {"axes": ["x", "z"]}),
+    Work(
+        "forces, CMA-ES, then Gauss-Newton",
+        "delfly",
+        {"method": "cma_es", "finish": True, "population": 12, "max_generations": 12, "stall": 12, "seed": 5},
+    ),
+)
+
+
+def archive(example: str) -> bytes:
+    """An example's folder as a zip, the same bytes every time."""
+    packed, folder = io.BytesIO(), EXAMPLES / example
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as zipped:
+        for file in sorted(path for path in _files(folder)):
+            zipped.writestr(zipfile.ZipInfo(file.relative_to(folder).as_posix()), file.read_bytes())
+    return packed.getvalue()
+
+
+def _files(folder: Path) -> list[Path]:
+    return [folder / "dataset.yaml", *(folder / "recordings").iterdir()]
