@@ -21,6 +21,7 @@ from alembic.config import Config
 from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool, StaticPool
 
@@ -39,6 +40,12 @@ class DataFolderError(RuntimeError):
 
 class DatabaseClosedError(RuntimeError):
     """The service is stopping; what was not yet stored is computed again after the next start."""
+
+
+def is_full(error: Exception) -> bool:
+    """Whether a write failed for lack of space, or because the disk does not take it: later it may."""
+    text = str(getattr(error, "orig", error))
+    return isinstance(error, OperationalError) and any(sign in text for sign in ("is full", "disk I/O error"))
 
 
 class FolderLock:

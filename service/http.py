@@ -41,7 +41,10 @@ def errors(*statuses: int) -> Responses:
         status: {"description": HTTPStatus(status).phrase, "content": content} for status in (422, *statuses)
     }
     documented["default"] = {
-        "description": "host (400), key (401), scope or origin (403), size (413), internal (500), busy or ending (503)",
+        "description": (
+            "host (400), key (401), scope or origin (403), size (413), internal (500), busy or ending (503), "
+            "disk full (507)"
+        ),
         "content": content,
     }
     return documented

@@ -11,10 +11,11 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
-from service.database import DatabaseClosedError
+from service.database import DatabaseClosedError, is_full
 
 MEDIA_TYPE = "application/problem+json"
 LONGEST_VALUE = 200
@@ -89,6 +90,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(HTTPException, _on_http)
     app.add_exception_handler(RequestValidationError, _on_validation)
     app.add_exception_handler(DatabaseClosedError, _on_closed)
+    app.add_exception_handler(OperationalError, _on_operational)
     app.add_exception_handler(Exception, _on_bug)
 
 
@@ -110,6 +112,14 @@ async def _on_validation(_: Request, error: Exception) -> Response:
 
 async def _on_closed(_: Request, error: Exception) -> Response:
     return response(ProblemError(503, "stopping", str(error)), {"Retry-After": "5"})
+
+
+async def _on_operational(request: Request, error: Exception) -> Response:
+    if not is_full(error):
+        return await _on_bug(request, error)
+    LOG.error("%s %s: %s", request.method, request.url.path, error)
+    detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
+    return response(ProblemError(507, "disk-full", detail), {"Retry-After": "30"})
 
 
 async def _on_bug(request: Request, error: Exception) -> Response:

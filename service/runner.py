@@ -12,15 +12,16 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeVar
 
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from calibration.evaluator import Evaluator
 from service import store
 from service.changes import Changes
-from service.database import Database, DatabaseClosedError
+from service.database import Database, DatabaseClosedError, is_full
 from service.problems import conflict
 from service.remedies import with_remedy
 from service.tables import JobRow
@@ -32,6 +33,10 @@ LOG = logging.getLogger("wingfit.runs")
 LONGEST_ERROR = 1000
 # Calibrations yield to the API when both want a processor.
 NICENESS = 10
+# Between attempts to write on a full disk: the first, the longest.
+ROOM_SECONDS = (0.5, 15.0)
+
+Written = TypeVar("Written")
 
 
 class Known(NamedTuple):
@@ -177,23 +182,45 @@ class Runner:
             if self._stopping or not goes_on:
                 return
 
+    def _patiently(self, job: Known, write: Callable[[], Written]) -> Written:
+        """Write, again and again while the disk takes nothing: a job waits for room, and loses nothing."""
+        waited = 0.0
+        while True:
+            try:
+                return write()
+            except OperationalError as error:
+                if not is_full(error) or self._stopping:
+                    raise
+                LOG.error("%s waits: the disk is full or fails (%s)", job, error.orig)
+            pause = min(ROOM_SECONDS[0] + waited, ROOM_SECONDS[1])
+            waited += pause
+            time.sleep(pause)
+
     def _start(self, job: Known) -> tuple[JobRow, Points]:
-        with self._database.write() as session:
-            row = job.work.row(session, job.id)
-            instructions = _step(row, jobs.Start())
-            points = job.work.begin(session, row)
+        def write() -> tuple[JobRow, Points, tuple[Instruction, ...]]:
+            with self._database.write() as session:
+                row = job.work.row(session, job.id)
+                instructions = _step(row, jobs.Start())
+                return row, job.work.begin(session, row), instructions
+
+        row, points, instructions = self._patiently(job, write)
         self._obey(job, instructions)
         return row, points
 
     def _store(self, job: Known, step: Step, points: Points) -> bool:
         """One step with all that it found, in one transaction; whether the job goes on."""
         eta = jobs.eta_seconds(points)
-        with self._database.write() as session:
-            row = job.work.row(session, job.id)
-            instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress))
-            row.elapsed_seconds = points[-1][0]
-            if not step.last or row.state == jobs.State.SUCCEEDED:
-                step.keep(session, row, eta)
+
+        def write() -> tuple[Instruction, ...]:
+            with self._database.write() as session:
+                row = job.work.row(session, job.id)
+                instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress))
+                row.elapsed_seconds = points[-1][0]
+                if not step.last or row.state == jobs.State.SUCCEEDED:
+                    step.keep(session, row, eta)
+            return instructions
+
+        instructions = self._patiently(job, write)
         self._obey(job, (*instructions, Instruction.PUBLISH))
         return Instruction.STOP not in instructions
 
@@ -205,12 +232,14 @@ class Runner:
         self._end(job, jobs.Fail(_failure(job, error)))
 
     def _end(self, job: Known, event: jobs.Fail) -> None:
-        try:
+        def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
-                instructions = _step(job.work.row(session, job.id), event)
-            self._obey(job, instructions)
+                return _step(job.work.row(session, job.id), event)
+
+        try:
+            self._obey(job, self._patiently(job, write))
         except Exception as late:
-            # A full disk, say: the job stays as stored and goes on at the next start of the service.
+            # The job stays as stored and goes on at the next start of the service.
             LOG.error("%s: end not stored (%s)", job, late)
 
 
