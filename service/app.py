@@ -9,14 +9,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import Depends, FastAPI, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
-from service import problems
+from service import http, problems
 from service.database import Database
 from service.diagnoser import Diagnoser
 from service.engine import Engine
@@ -75,6 +75,7 @@ def create_app(
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
+        dependencies=[Depends(http.refuse_unknown_query)],
     )
     problems.install(app)
     for router in ROUTERS:
@@ -97,6 +98,8 @@ async def _nothing_here(request: Request) -> Response:
         scope["method"] = method
         if any(route.matches(scope)[0] is Match.FULL for router in ROUTERS for route in router.routes):
             found.add(method)
+    if "GET" in found and not request.url.path.endswith("/events"):
+        found.add("HEAD")
     if not found:
         raise HTTPException(404, f"there is nothing at {request.url.path[:200]}; /docs lists the calls")
     allow = ", ".join(sorted(found))

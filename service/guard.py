@@ -51,6 +51,8 @@ class Guard:
         if refusal:
             await response(refusal)(scope, receive, guarded)
             return
+        if scope["method"] == "HEAD" and not scope["path"].endswith("/events"):  # which would never end
+            scope, guarded = {**scope, "method": "GET"}, _without_body(guarded)
         await self.app(scope, _limited(receive, _limit(scope)), guarded)
 
     def _refusal(self, scope: Scope) -> ProblemError | None:
@@ -106,6 +108,17 @@ def _limited(receive: Receive, limit: int) -> Receive:
         return message
 
     return counted
+
+
+def _without_body(send: Callable[[Message], Awaitable[None]]) -> Callable[[Message], Awaitable[None]]:
+    """Answer a HEAD as a GET is answered, headers and all, without what they describe."""
+
+    async def headed(message: Message) -> None:
+        if message["type"] == "http.response.body":
+            message = {**message, "body": b""}
+        await send(message)
+
+    return headed
 
 
 def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:

@@ -16,6 +16,7 @@ from starlette.responses import JSONResponse, Response
 from service import problems, store
 from service.access import CALLER
 from service.database import Database
+from service.problems import error_item, invalid
 
 Limit = Annotated[int, Query(ge=1, le=200, description="items on a page")]
 Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the last page")]
@@ -48,6 +49,24 @@ def errors(*statuses: int) -> Responses:
         "content": content,
     }
     return documented
+
+
+async def refuse_unknown_query(request: Request) -> None:
+    """A 422 for a query parameter that the route does not have: a misspelt one would be ignored in silence."""
+    path = getattr(request.scope.get("route"), "path", "")
+    if not request.query_params:
+        return
+    operation = request.app.openapi()["paths"].get(path, {}).get(request.method.lower())
+    if operation is None:
+        return
+    known = {one["name"] for one in operation.get("parameters", ()) if one["in"] == "query"}
+    faults = [
+        error_item(f"query.{name[:200]}", value, f"unknown; known are {', '.join(sorted(known)) or 'none'}")
+        for name, value in request.query_params.multi_items()
+        if name not in known
+    ]
+    if faults:
+        raise invalid("the request has query parameters that do not exist here", faults)
 
 
 def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | None:

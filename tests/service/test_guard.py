@@ -57,9 +57,30 @@ def test_unknown_paths_and_methods_are_told_apart(client: httpx.Client) -> None:
     assert client.get("/v1/nothing").status_code == 404
     assert client.get("/v1/runs/x/y/z").json()["type"] == "urn:wingfit:problem:not-found"
     answer = client.put("/v1/runs")
-    assert (answer.status_code, answer.headers["Allow"]) == (405, "GET, POST")
+    assert (answer.status_code, answer.headers["Allow"]) == (405, "GET, HEAD, POST")
     assert client.get("/../../etc/passwd").status_code == 404
     assert client.get("/%2e%2e/app.py").status_code == 404
+
+
+def test_a_head_is_a_get_without_its_body(api: Api) -> None:
+    run = api.submit(api.upload()["id"])["id"]
+    api.finish(run)
+    for path in ("/", f"/v1/runs/{run}", "/v1/runs", f"/v1/runs/{run}/result", "/v1/runs/run_none"):
+        head, get = api.client.head(path), api.client.get(path)
+        assert (head.status_code, head.content) == (get.status_code, b""), path
+        assert head.headers.get("ETag") == get.headers.get("ETag")
+        assert head.headers["Content-Length"] == get.headers["Content-Length"]
+    assert api.client.head(f"/v1/runs/{run}/events").status_code == 405
+
+
+def test_a_misspelt_query_parameter_is_told(client: httpx.Client) -> None:
+    answer = client.get("/v1/runs", params={"stat": "RUNNING", "limit": 3})
+    assert answer.status_code == 422
+    (fault,) = answer.json()["errors"]
+    assert (fault["where"], fault["value"]) == ("query.stat", "RUNNING")
+    assert "cursor, dataset_id, limit, state" in fault["message"]
+    assert client.get("/v1/health", params={"x": "1"}).status_code == 422
+    assert client.get("/", params={"x": "1"}).status_code == 200
 
 
 def test_plotly_comes_from_here(client: httpx.Client) -> None:
