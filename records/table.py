@@ -83,6 +83,8 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         header = [name.strip() for name in next(reader)]
+        if not header:
+            raise fail(f"{file}, line 1", None, "the line is empty; it must name the columns, 'time_s' first")
         layout = read_layout(header, f"{file}, line 1")
         clean = not _SUSPICIOUS.search(text, text.find("\n"))
         matrix, lines = _rows(reader, header, file, room, None if clean else gap)

@@ -23,10 +23,11 @@ import httpx
 import numpy as np
 
 from benchmarks import machine
+from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
 from benchmarks.durability.visitors import FINAL, Visitor, outcome, settle
 from benchmarks.durability.works import WORKS, archive
-from benchmarks.durability.world import Cluster, Server
+from benchmarks.server_process import Server
 from service.database import FILE_NAME
 
 Json = dict[str, Any]

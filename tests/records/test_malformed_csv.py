@@ -42,6 +42,7 @@ CASES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "truncated": (lambda: {**good_files(), TRACKS: GOOD[:-200]}, [f"{TRACKS}, line 13"], ["cut off"]),
     "empty": (lambda: {**good_files(), TRACKS: b""}, [TRACKS], ["empty", "8 rows"]),
     "blank": (lambda: {**good_files(), TRACKS: b"\n \n"}, [TRACKS], ["empty"]),
+    "empty first line": (lambda: {**good_files(), TRACKS: b"\n" + GOOD}, ["line 1"], ["is empty", "'time_s' first"]),
     "header only": (lambda: {**good_files(), TRACKS: HEADER.encode()}, [TRACKS], ["0 frames", "8 to 200000"]),
     "few frames": (lambda: {**good_files(), TRACKS: b"\n".join(GOOD.splitlines()[:8])}, [TRACKS], ["7 frames"]),
     "column twice": (lambda: with_csv(old="m2_x_m", new="m1_x_m"), ["line 1, column 5"], ["column 2", "keep one"]),

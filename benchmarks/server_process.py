@@ -1,20 +1,19 @@
-"""A server, its workers and its cluster as processes, and the ways in which they die."""
+"""A server as a process of its own, over a data folder, and the ways in which it dies."""
 
 from __future__ import annotations
 
 import os
-import secrets
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
 import httpx
 
-from benchmarks.ray_nodes import REPOSITORY, Node, environment, free_port
+from benchmarks.ray_nodes import REPOSITORY, environment, free_port
 
 START_SECONDS = 120.0
 DIE_SECONDS = 30.0
@@ -23,7 +22,14 @@ DIE_SECONDS = 30.0
 class Server:
     """A server over a data folder, on one port over all its lives."""
 
-    def __init__(self, folder: Path, evaluator: str, token: Path | None = None, ray_address: str = "") -> None:
+    def __init__(
+        self,
+        folder: Path,
+        evaluator: str,
+        token: Path | None = None,
+        ray_address: str = "",
+        settings: Mapping[str, str] | None = None,
+    ) -> None:
         self.folder, self.port = folder, free_port()
         base = environment(token) if token else dict(os.environ)
         self._environment = base | {
@@ -32,6 +38,7 @@ class Server:
             "WINGFIT_EVALUATOR": evaluator,
             "WINGFIT_WORKERS": "2",
             "OMP_NUM_THREADS": "1",
+            **(settings or {}),
         }
         if ray_address:
             self._environment["WINGFIT_RAY_ADDRESS"] = ray_address
@@ -65,6 +72,11 @@ class Server:
         with suppress(httpx.TransportError):
             return httpx.get(f"http://127.0.0.1:{self.port}/v1/health", timeout=5.0).status_code == 200
         return False
+
+    def peak_mb(self) -> float:
+        """Most memory that the server itself has held."""
+        lines = (Path("/proc") / str(self.pid) / "status").read_text().splitlines()
+        return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024
 
     def tail(self) -> str:
         """The end of its log."""
@@ -114,48 +126,6 @@ class Server:
             self.kill()
 
 
-class Cluster:
-    """A Ray head without processors and one node that computes, as Compose starts them."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.token, self._lives = folder, folder / "token", 0
-        self.token.touch(mode=0o600)
-        self.token.write_text(secrets.token_hex(32))
-        self.port = free_port()
-        self.start()
-
-    @property
-    def address(self) -> str:
-        """Of the head."""
-        return f"127.0.0.1:{self.port}"
-
-    def start(self) -> None:
-        """Start both."""
-        self._lives += 1
-        log = self.folder / f"head-{self._lives}.log"
-        self.head = Node(
-            self.token, log, "--head", "--node-ip-address=127.0.0.1", f"--port={self.port}", "--include-dashboard=false"
-        )
-        _until(lambda: "Ray runtime started" in log.read_text(errors="replace"), log)
-        self.start_node()
-
-    def start_node(self) -> None:
-        """Start the one that computes."""
-        self._lives += 1
-        log = self.folder / f"node-{self._lives}.log"
-        self.node = Node(self.token, log, f"--address={self.address}")
-        _until(lambda: "Ray runtime started" in log.read_text(errors="replace"), log)
-
-    def kill_node(self) -> None:
-        """Pull its plug."""
-        self.node.remove()
-
-    def kill(self) -> None:
-        """Pull the plug of both."""
-        for node in (self.node, self.head):
-            node.remove()
-
-
 def descendants(pid: int) -> list[int]:
     """Living processes that ``pid`` started, and that these did."""
     children: dict[int, list[int]] = {}
@@ -179,12 +149,3 @@ def _commands(pids: list[int]) -> Iterator[tuple[int, str]]:
 
 def _evaluates(command: str) -> bool:
     return "spawn_main" in command or command.startswith("ray::")
-
-
-def _until(what: object, log: Path) -> None:
-    assert callable(what)  # noqa: S101  # for the type checker
-    deadline = time.monotonic() + START_SECONDS
-    while not what():
-        if time.monotonic() > deadline:
-            raise RuntimeError(f"Ray does not start: {log.read_text(errors='replace')[-2000:]}")
-        time.sleep(0.1)

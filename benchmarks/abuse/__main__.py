@@ -1,0 +1,154 @@
+"""``python -m benchmarks.abuse --json``: a server under malformed and hostile requests, then under a fuzzer.
+
+A request that must be refused is answered with 4xx in the form of a problem, and none with 5xx; the server lives on
+and answers good requests in between; its memory stays bounded.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import socket
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from benchmarks import machine
+from benchmarks.abuse import requests, uploads
+from benchmarks.abuse.cases import Case
+from benchmarks.durability.works import archive
+from benchmarks.server_process import Server
+
+Json = dict[str, Any]
+ENOUGH_MB = 1024.0
+RAW_SECONDS = 0.5
+WORKING = {"WINGFIT_MAX_ACTIVE": "100000", "WINGFIT_MAX_RUNS": "1"}
+
+
+def main() -> None:
+    """Send everything, and print one JSON object as the last line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
+        server = Server(Path(scratch), "in_process", settings=WORKING)
+        server.start()
+        try:
+            told = abused(server, [*uploads.cases(asked.seed), *requests.cases()])
+            told["peak_rss_mb"] = round(server.peak_mb(), 1)
+        finally:
+            server.kill()
+    told |= {"seconds": round(time.monotonic() - began, 1), "processor": machine.cpu(), "commit": machine.commit()}
+    print(json.dumps(told))
+    sys.exit(1 if told["server_errors"] or told["failures"] or told["peak_rss_mb"] > ENOUGH_MB else 0)
+
+
+def abused(server: Server, cases: list[Case]) -> Json:
+    """How the server answers ``cases``."""
+    statuses, failures = Counter[int](), list[str]()
+    with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
+        names = _good(http)
+        for number, case in enumerate(cases):
+            status, wrong = _sent(http, server.port, case, names)
+            statuses[status] += 1
+            if wrong:
+                failures.append(f"{case.method} {case.path[:80]}, {case.name}: {wrong}")
+            if number % 100 == 0 or number + 1 == len(cases):
+                _still_well(http, names, failures, case)
+                print(f"\rabused {number + 1} of {len(cases)}  ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    errors = sum(count for status, count in statuses.items() if status >= 500)
+    counted = {str(status): count for status, count in sorted(statuses.items())}
+    return {"cases": len(cases), "server_errors": errors, "failures": failures, "statuses": counted}
+
+
+def _good(http: httpx.Client) -> dict[str, str]:
+    """Good datasets of either kind, and a run on each that has ended."""
+    dataset = http.post("/v1/datasets", files={"file": ("good.zip", uploads.small_archive())}).json()
+    forces = http.post("/v1/datasets", files={"file": ("good.zip", archive("delfly"))}).json()
+    search = {"division": "4", "population": 8, "max_generations": 1, "mode": "joint"}
+    return {
+        "{dataset}": dataset["id"],
+        "{forces}": forces["id"],
+        "{recording}": dataset["recordings"][0]["name"],
+        "{run}": _ended(http, {"dataset_id": dataset["id"]} | search),
+        "{run of forces}": _ended(http, {"dataset_id": forces["id"]}),
+    }
+
+
+def _ended(http: httpx.Client, body: Json) -> str:
+    run = str(http.post("/v1/runs", json=body).json()["id"])
+    while (now := http.get(f"/v1/runs/{run}").json())["state"] != "SUCCEEDED":
+        if now["state"] == "FAILED":
+            raise RuntimeError(now["error"])
+        time.sleep(0.05)
+    return run
+
+
+def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, str]:
+    """Its status (0 where a bare socket got none), and what is wrong with the answer."""
+    if case.raw:
+        return _raw(port, case.raw), ""
+    path, more = case.path, dict(case.more)
+    for name, value in names.items():
+        path = path.replace(name, value)
+        if isinstance(more.get("content"), bytes):
+            more["content"] = more["content"].replace(name.encode(), value.encode())
+    try:
+        answer = http.request(case.method, path, **more)
+    except (httpx.InvalidURL, httpx.LocalProtocolError, UnicodeError):
+        return 0, ""  # nothing that a client of HTTP can send
+    except httpx.TransportError as error:
+        return 0, f"no answer: {error!r}"
+    return answer.status_code, _wrong(case, answer)
+
+
+def _wrong(case: Case, answer: httpx.Response) -> str:
+    status = answer.status_code
+    if status >= 500:
+        return f"{status} {answer.text[:300]}"
+    if status < 400:
+        return f"{status}, though it must be refused" if case.answer == "refused" else ""
+    if case.answer == "accepted":
+        return f"{status}, though it is good: {answer.text[:300]}"
+    if answer.headers.get("Content-Type") != "application/problem+json":
+        return f"{status} {answer.headers.get('Content-Type')}: {answer.text[:100]}"
+    text = answer.text
+    return "a stack trace in the answer" if "Traceback" in text or '.py", line' in text else ""
+
+
+def _raw(port: int, data: bytes) -> int:
+    with socket.create_connection(("127.0.0.1", port), timeout=RAW_SECONDS) as bare, suppress(OSError):
+        bare.sendall(data)
+        first = bare.recv(4096)
+        words = first.split(b" ")
+        if len(words) > 1 and words[1].isdigit():
+            return int(words[1])
+    return 0
+
+
+def _still_well(http: httpx.Client, names: Json, failures: list[str], after: Case) -> None:
+    answer = http.get(f"/v1/runs/{names['{run}']}")
+    if answer.status_code != 200:
+        failures.append(f"after {after.name}: a good request is answered with {answer.status_code}")
+    _cancel(http, (one["id"] for one in http.get("/v1/runs?state=QUEUED&limit=200").json()["items"]), "runs")
+    _cancel(http, (one["id"] for one in http.get("/v1/diagnoses?state=QUEUED&limit=200").json()["items"]), "diagnoses")
+
+
+def _cancel(http: httpx.Client, ids: Iterable[str], kind: str) -> None:
+    """What was accepted need not be computed."""
+    for one in ids:
+        http.post(f"/v1/{kind}/{one}/cancel")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""One malformed or hostile request."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class Case:
+    """A request that must be refused, or do no harm.
+
+    Attributes:
+        name: what is wrong with it.
+        method: of HTTP.
+        path: with its query; ``{dataset}``, ``{run}`` and ``{recording}`` stand for good ones.
+        more: arguments of the HTTP client.
+        raw: bytes to send on a bare socket instead.
+        answer: that it must be refused, may be, or must not be.
+    """
+
+    name: str
+    method: str = "POST"
+    path: str = "/v1/datasets"
+    more: Mapping[str, Any] = field(default_factory=dict)
+    raw: bytes = b""
+    answer: Literal["refused", "any", "accepted"] = "refused"
+
+
+def upload(name: str, data: bytes, filename: str = "hostile.zip", **more: Any) -> Case:
+    """An upload of ``data``."""
+    return Case(f"upload: {name}", more={"files": {"file": (filename, data)}}, **more)

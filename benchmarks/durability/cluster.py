@@ -1,0 +1,62 @@
+"""A Ray cluster as Compose starts it, and its deaths."""
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.ray_nodes import Node, free_port
+
+START_SECONDS = 120.0
+
+
+class Cluster:
+    """A Ray head without processors and one node that computes, as Compose starts them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.token, self._lives = folder, folder / "token", 0
+        self.token.touch(mode=0o600)
+        self.token.write_text(secrets.token_hex(32))
+        self.port = free_port()
+        self.start()
+
+    @property
+    def address(self) -> str:
+        """Of the head."""
+        return f"127.0.0.1:{self.port}"
+
+    def start(self) -> None:
+        """Start both."""
+        self._lives += 1
+        log = self.folder / f"head-{self._lives}.log"
+        self.head = Node(
+            self.token, log, "--head", "--node-ip-address=127.0.0.1", f"--port={self.port}", "--include-dashboard=false"
+        )
+        _until(lambda: "Ray runtime started" in log.read_text(errors="replace"), log)
+        self.start_node()
+
+    def start_node(self) -> None:
+        """Start the one that computes."""
+        self._lives += 1
+        log = self.folder / f"node-{self._lives}.log"
+        self.node = Node(self.token, log, f"--address={self.address}")
+        _until(lambda: "Ray runtime started" in log.read_text(errors="replace"), log)
+
+    def kill_node(self) -> None:
+        """Pull its plug."""
+        self.node.remove()
+
+    def kill(self) -> None:
+        """Pull the plug of both."""
+        for node in (self.node, self.head):
+            node.remove()
+
+
+def _until(what: Callable[[], bool], log: Path) -> None:
+    deadline = time.monotonic() + START_SECONDS
+    while not what():
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"Ray does not start: {log.read_text(errors='replace')[-2000:]}")
+        time.sleep(0.1)
