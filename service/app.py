@@ -7,7 +7,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 from fastapi import Depends, FastAPI, Request
 from starlette.concurrency import run_in_threadpool
@@ -18,13 +17,13 @@ from starlette.staticfiles import StaticFiles
 
 from service import http, problems
 from service.database import Database
+from service.describing import describe
 from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
 from service.observing import Observer
 from service.routes import backup, datasets, diagnoses, effects, forces, keys, outcomes, runs, system
-from service.schemas import ProblemOut
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
 
@@ -81,7 +80,7 @@ def create_app(
     for router in ROUTERS:
         app.include_router(router)
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
-    _document_problems(app)
+    describe(app)
     _mount_pages(app)
     if settings.keys:
         app.add_middleware(Gate)
@@ -104,20 +103,6 @@ async def _nothing_here(request: Request) -> Response:
         raise HTTPException(404, f"there is nothing at {request.url.path[:200]}; /docs lists the calls")
     allow = ", ".join(sorted(found))
     raise HTTPException(405, f"{request.method} is not possible here; possible: {allow}", {"Allow": allow})
-
-
-def _document_problems(app: FastAPI) -> None:
-    generate = app.openapi
-
-    def openapi() -> dict[str, Any]:
-        specification = generate()
-        schemas = specification.setdefault("components", {}).setdefault("schemas", {})
-        problem = ProblemOut.model_json_schema(ref_template="#/components/schemas/{model}")
-        schemas.update(problem.pop("$defs", {}))
-        schemas["Problem"] = problem
-        return specification
-
-    app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents
 
 
 def _mount_pages(app: FastAPI) -> None:

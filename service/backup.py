@@ -24,7 +24,10 @@ def snapshot(folder: Path) -> Path:
 
     One reading transaction: what is written meanwhile goes on, and is not in the copy.
     """
-    handle, name = mkstemp(SUFFIX, "copy-", folder)
+    try:
+        handle, name = mkstemp(SUFFIX, "copy-", folder)
+    except OSError as error:
+        raise BackupError(f"cannot write into {folder}: {error.strerror}") from error
     os.close(handle)
     target = Path(name)
     try:

@@ -52,6 +52,8 @@ def test_copies_leave_nothing_behind(api: Api, settings: Settings) -> None:
         assert answer.content.startswith(b"SQLite format 3")
         assert int(answer.headers["Content-Length"]) == len(answer.content)
     assert sorted(path.name for path in settings.data.iterdir()) == before
+    with pytest.raises(BackupError, match="cannot write into"):
+        snapshot(settings.data / "gone")
     (settings.data / "copy-left.backup").write_bytes(b"x")
     forget_snapshots(settings.data)
     assert sorted(path.name for path in settings.data.iterdir()) == before

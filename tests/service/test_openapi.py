@@ -53,6 +53,16 @@ def test_every_reference_leads_somewhere(specification: Specification) -> None:
     assert "Problem" in names
 
 
+def test_what_is_made_leads_to_the_calls_on_it(specification: Specification) -> None:
+    by_id = {operation["operationId"]: path for _, path, operation in operations(specification)}
+    links = specification["paths"]["/v1/runs"]["post"]["responses"]["202"]["links"]
+    reached = {by_id[link["operationId"]] for link in links.values()}
+    assert {path for path in by_id.values() if "{run_id}" in path} <= reached
+    of_dataset = specification["paths"]["/v1/datasets"]["post"]["responses"]["201"]["links"]
+    assert of_dataset["Submit a calibration"]["requestBody"] == {"dataset_id": "$response.body#/id"}
+    assert of_dataset["Fetch a dataset"]["parameters"] == {"dataset_id": "$response.body#/id"}
+
+
 def test_every_call_is_in_the_documentation_and_every_documented_one_exists(specification: Specification) -> None:
     text = DOCS.read_text()
     documented = {
