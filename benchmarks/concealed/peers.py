@@ -27,6 +27,7 @@ from calibration.spec import CalibrationSpec, model_for
 from diagnosis.rigs import subject_of
 from diagnosis.subject import Suspect
 from records import Recording, load_dataset
+from sim.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
 
@@ -89,6 +90,8 @@ def gathered(task: Task) -> Material:
     values = {g.name: float(g.from_unit(u)) for g, u in zip(refit.genes, np.clip(unit, 0.0, 1.0), strict=True)}
     suspects = subject_of(dataset, spec).suspects
     there = replace(refit, start={**refit.start, **values})
+    if isinstance(model, FlexibleWing):  # whose periodic motions are found sooner beside one that is known
+        there = replace(there, model=model.beside([there.start[gene.name] for gene in model.genes]))
     names, seen = features(there, suspects, dataset.recordings)
     split = len(residual)
     order = np.concatenate([stacked(fitted), stacked(held_out)])

@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -60,6 +60,11 @@ class Folders:
     def findings(self) -> Path:
         """What the tool said, as JSON."""
         return self.root / "findings"
+
+    @property
+    def peers(self) -> Path:
+        """What the peers made of them, as JSON."""
+        return self.root / "peers"
 
     def answer(self, trial: str) -> Path:
         """Sealed."""
@@ -169,9 +174,30 @@ def _peers(trials: Sequence[Trial], folders: Folders, jobs: int) -> dict[str, li
     """What the peers make of the same datasets."""
     from benchmarks.concealed.peers import run as run_peers  # needs the extra [peers]
 
+    folders.peers.mkdir(exist_ok=True)
+    tasks = [task(trial, trial.name, folders) for trial in trials]
+    kept = {one.trial: found for one in tasks if (found := _kept_of_peers(one, folders)) is not None}
+
+    def keep(found: tuple[PeerOutcome, ...]) -> None:
+        kept[found[0].trial] = found
+        path = folders.peers / f"{found[0].trial}.json"
+        path.with_suffix(".part").write_text(json.dumps([asdict(one) for one in found]), encoding="utf-8")
+        path.with_suffix(".part").replace(path)
+
     with pool(jobs) as executor:
-        found = each(executor, run_peers, [task(trial, trial.name, folders) for trial in trials], "peers")
-    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*found, strict=True)}
+        each(executor, run_peers, [one for one in tasks if one.trial not in kept], "peers", keep)
+    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*(kept[one.trial] for one in tasks), strict=True)}
+
+
+def _kept_of_peers(asked: Task, folders: Folders) -> tuple[PeerOutcome, ...] | None:
+    """What the peers made of the very dataset in an earlier run."""
+    from benchmarks.concealed.peers import PeerOutcome as Outcome
+
+    path = folders.peers / f"{asked.trial}.json"
+    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+        return None
+    stored = json.loads(path.read_text(encoding="utf-8"))
+    return tuple(Outcome(**(one | {"named": tuple(one["named"])})) for one in stored)
 
 
 def _table_of_peer(outcomes: Sequence[PeerOutcome], answers: Mapping[str, Answer]) -> Table:
