@@ -380,8 +380,8 @@ def test_wing_and_vehicle_stand_side_by_side(seen: Seen, api: Api, dataset: dict
     run_id = seen.page.evaluate("location.hash").removeprefix("#run=")
     assert api.run(run_id)["spec"]["division"] == "4"
     api.client.post(f"/v1/runs/{run_id}/cancel")
-    seen.wait("!document.getElementById('tracks-part').hidden")
-    assert "solved to 0.1 mm" in seen.page.inner_text("#run-about")
+    seen.wait("document.getElementById('run-about').innerText.includes('solved to 0.1 mm')")
+    assert seen.page.is_visible("#tracks-part")
     assert not seen.page.is_visible("#forces-part")
     seen.page.evaluate(f"location.hash = 'run={local}'")
     seen.wait(DRAWN.format("beat-0", 3))
