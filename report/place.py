@@ -12,6 +12,7 @@ from report.words import Scale, bounds, capital, listed, number, percent, with_u
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 MOST_HARMONICS = 8
+LEVEL = 1.0  # an interval of a power that holds zero and is narrower says that there is no dependence
 
 
 def place(finding: Finding) -> Markup | None:
@@ -119,11 +120,13 @@ def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
 
 def _scaling(exponents: tuple[Exponent, ...], whose: str) -> str:
     """In words what grows, and how surely."""
-    sure = [
-        e for e in exponents if e.power.low is not None and e.power.high is not None and e.power.low * e.power.high > 0
-    ]
-    if not sure:
+    told = [(e, e.power.low, e.power.high) for e in exponents if e.power.low is not None and e.power.high is not None]
+    sure = [e for e, low, high in told if low * high > 0]
+    level = [e.variable for e, low, high in told if low * high <= 0 and high - low < LEVEL]
+    if not sure and not level:
         return f"How {whose} scales cannot be told from these conditions"
+    if not sure:
+        return f"{capital(whose)} does not depend on " + listed(level, "or")
     return f"{capital(whose)} goes as " + listed(f"{e.variable} to the power {number(e.power.value, 2)}" for e in sure)
 
 
