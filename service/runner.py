@@ -61,8 +61,7 @@ class Runner:
         self._at_once, self._of_one = at_once, of_one or at_once
         self._lock = threading.RLock()
         self._waiting: deque[Known] = deque()
-        self._threads: dict[str, threading.Thread] = {}
-        self._computed: dict[str, Known] = {}
+        self._threads: dict[Known, threading.Thread] = {}
         self._evaluator: Evaluator | None = None
         self._stopping = False
 
@@ -141,9 +140,8 @@ class Runner:
                 if job is None:
                     return
                 self._waiting.remove(job)
-                self._computed[job.id] = job
                 thread = threading.Thread(target=self._work, args=(job, self._evaluator), name=job.id, daemon=True)
-                self._threads[job.id] = thread
+                self._threads[job] = thread
                 thread.start()
 
     def _may_start(self, job: Known) -> bool:
@@ -151,8 +149,8 @@ class Runner:
 
         A job that was paused and resumed waits until its earlier thread has ended.
         """
-        beside = sum(other.owner == job.owner for other in self._computed.values())
-        return job.id not in self._threads and beside < self._of_one
+        beside = sum(other.owner == job.owner for other in self._threads)
+        return job not in self._threads and beside < self._of_one
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
@@ -168,8 +166,7 @@ class Runner:
             self._fail(job, error)
         finally:
             with self._lock:
-                self._threads.pop(job.id, None)
-                self._computed.pop(job.id, None)
+                self._threads.pop(job, None)
             self._dispatch()
 
     def _compute(self, job: Known, evaluator: Evaluator) -> None:

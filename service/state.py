@@ -12,7 +12,7 @@ from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
 from service import store
-from service.access import KeyRing
+from service.access import KeyRing, calling
 from service.backup import forget_snapshots
 from service.calibrating import Calibrating
 from service.changes import Changes
@@ -97,8 +97,8 @@ class Service:
         return ended and closed
 
     def gauges(self) -> Gauges:
-        """Standing of the service as numbers."""
-        with self.database.read() as session:
+        """Standing of the service as numbers, of all owners, whoever asks."""
+        with calling(None), self.database.read() as session:
             jobs: dict[tuple[tuple[str, str], ...], float] = {
                 (("kind", work.what), ("state", state)): float(count)
                 for work in (self.calibrating, self.diagnosing)
@@ -114,8 +114,8 @@ class Service:
         }
 
     def health(self) -> HealthOut:
-        """Standing of the service."""
-        with self.database.read() as session:
+        """Standing of the service, of all owners, whoever asks."""
+        with calling(None), self.database.read() as session:
             active, diagnoses = store.active(session, RunRow), store.active(session, DiagnosisRow)
         return HealthOut(
             status=self._pool.status,

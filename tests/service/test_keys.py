@@ -165,6 +165,16 @@ def test_nobody_sees_what_belongs_to_others(as_: As) -> None:
         assert bob.client.post(f"/v1/{path}", json=body).status_code == 422, path
 
 
+def test_how_busy_the_server_is_does_not_depend_on_who_asks(as_: As, gate: Gate) -> None:
+    ann, bob = as_("ann"), as_("bob")
+    run = ann.submit(ann.upload()["id"])["id"]
+    ann.until(run, lambda now: now["state"] == "RUNNING")
+    assert bob.get("/v1/health")["runs_active"] == 1
+    assert 'wingfit_jobs{kind="run",state="RUNNING"} 1.0' in bob.client.get("/v1/metrics").text
+    gate.let(100)
+    ann.finish(run)
+
+
 def test_a_job_belongs_to_whom_its_dataset_belongs_to(as_: As) -> None:
     ann, admin = as_("ann"), as_("admin")
     dataset = ann.upload()["id"]
