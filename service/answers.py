@@ -62,6 +62,13 @@ class Dataset(TypedDict):
     recordings: list[RecordingInfo]
 
 
+class Checked(TypedDict):
+    """A run as it would be submitted."""
+
+    name: str
+    spec: dict[str, Any]
+
+
 class Run(TypedDict):
     """A calibration run and how far it is."""
 

@@ -107,8 +107,11 @@ class Client(DiagnosisCalls, KeyCalls):
         name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
         peel_width_beats. What is left out takes the server's default.
         """
-        body = {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
-        return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
+        return cast(a.Run, self._json("POST", "/v1/runs", json=_body(dataset_id, spec), key=str(uuid.uuid4())))
+
+    def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
+        """What :meth:`submit_run` would submit, or the error that it would raise; nothing is stored."""
+        return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=_body(dataset_id, spec)))
 
     def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
         """List all runs, newest first, optionally of one dataset or in one state."""
@@ -303,6 +306,10 @@ class Client(DiagnosisCalls, KeyCalls):
             "effects": list(effects),
         } | given(accuracy_mm=accuracy_mm)
         return cast(a.Loads, self._simulated("/v1/loads", body))
+
+
+def _body(dataset_id: str, spec: Mapping[str, Any]) -> dict[str, Any]:
+    return {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
 
 
 def _run(run_id: str) -> str:

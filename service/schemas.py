@@ -201,6 +201,13 @@ class GenerationEvent(HistoryItem):
     eta_seconds: float | None
 
 
+class CheckedOut(BaseModel):
+    """A run as it would be submitted: its name, and its specification with everything decided."""
+
+    name: str
+    spec: SpecOut
+
+
 class GeneOut(BaseModel):
     """One gene, in its ``unit``; shares are normalised."""
 

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
-from starlette.responses import Response
+from starlette.responses import JSONResponse, Response
 
 from calibration.search import CalibrationSpec
 from records import Dataset
 from service import http, spec_views, store, views
 from service.checks import gene_names, unknown_recordings
 from service.problems import ProblemError, error_item, invalid
-from service.schemas import Page, RunOut
+from service.schemas import CheckedOut, Page, RunOut
 from service.spec_schemas import RunIn
 from service.state import Service, ServiceDep
 from service.tables import RunRow
@@ -26,23 +26,32 @@ router = APIRouter(prefix="/v1/runs", tags=["runs"])
     "",
     status_code=202,
     response_model=RunOut,
-    responses={202: {"headers": http.LOCATION}, **http.errors(429)},
+    responses={
+        200: {"model": CheckedOut, "description": "Nothing is wrong with it (validate_only)"},
+        202: {"headers": http.LOCATION},
+        **http.errors(429),
+    },
     summary="Submit a calibration",
 )
-def submit(request: Request, service: ServiceDep, body: RunIn, idempotency_key: http.RepeatKey = None) -> Response:
+def submit(
+    request: Request,
+    service: ServiceDep,
+    body: RunIn,
+    validate_only: Annotated[bool, Query(description="only say whether it would be accepted")] = False,
+    idempotency_key: http.RepeatKey = None,
+) -> Response:
     """Submit a calibration; it is stored when this answers, and computed when its turn comes."""
+    if validate_only:
+        dataset, spec = _asked(service, body)
+        name = body.name or spec_views.run_name(dataset, spec)
+        return JSONResponse(CheckedOut(name=name, spec=spec_views.spec_out(spec)).model_dump(mode="json"))
     # Without defaults, so that an option that a later version adds does not make an earlier request another one.
     again = http.repeat(request, idempotency_key, body.model_dump_json(exclude_defaults=True))
     with service.database.read() as session:
         earlier = store.earlier_answer(session, again)
     if earlier:
         return http.sent(earlier)
-    dataset = load(service, body.dataset_id)
-    spec_views.refuse_foreign(body, dataset)
-    spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
-    spec_views.refuse_effects(body.effects, dataset, body)
-    spec = _checked(service, spec_views.of_run(body), dataset)
-    spec_views.refuse_idle(body, spec.method)
+    dataset, spec = _asked(service, body)
     name = body.name or spec_views.run_name(dataset, spec)
 
     def create(session: Session) -> store.Answer:
@@ -123,6 +132,17 @@ def load(service: Service, dataset_id: str) -> Dataset:
             raise
         message = "there is no such dataset; GET /v1/datasets lists them"
         raise invalid(problem.detail, [error_item("body.dataset_id", dataset_id, message)]) from None
+
+
+def _asked(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
+    """What a request is about and asks for, or a 422."""
+    dataset = load(service, body.dataset_id)
+    spec_views.refuse_foreign(body, dataset)
+    spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
+    spec_views.refuse_effects(body.effects, dataset, body)
+    spec = _checked(service, spec_views.of_run(body), dataset)
+    spec_views.refuse_idle(body, spec.method)
+    return dataset, spec
 
 
 def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:

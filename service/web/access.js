@@ -1,7 +1,8 @@
 // Who is calling: where the server asks for a key, it is given here once and kept in a cookie that no script can read.
 
 import { call, get, postJson } from "./api.js";
-import { $, askKeyInCurl } from "./format.js";
+import { askKeyInCurl } from "./copying.js";
+import { $ } from "./format.js";
 import { showErrors } from "./said.js";
 
 export const isRefused = (error) => error.status === 401;

@@ -1,30 +1,36 @@
-// The page: lists, the selected run (#run=ID) or diagnosis (#diagnosis=ID), the state of the server.
+// The page: lists at the side, the state of the server, and what the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./access.js";
 import { get } from "./api.js";
+import { redrawComparison, setUpCompare, showComparison } from "./compare.js";
+import { redrawDataset, selectDataset, setUpDataset } from "./dataset.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./diagnosis.js";
+import { showEffects } from "./effects.js";
+import { redrawFinding } from "./finding.js";
 import { $, plural, toast } from "./format.js";
+import { refreshListing, setUpListing, showListing } from "./listing.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./lists.js";
 import { redraw, selectRun, setUpRun } from "./run.js";
 import { openSubmit, remove, setUpSubmit } from "./submit.js";
 
 const POLL_MS = 2500;
 const SHOWN = 50;
+const AGAIN_MS = 3000;
+const LISTINGS = ["runs", "diagnoses", "datasets"];
+const PAGES = ["run", "diagnosis", "dataset", "compare", "effects", ...LISTINGS];
+const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets" }; // where a page stands in the menu
 
-let runs = [];
-let diagnoses = [];
-let datasets = [];
+let lists = { runs: [], diagnoses: [], datasets: [] };
 let polling = null;
 
-const current = (kind) => new URLSearchParams(location.hash.slice(1)).get(kind);
-const currentId = () => current("run");
-const currentDiagnosis = () => current("diagnosis");
+const asked = () => new URLSearchParams(location.hash.slice(1));
+const current = (page) => asked().get(page);
 
 function drawLists() {
-  drawRuns(runs, currentId());
-  drawDiagnoses(diagnoses, currentDiagnosis());
-  drawDatasets(datasets, {
-    onRun: (dataset) => openSubmit(datasets, dataset.id),
+  drawRuns(lists.runs, current("run"));
+  drawDiagnoses(lists.diagnoses, current("diagnosis"));
+  drawDatasets(lists.datasets, {
+    onRun: (dataset) => openSubmit(lists.datasets, dataset),
     onDiagnose: (dataset) => startDiagnosis({ dataset_id: dataset.id }),
     onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll(),
   });
@@ -46,12 +52,12 @@ function showHealth(health) {
 async function poll() {
   clearTimeout(polling);
   try {
-    const [health, ...pages] = await Promise.all(
-      [get("health"), ...["runs", "diagnoses", "datasets"].map((kind) => get(`${kind}?limit=${SHOWN}`))]);
-    [runs, diagnoses, datasets] = pages.map((page) => page.items);
+    const [health, ...pages] = await Promise.all([get("health"), ...LISTINGS.map((kind) => get(`${kind}?limit=${SHOWN}`))]);
+    lists = Object.fromEntries(LISTINGS.map((kind, k) => [kind, pages[k].items]));
     setAway(false);
     showHealth(health);
     drawLists();
+    refreshListing(lists);
   } catch (error) {
     if (isRefused(error)) askForKey();
     else if (error.away) setAway(true);
@@ -63,8 +69,28 @@ async function poll() {
 
 async function route() {
   drawLists();
-  if (!currentId() && !currentDiagnosis()) document.title = "wingfit";
-  await Promise.all([selectRun(currentId()), selectDiagnosis(currentDiagnosis())]);
+  const params = asked();
+  const page = PAGES.find((name) => params.has(name)) ?? null;
+  const value = (name) => (page === name ? params.get(name) : null);
+  $("empty").hidden = page !== null;
+  document.body.classList.toggle("home", page === null);
+  document.body.classList.toggle("broad", page === "compare" || LISTINGS.includes(page)); // the lists at the side would say it twice
+  if (!page) document.title = "wingfit";
+  for (const link of document.querySelectorAll(".menu a")) {
+    if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  await Promise.all([
+    selectRun(value("run")), selectDiagnosis(value("diagnosis")), selectDataset(value("dataset")), showEffects(value("effects")),
+    showComparison(value("compare"), { onMissing }), showListing(LISTINGS.includes(page) ? page : null, params),
+  ]);
+}
+
+// The server may be back in a moment; what is unknown stays unknown.
+function onMissing(error, again) {
+  $("empty").hidden = false;
+  toast(error.message);
+  if (error.away) setTimeout(() => { $("empty").hidden = Boolean(location.hash); again(); }, AGAIN_MS);
 }
 
 function go(id, kind = "run") {
@@ -83,36 +109,44 @@ function onDeleted() {
   poll();
 }
 
-setUpRun({
-  currentId,
-  onAway: setAway,
-  onChange(run) {
-    runs = runs.map((other) => (other.id === run.id ? run : other));
-    drawLists();
-  },
-  onDiagnose: (run) => startDiagnosis({ run_id: run.id }),
-  onDeleted,
+// What a page of a job has learnt, for the lists.
+const onChange = (kind) => (job) => {
+  lists = { ...lists, [kind]: lists[kind].map((other) => (other.id === job.id ? job : other)) };
+  drawLists();
+};
+
+function redrawAll() {
+  redraw();
+  redrawFinding();
+  redrawDataset();
+  redrawComparison();
+}
+
+const common = (page) => ({ currentId: () => current(page), onAway: setAway, onDeleted, onMissing });
+setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: (run) => startDiagnosis({ run_id: run.id }) });
+setUpDiagnosis({ ...common("diagnosis"), onChange: onChange("diagnoses") });
+setUpDataset({
+  ...common("dataset"),
+  onRun: (dataset) => openSubmit(lists.datasets, dataset),
+  onDiagnose: (dataset) => startDiagnosis({ dataset_id: dataset.id }),
 });
-setUpDiagnosis({
-  currentId: currentDiagnosis,
-  onAway: setAway,
-  onChange(diagnosis) {
-    diagnoses = diagnoses.map((other) => (other.id === diagnosis.id ? diagnosis : other));
-    drawLists();
-  },
-  onDeleted,
-});
+setUpListing();
+setUpCompare();
 setUpSubmit({
   onSubmitted(run) {
     go(run.id);
     poll();
   },
   onUploaded(dataset) {
-    poll().then(() => openSubmit(datasets, dataset.id));
+    poll().then(() => openSubmit(lists.datasets, dataset));
   },
 });
-$("new-run").addEventListener("click", () => openSubmit(datasets));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+$("skip").addEventListener("click", (event) => {
+  event.preventDefault(); // the address says which page this is
+  $("detail").focus();
+});
+$("new-run").addEventListener("click", () => openSubmit(lists.datasets));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
 if (await setUpAccess()) {
   window.addEventListener("hashchange", route);
   document.addEventListener("visibilitychange", () => document.hidden || poll());

@@ -1,17 +1,20 @@
-// The selected diagnosis: progress, verdict, the report in a frame that may do nothing.
+// The selected diagnosis: progress, verdict, and what was found.
 
 import { call, follow, get, isFinal, part, postJson } from "./api.js";
 import { $, plural, toast, when } from "./format.js";
+import { setUpFinding, showFinding } from "./finding.js";
 import { badge, setBar, timeLeft } from "./lists.js";
 import { randomKey, remove } from "./submit.js";
 import { modelOf, withEffects } from "./words.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};
+let fetched = false;
 let hooks = {};
 
 export function setUpDiagnosis(given) {
   hooks = given;
+  setUpFinding();
   $("diagnosis-actions").addEventListener("click", (event) => {
     const action = event.target.dataset?.action;
     if (action) act(action);
@@ -31,20 +34,16 @@ export async function diagnose(body) {
 export async function selectDiagnosis(id) {
   stopFollowing();
   stopFollowing = () => {};
-  diagnosis = null;
+  [diagnosis, fetched] = [null, false];
   $("diagnosis").hidden = true;
-  $("report").removeAttribute("src");
+  showFinding(null);
   if (!id) return;
-  $("empty").hidden = true;
   try {
     const found = await get(`diagnoses/${part(id)}`);
     if (hooks.currentId() !== id) return;
     diagnosis = found;
   } catch (error) {
-    if (hooks.currentId() !== id) return;
-    $("empty").hidden = false;
-    toast(error.message);
-    if (error.away) setTimeout(() => hooks.currentId() === id && !diagnosis && selectDiagnosis(id), 3000);
+    if (hooks.currentId() === id) hooks.onMissing(error, () => !diagnosis && selectDiagnosis(id));
     return;
   }
   $("diagnosis").hidden = false;
@@ -86,14 +85,26 @@ function update() {
   $("verdict-part").hidden = !done;
   $("verdict").textContent = diagnosis.verdict ?? "";
   $("diagnosis-summary").textContent = diagnosis.summary ?? "";
-  for (const id of ["report-link", "finding-link", "report"]) $(id).hidden = !done;
+  for (const id of ["report-link", "finding-link"]) $(id).hidden = !done;
   $("report-link").href = `${path}/report`;
   $("finding-link").href = `${path}/finding`;
   $("finding-link").download = `${diagnosis.id}.json`;
-  if (done && !$("report").hasAttribute("src")) $("report").src = `${path}/report`;
+  if (done && !fetched) fetchFinding();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
     button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");
     button.disabled = Boolean(diagnosis.wish);
+  }
+}
+
+async function fetchFinding() {
+  const { id } = diagnosis;
+  fetched = true;
+  try {
+    const finding = await get(`diagnoses/${part(id)}/finding`);
+    if (diagnosis?.id === id) showFinding(finding);
+  } catch (error) {
+    if (diagnosis?.id === id) fetched = false;
+    toast(error.message);
   }
 }
 

@@ -78,16 +78,6 @@ export function el(tag, properties = {}, ...children) {
 
 export const $ = (id) => document.getElementById(id);
 
-const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
-
-let keyInCurl = "";
-export const askKeyInCurl = (asked) => { keyInCurl = asked ? ' -H "Authorization: Bearer $WINGFIT_API_KEY"' : ""; };
-
-export function curl(path, body) {
-  const url = new URL(`v1/${path}`, document.baseURI).href;
-  return `curl -X POST ${quote(url)}${keyInCurl} -H 'Content-Type: application/json' -d ${quote(JSON.stringify(body))}`;
-}
-
 let toastTimer = null;
 export function toast(text) {
   const node = $("toast");
@@ -95,13 +85,4 @@ export function toast(text) {
   node.hidden = false;
   clearTimeout(toastTimer);
   toastTimer = setTimeout(() => { node.hidden = true; }, 4000);
-}
-
-export async function copy(text) {
-  try {
-    await navigator.clipboard.writeText(text);
-    toast("Copied");
-  } catch {
-    window.prompt("Copy this:", text);
-  }
 }

@@ -10,6 +10,8 @@ const WORDS = {
 const LOOKS = { RUNNING: "live", SUCCEEDED: "good", FAILED: "bad" };
 const WISHES = { PAUSE: "pausing", CANCEL: "cancelling" };
 
+export const stateWord = (state) => WORDS[state];
+
 export const badge = (run) => el("span", { className: `badge ${LOOKS[run.state] ?? ""}` }, WISHES[run.wish] ?? WORDS[run.state]);
 
 export const runName = (run) => run.name || `${modelOf(run)}, ${run.spec.mode}`;
@@ -17,7 +19,7 @@ export const runName = (run) => run.name || `${modelOf(run)}, ${run.spec.mode}`;
 export function setBar(bar, run) {
   const percent = Math.round(100 * run.progress);
   bar.firstElementChild.style.width = `${percent}%`;
-  bar.setAttribute("aria-valuenow", percent);
+  if (bar.role) bar.setAttribute("aria-valuenow", percent); // those of the lists only repeat what stands beside them
   bar.classList.toggle("ended", isFinal(run) && run.state !== "SUCCEEDED");
 }
 
@@ -54,7 +56,7 @@ export function drawRuns(runs, currentId) {
     if (run.id === currentId) card.setAttribute("aria-current", "true");
     return el("li", { className: run.id === currentId ? "current" : "" }, keyed(card, run.id));
   });
-  replace($("runs"), items.length ? items : [el("li", { className: "none" }, "No runs yet.")]);
+  replace($("newest-runs"), items.length ? items : [el("li", { className: "none" }, "No runs yet.")]);
 }
 
 export function drawDiagnoses(diagnoses, currentId) {
@@ -68,7 +70,7 @@ export function drawDiagnoses(diagnoses, currentId) {
     if (diagnosis.id === currentId) card.setAttribute("aria-current", "true");
     return el("li", { className: diagnosis.id === currentId ? "current" : "" }, keyed(card, diagnosis.id));
   });
-  replace($("diagnoses"), items.length ? items : [el("li", { className: "none" }, "No diagnoses yet.")]);
+  replace($("newest-diagnoses"), items.length ? items : [el("li", { className: "none" }, "No diagnoses yet.")]);
 }
 
 export function drawDatasets(datasets, { onRun, onDiagnose, onDelete }) {
@@ -77,11 +79,11 @@ export function drawDatasets(datasets, { onRun, onDiagnose, onDelete }) {
     const about = `${plural(dataset.recordings.length, "recording")} of ${isForces(dataset) ? "forces" : "markers"}${held ? `, ${held} held out` : ""}`;
     const button = (text, action, key) => keyed(el("button", { type: "button", onclick: () => action(dataset) }, text), `${key}-${dataset.id}`);
     return el("li", {}, el("div", { className: "card" },
-      el("strong", { title: dataset.description }, dataset.name),
+      el("a", { href: `#dataset=${encodeURIComponent(dataset.id)}`, title: dataset.description }, el("strong", {}, dataset.name)),
       el("span", { className: "line" }, el("span", {}, about), el("span", {}, size(dataset.size_bytes))),
       el("div", { className: "buttons" }, button("New run", onRun, "run"), button("Diagnose", onDiagnose, "diagnose"),
         keyed(el("a", { className: "link-button", href: `v1/datasets/${encodeURIComponent(dataset.id)}/archive`, download: "" }, "Download"), `get-${dataset.id}`),
         button("Delete", onDelete, "delete"))));
   });
-  replace($("datasets"), items.length ? items : [el("li", { className: "none" }, "No datasets yet. Upload a zip of a folder with dataset.yaml.")]);
+  replace($("newest-datasets"), items.length ? items : [el("li", { className: "none" }, "No datasets yet. Upload a zip of a folder with dataset.yaml.")]);
 }

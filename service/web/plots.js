@@ -24,7 +24,7 @@ export function theme() {
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return {
     ink: colour("ink"), quiet: colour("quiet"), faint: colour("faint"), line: colour("line"),
-    series: [1, 2, 3, 4].map((k) => colour(`series-${k}`)), accent: colour("accent"), ground: colour("ground"), surface: colour("surface"),
+    series: [1, 2, 3, 4, 5, 6].map((k) => colour(`series-${k}`)), accent: colour("accent"), ground: colour("ground"), surface: colour("surface"),
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("quiet") },
   };
 }
@@ -47,14 +47,14 @@ export const legend = (look) => ({
 
 export const PHASE = { range: [0, 1], dtick: 0.25 };
 
-// Curves [name, y] over the phase of the beat, or with ``dots`` over something else.
-export async function lines(node, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false }) {
+// Curves [name, y] over the phase of the beat, or with ``dots`` over something else; ``first`` is how the first is drawn.
+export async function lines(node, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false, first = null }) {
   const Plotly = await plotly();
   const look = theme();
   const traces = series.map(([name, y], k) => {
     const colour = shades ? look.accent : look.series[k];
     return {
-      x, y, name, type: "scatter", mode: dots ? "lines+markers" : "lines", opacity: shades ? 1 - (0.75 * k) / series.length : 1,
+      x, y, name, type: "scatter", mode: (k === 0 && first) || (dots ? "lines+markers" : "lines"), opacity: shades ? 1 - (0.75 * k) / series.length : 1,
       line: { color: colour, width: 2, simplify: false }, marker: { color: colour, size: 6 }, hovertemplate: `%{y:.3g} ${unit}<extra>${name}</extra>`,
     };
   });

@@ -1,7 +1,8 @@
 // The selected run: progress, figures, tables, actions.
 
 import { call, follow, get, history, isFinal, part } from "./api.js";
-import { $, copy, curl, plural, toast, when } from "./format.js";
+import { copy, curl, python } from "./copying.js";
+import { $, plural, toast, when } from "./format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
 import { aboutHistory, drawHistory } from "./history.js";
 import { badge, runName, setBar, timeLeft } from "./lists.js";
@@ -35,11 +36,12 @@ export function setUpRun(given) {
     if (action) act(action);
   });
   $("diagnose-run").addEventListener("click", () => hooks.onDiagnose(run));
-  $("copy-curl").addEventListener("click", () => {
-    const name = run.name ? { name: run.name } : {};
-    copy(curl("runs", { dataset_id: run.dataset_id, ...request(run), ...name }));
-  });
+  $("copy-curl").addEventListener("click", () => copy(curl("runs", again())));
+  $("copy-python").addEventListener("click", () => copy(python(again())));
 }
+
+// The request that submits this run once more.
+const again = () => ({ dataset_id: run.dataset_id, ...request(run), ...(run.name ? { name: run.name } : {}) });
 
 export async function selectRun(id) {
   stopFollowing();
@@ -48,7 +50,6 @@ export async function selectRun(id) {
   drawGenes(null);
   drawMisfit(null);
   $("run").hidden = true;
-  $("empty").hidden = Boolean(id);
   if (!id) return;
   try {
     const found = await get(`runs/${part(id)}`);
@@ -58,11 +59,7 @@ export async function selectRun(id) {
     [run, dataset] = [found, its];
     past.forEach((item) => items.set(item.sequence, item));
   } catch (error) {
-    if (hooks.currentId() !== id) return;
-    $("empty").hidden = false;
-    toast(error.message);
-    // The server may be back in a moment; an unknown run stays unknown.
-    if (error.away) setTimeout(() => hooks.currentId() === id && !run && selectRun(id), 3000);
+    if (hooks.currentId() === id) hooks.onMissing(error, () => !run && selectRun(id));
     return;
   }
   $("run").hidden = false;
@@ -158,6 +155,7 @@ function drawHead() {
     plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
   $("run-progress").textContent = parts.filter(Boolean).join(" · ");
   $("diagnose-run").hidden = run.generations === 0;
+  for (const format of ["csv", "netcdf", "json"]) $(`export-${format}`).href = `v1/runs/${part(run.id)}/export?format=${format}`;
   for (const button of $("actions").querySelectorAll("[data-action]")) {
     button.hidden = !ALLOWED[button.dataset.action].includes(run.state);
     button.disabled = Boolean(run.wish);

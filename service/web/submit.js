@@ -1,13 +1,18 @@
 // Starting a run and uploading a dataset; the server checks, and its words are shown where they belong.
 
 import { ApiError, call, get, part, postJson } from "./api.js";
-import { $, copy, curl, el, size, toast } from "./format.js";
+import { copy, curl, python } from "./copying.js";
+import { $, el, size, toast } from "./format.js";
 import { showErrors } from "./said.js";
-import { isForces, METHODS, MODES, PRESETS, spoken } from "./words.js";
+import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "./words.js";
+
+const TYPED_MS = 350;
 
 let datasets = [];
 let models = null;
 let effects = null;
+let typing = null;
+let checked = 0;
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");
@@ -21,6 +26,8 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
     const text = JSON.stringify(body);
     if (sent?.text !== text) sent = { text, key: randomKey() };
     showErrors(form, $("submit-errors"), null);
+    clearTimeout(typing);
+    checked += 1; // an answer that is still on its way is about something else
     button.disabled = true;
     try {
       const run = await postJson("runs", body, { "Idempotency-Key": sent.key });
@@ -36,25 +43,46 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   form.dataset_id.addEventListener("change", () => suit(form));
   form.method.addEventListener("change", () => suitMethod(form));
   form.preset.addEventListener("change", () => suitPreset(form));
-  $("effects").addEventListener("change", sayEffects);
+  $("effect-choices").addEventListener("change", sayEffects);
   $("submit-close").addEventListener("click", () => $("submit-dialog").close());
+  form.addEventListener("input", () => {
+    clearTimeout(typing);
+    typing = setTimeout(() => check(form), TYPED_MS);
+  });
   $("submit-curl").addEventListener("click", () => copy(curl("runs", values(form))));
+  $("submit-python").addEventListener("click", () => copy(python(values(form))));
   $("pick-file").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-export function openSubmit(known, datasetId) {
-  datasets = known;
+// With ``dataset`` chosen, which may be older than those that are listed.
+export function openSubmit(known, dataset = known[0]) {
+  datasets = known.some((one) => one.id === dataset?.id) || !dataset ? known : [dataset, ...known];
   if (!datasets.length) {
     toast("Upload a dataset first");
     return;
   }
   const form = $("submit-form");
-  form.dataset_id.replaceChildren(...datasets.map((dataset) => new Option(dataset.name, dataset.id)));
-  form.dataset_id.value = datasetId ?? datasets[0].id;
+  form.dataset_id.replaceChildren(...datasets.map((one) => new Option(one.name, one.id)));
+  form.dataset_id.value = dataset.id;
   showErrors(form, $("submit-errors"), null);
-  suit(form);
+  suit(form).then(() => check(form));
   $("submit-dialog").showModal();
+}
+
+// What the server would say to the form as it stands; nothing is submitted.
+async function check(form) {
+  const mine = ++checked;
+  try {
+    const { name, spec } = await postJson("runs?validate_only=true", values(form));
+    if (mine !== checked) return;
+    showErrors(form, $("submit-errors"), null);
+    $("submit-said").textContent = `Would run as “${name}”: ${setup({ kind: chosenDataset(form).kind, spec }).join(" · ")}`;
+  } catch (error) {
+    if (mine !== checked) return;
+    $("submit-said").textContent = "";
+    showErrors(form, $("submit-errors"), error);
+  }
 }
 
 // crypto.randomUUID exists only in secure contexts, and a page on a private network is none.
@@ -65,7 +93,7 @@ function values(form) {
   const forces = isForces(chosenDataset(form));
   if (forces) Object.assign(body, { preset: form.preset.value, without: unticked("terms"), axes: ticked("axes") });
   else body.division = form.division.value;
-  if (ticked("effects").length) body.effects = ticked("effects");
+  if (ticked("effect-choices").length) body.effects = ticked("effect-choices");
   if (searches(form)) body.finish = form.finish.checked;
   // What is not a number goes to the server as it was typed: it knows what to say about it.
   for (const name of numbers(form, forces)) if (form[name].value !== "") body[name] = Number(form[name].value);
@@ -119,7 +147,7 @@ async function suitEffects(form, rig) {
   }
   const fitting = effects.filter((effect) => effect.applies_to.includes(rig));
   const families = [...new Set(fitting.map((effect) => effect.family))];
-  $("effects").replaceChildren(...families.map((family) => el("div", { className: "family" },
+  $("effect-choices").replaceChildren(...families.map((family) => el("div", { className: "family" },
     el("p", { className: "quiet" }, family),
     ...fitting.filter((effect) => effect.family === family).map((effect) => tick(effect.name, effect.title, false, effect.signature)))));
   $("effects-part").hidden = !fitting.length;
@@ -127,8 +155,8 @@ async function suitEffects(form, rig) {
 }
 
 function sayEffects() {
-  const count = ticked("effects").length;
-  $("effects-summary").textContent = count ? `Effects: ${ticked("effects").map(spoken).join(", ")}` : "Effects: none included";
+  const count = ticked("effect-choices").length;
+  $("effects-summary").textContent = count ? `Effects: ${ticked("effect-choices").map(spoken).join(", ")}` : "Effects: none included";
 }
 
 function suitPreset(form) {

@@ -71,6 +71,8 @@ export async function drawWing(node, tracks, frame) {
       showlegend: false, line: { color: look.faint, width: 2 } },
     points("recorded", recorded, { size: 4.5, color: look.ink, symbol: "circle-open", line: { width: 1 } }),
     points("simulated", simulated, { size: 3.5, color: look.accent }),
+    // The simulated wing as a surface through its markers, seen from above.
+    { type: "mesh3d", ...coordinates(simulated.filter(isSeen)), delaunayaxis: "z", color: look.accent, opacity: 0.18, hoverinfo: "skip", flatshading: true },
   ];
   const box = (k, range) => ({
     title: { text: AXES[k], font: { size: 11 } }, range, gridcolor: look.line, zeroline: false, showbackground: false,

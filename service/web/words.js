@@ -23,6 +23,8 @@ const SEARCH_ONLY = ["population", "stall", "tolerance", "seed", "finish"];
 
 export const spoken = (name) => name.replaceAll("_", " ");
 
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 export const modelOf = (run) => (isForces(run)
   ? SHORT[run.spec.preset] ?? spoken(run.spec.preset)
   : `${run.spec.division} bodies`);

@@ -64,7 +64,11 @@ class Seen:
         return seen
 
     def open(self, run_id: str | None = None) -> None:
-        self.page.goto(f"{self.base}/" + (f"#run={run_id}" if run_id else ""))
+        self.show(f"run={run_id}" if run_id else "")
+
+    def show(self, address: str) -> None:
+        """Open the page of ``address``, what stands after # in its URL."""
+        self.page.goto(f"{self.base}/" + (f"#{address}" if address else ""))
 
     def data(self, figure: str, trace: int, name: str) -> list[Any]:
         """A coordinate of a trace, as Plotly draws it."""

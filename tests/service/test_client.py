@@ -189,8 +189,12 @@ def test_simulate_names_the_wrong_gene(client: Client, dataset_id: str) -> None:
 
 
 def test_invalid_input_is_told_in_the_servers_words(client: Client, dataset_id: str) -> None:
+    assert client.check_run(dataset_id, seed=3)["spec"]["seed"] == 3
+    with pytest.raises(WingfitError) as refused:
+        client.check_run(dataset_id, seed=-1, population=2)
     with pytest.raises(WingfitError) as error:
         client.submit_run(dataset_id, seed=-1, population=2)
+    assert str(refused.value) == str(error.value)
     assert error.value.status == 422
     assert {item["where"] for item in error.value.errors} == {"body.seed", "body.population"}
     assert "(given: -1)" in str(error.value)

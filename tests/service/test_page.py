@@ -165,9 +165,9 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     assert seen.page.get_attribute("[name=accuracy_mm]", "aria-invalid") == "true"
     seen.page.fill("[name=accuracy_mm]", "0.05")
     seen.page.click("#effects-summary")
-    offered = seen.page.evaluate("[...document.querySelectorAll('#effects input')].map((i) => i.value)")
+    offered = seen.page.evaluate("[...document.querySelectorAll('#effect-choices input')].map((i) => i.value)")
     assert sorted(offered) == sorted(name for name, effect in EFFECTS.items() if effect.applies_to(toy._wing()))
-    seen.page.check("#effects input[value=camera_shift]")
+    seen.page.check("#effect-choices input[value=camera_shift]")
     assert seen.page.inner_text("#effects-summary") == "Effects: camera shift"
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
@@ -194,7 +194,7 @@ def test_upload_accepts_and_refuses(seen: Seen, tmp_path: Path) -> None:
     seen.page.set_input_files("#file", bad)
     seen.wait("document.getElementById('upload-state').textContent.includes('not a toy archive')")
     seen.page.set_input_files("#file", good)
-    seen.wait("document.getElementById('datasets').textContent.includes('from the page')")
+    seen.wait("document.getElementById('newest-datasets').textContent.includes('from the page')")
 
 
 def test_names_are_text_never_markup(seen: Seen, server: ServerProcess) -> None:
@@ -204,7 +204,7 @@ def test_names_are_text_never_markup(seen: Seen, server: ServerProcess) -> None:
     seen.open(run_id)
     seen.wait("document.querySelector('#run-name').textContent.includes('<b id=planted>')")
     assert seen.page.locator("#planted").count() == 0
-    assert seen.page.locator("#datasets img").count() == 0
+    assert seen.page.locator("#newest-datasets img").count() == 0
     assert seen.errors == []
 
 

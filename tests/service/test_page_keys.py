@@ -44,13 +44,13 @@ def test_a_key_is_asked_for_once_kept_from_scripts_and_forgotten(browser: Browse
         seen.errors.clear()  # the browser reports the refusal
         page.fill("#key-form [name=key]", secret)
         page.keyboard.press("Enter")
-        seen.wait("document.querySelector('#datasets').textContent.includes('of ann')")
+        seen.wait("document.querySelector('#newest-datasets').textContent.includes('of ann')")
         assert page.inner_text("#owner") == "ann"
         assert page.evaluate("document.cookie") == ""
         page.reload()
-        seen.wait("document.querySelector('#datasets').textContent.includes('of ann')")
+        seen.wait("document.querySelector('#newest-datasets').textContent.includes('of ann')")
         page.click("#sign-out")
         page.wait_for_selector("#key-dialog[open]")
-        assert "of ann" not in page.inner_text("#datasets")
+        assert "of ann" not in page.inner_text("#newest-datasets")
         assert (seen.errors, seen.foreign) == ([], [])
         page.context.close()

@@ -48,7 +48,18 @@ def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, 
     answer = api.client.post("/v1/runs", json={"dataset_id": dataset} | body)
     assert answer.status_code == 422, answer.text
     assert [error["where"] for error in answer.json()["errors"]] == [where]
+    told = api.client.post("/v1/runs?validate_only=true", json={"dataset_id": dataset} | body)
+    assert (told.status_code, told.json()) == (422, answer.json())
     assert api.get("/v1/runs")["items"] == []
+
+
+def test_a_specification_is_checked_without_a_run(api: Api) -> None:
+    body = {"dataset_id": api.upload()["id"], "seed": 5}
+    answer = api.client.post("/v1/runs?validate_only=true", json=body)
+    assert answer.status_code == 200
+    assert api.get("/v1/runs")["items"] == []
+    run = api.submit(**body, max_generations=answer.json()["spec"]["max_generations"])
+    assert answer.json() == {"name": run["name"], "spec": run["spec"]}
 
 
 @pytest.mark.parametrize("division", ["eleven", "128x1", "4 ", "", "4\n", ",".join(["1"] * 65), "1," * 150 + "1"])

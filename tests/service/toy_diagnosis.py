@@ -15,7 +15,22 @@ from typing import Any
 import numpy as np
 
 from calibration.evaluator import Evaluator
-from diagnosis.finding import Exponent, Finding, Floors, GeneValue, Hypothesis, Interval, Proof, RecordingMisfit, Where
+from diagnosis.finding import (
+    Advice,
+    Exponent,
+    Finding,
+    Floors,
+    GeneValue,
+    Hypothesis,
+    Interval,
+    MarkerMisfit,
+    MissingLoad,
+    Overlay,
+    PhaseMap,
+    Proof,
+    RecordingMisfit,
+    Where,
+)
 from diagnosis.spec import DiagnosisSpec, Progress
 from records import Dataset
 from tests.service.toy import UNLUCKY
@@ -93,15 +108,33 @@ def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:
             "outer 30 % of the span, along z", Interval(0.85, 0.7, 1.0), None, None, "z", (0.1, 0.9),
             (Exponent("flap frequency", Interval(2.0, 1.8, 2.2), 2.0, 4.0, "Hz"),),
         ),
-        markers=(),
-        phase_map=None,
-        missing=(),
+        markers=(
+            MarkerMisfit("1", 0.4, 0.2, 0.02, 0.2, 1e-3, 0.2e-3, 0.25, (0.0, 0.0, 1.0)),
+            MarkerMisfit("2", 0.9, 0.7, 0.08, 0.45, 3e-3, 0.3e-3, 0.5, (0.0, 0.0, 1.0)),
+        ),
+        phase_map=PhaseMap(
+            (0.4, 0.9), (0.0, 0.25, 0.5, 0.75), ((1e-3, 2e-3, 1e-3, 0.0), (2e-3, 4e-3, 2e-3, 1e-3)),
+            ((1e-4,) * 4, (2e-4,) * 4), 1e-4,
+        ),
+        missing=(
+            MissingLoad(
+                "slow", (0.3, 0.8), (0.0, 0.5), ((0.1, -0.1), (0.4, -0.5)), ((0.02, 0.02), (0.03, 0.03)), "N/m"
+            ),
+        ),
         recordings=(RecordingMisfit("slow", False, 3.0, 45.0, 100.0, 0.0, before, after, 0.5e-3),),
         proof=Proof(before, after, 0.5e-3, True, "held-out misfit falls to the floor"),
-        overlays=(),
+        overlays=(
+            Overlay("slow", "2_z", False, (0.5, 0.0, 0.25), (3e-3, 1e-3, 2e-3), (0.0, 0.0, 0.0), (3e-3, 1e-3, 2e-3)),
+        ),
         genes=(GeneValue("hinge_offset.z", "m", "height of the hinge", Interval(4e-3, 3.8e-3, 4.2e-3), 0.0),),
         law=None,
-        advice=(),
+        advice=(
+            Advice(
+                "record at 4 Hz: hinge offset or camera shift would differ by 5 times the noise", 4.0, 45.0, 100.0, 0.0,
+                0.0, 5.0, 0.9, ("hinge_offset", "camera_shift"),
+            ),
+        ),
+        outline=((0.0, 0.0), (0.0, 0.5), (0.1, 0.5), (0.1, 0.0)),
     )  # fmt: skip
 
 

@@ -1,0 +1,142 @@
+// Runs beside each other (#compare=ID,ID): how they were set, how they went, what they found.
+
+import { get, history, part } from "./api.js";
+import { $, DASH, duration, el, significant, toast } from "./format.js";
+import { badge, runName } from "./lists.js";
+import { MOST_COMPARED } from "./listing.js";
+import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
+import { isForces, request, spoken } from "./words.js";
+
+let shown = [];
+let asked = "";
+
+export function setUpCompare() {
+  $("compare-all").addEventListener("change", drawSetup);
+}
+
+export async function showComparison(ids, { onMissing }) {
+  asked = ids ?? "";
+  $("comparison").hidden = true;
+  if (!ids) return;
+  document.title = "Comparison · wingfit";
+  const wanted = [...new Set(ids.split(",").filter(Boolean))].slice(0, MOST_COMPARED);
+  try {
+    const found = await Promise.all(wanted.map(loaded));
+    if (asked !== ids) return;
+    shown = found;
+  } catch (error) {
+    if (asked === ids) onMissing(error, () => showComparison(ids, { onMissing }));
+    return;
+  }
+  $("comparison").hidden = false;
+  drawOutcome();
+  drawSetup();
+  drawRecordings();
+  drawGenes();
+  await redrawComparison();
+}
+
+async function loaded(id) {
+  const run = await get(`runs/${part(id)}`);
+  const dataset = await get(`datasets/${part(run.dataset_id)}`);
+  const past = await history(id);
+  const result = run.state === "SUCCEEDED" ? await get(`runs/${part(id)}/result`) : null;
+  const genome = result ?? (run.generations ? await get(`runs/${part(id)}/genome`) : { genes: [] });
+  return { run, dataset, past, result, genes: genome.genes };
+}
+
+const swatch = (k) => {
+  const mark = el("i", { className: "swatch", ariaHidden: "true" });
+  mark.style.background = `var(--series-${k + 1})`;
+  return mark;
+};
+const heading = ({ run }, k) => el("th", { scope: "col", className: "n" }, swatch(k), runName(run));
+const number = (text) => el("td", { className: "n" }, text);
+const head = (id, ...cells) => $(id).tHead.replaceChildren(el("tr", {}, ...cells));
+const body = (id, rows) => $(id).tBodies[0].replaceChildren(...rows);
+
+// A misfit with its unit: runs on markers and on forces may stand beside each other.
+function misfit(forces, value) {
+  if (value === null || value === undefined) return DASH;
+  return forces ? `${significant(value, 3)} mN` : `${significant(value, 3)} mm`;
+}
+
+function drawOutcome() {
+  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", "Noise floor", "Evaluations", "Computed for"];
+  head("compare-outcome", ...heads.map((text, i) => el("th", { scope: "col", className: i > 2 ? "n" : "" }, text)));
+  body("compare-outcome", shown.map(({ run, dataset, result, past }, k) => {
+    const forces = isForces(run);
+    const of = (key) => number(misfit(forces, result?.[`${key}_${forces ? "mn" : "mm"}`]));
+    return el("tr", {}, el("td", {}, swatch(k), el("a", { href: `#run=${part(run.id)}` }, runName(run))),
+      el("td", {}, el("a", { href: `#dataset=${part(dataset.id)}` }, dataset.name)), el("td", {}, badge(run)),
+      of("before"), result ? of("after") : number(misfit(forces, forces ? run.best_mn : run.best_mm)), of("held_out_before"), of("held_out_after"),
+      forces ? number(DASH) : of("noise"), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
+  }));
+  const datasets = new Set(shown.map(({ dataset }) => dataset.id));
+  $("compare-note").textContent = datasets.size > 1 ? "These runs are fitted to different datasets: their misfits say nothing about each other." : "";
+}
+
+function drawSetup() {
+  const specs = shown.map(({ run }) => ({ ...request(run) }));
+  const names = [...new Set(specs.flatMap(Object.keys))];
+  const text = (value) => {
+    if (value === undefined || value === null) return DASH;
+    return Array.isArray(value) ? value.map((one) => spoken(String(one))).join(", ") || "none" : String(value);
+  };
+  const rows = names.map((name) => ({ name, values: specs.map((spec) => text(spec[name])) }));
+  const told = rows.filter(({ values }) => $("compare-all").checked || new Set(values).size > 1);
+  head("compare-setup", el("th", { scope: "col" }, "Setting"), ...shown.map(heading));
+  body("compare-setup", told.map(({ name, values }) => el("tr", {}, el("th", { scope: "row" }, spoken(name)), ...values.map(number))));
+  $("compare-setup").hidden = !told.length;
+  $("compare-same").hidden = told.length > 0;
+}
+
+function drawRecordings() {
+  const tracked = shown.filter(({ result }) => result?.kind === "tracks");
+  $("compare-recordings-part").hidden = !tracked.length;
+  const names = [...new Set(tracked.flatMap(({ result }) => result.recordings.map((one) => one.name)))];
+  head("compare-recordings", el("th", { scope: "col" }, "Recording"), ...shown.map(heading));
+  body("compare-recordings", names.map((name) => {
+    const values = shown.map(({ result }) => result?.recordings?.find((one) => one.name === name));
+    const best = Math.min(...values.map((one) => one?.after_mm ?? Infinity));
+    return el("tr", {}, el("th", { scope: "row" }, name), ...values.map((one) => el("td", { className: one?.after_mm === best ? "n least" : "n" },
+      misfit(false, one?.after_mm), one?.held_out ? el("small", {}, " held out") : null)));
+  }));
+}
+
+function drawGenes() {
+  const genes = new Map(shown.flatMap((one) => one.genes.map((gene) => [gene.name, gene])));
+  $("compare-genes-part").hidden = !genes.size;
+  head("compare-genes", el("th", { scope: "col" }, "Gene"), el("th", { scope: "col" }, "Unit"), el("th", { scope: "col", className: "n" }, "Nominal"), ...shown.map(heading));
+  body("compare-genes", [...genes.values()].map((gene) => el("tr", {}, el("th", { scope: "row" }, el("abbr", { title: gene.description }, gene.name)),
+    el("td", {}, gene.unit === "1" ? "" : gene.unit), number(significant(gene.nominal)), ...shown.map((one) => geneCell(one.genes.find((own) => own.name === gene.name))))));
+}
+
+function geneCell(gene) {
+  if (!gene) return number(DASH);
+  const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
+  const about = !gene.searched ? " fixed" : gene.identifiable === false ? " not told" : error;
+  return el("td", { className: "n" }, significant(gene.best), el("small", {}, about));
+}
+
+// Best misfit so far over what it cost. Where the stages of a run sum over different recordings its line may rise.
+export async function redrawComparison() {
+  if ($("comparison").hidden) return;
+  try {
+    const Plotly = await plotly();
+    const look = theme();
+    const forces = shown.some(({ run }) => isForces(run));
+    const value = (item) => (forces ? item.best_mn : item.best_mm);
+    const traces = shown.map(({ run, past }, k) => ({
+      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: runName(run), x: past.map((item) => item.evaluations), y: past.map(value),
+      text: past.map((item) => item.stage), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
+    }));
+    await Plotly.react($("compare-plot"), traces, layout(look, {
+      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
+      xaxis: axis(look, { title: { text: "simulated individuals", standoff: 6 }, showgrid: false }),
+      yaxis: axis(look, { type: "log", title: { text: forces ? "RMS difference, mN" : "mean distance per marker, mm", standoff: 6 }, nticks: 6 }),
+    }), CONFIG);
+  } catch (error) {
+    toast(error.message);
+  }
+}

@@ -1,0 +1,45 @@
+// A request as something to paste: a line of curl, a few lines of Python.
+
+import { toast } from "./format.js";
+
+const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
+
+let keyInCurl = "";
+export const askKeyInCurl = (asked) => { keyInCurl = asked ? ' -H "Authorization: Bearer $WINGFIT_API_KEY"' : ""; };
+
+export function curl(path, body) {
+  const url = new URL(`v1/${path}`, document.baseURI).href;
+  return `curl -X POST ${quote(url)}${keyInCurl} -H 'Content-Type: application/json' -d ${quote(JSON.stringify(body))}`;
+}
+
+// What a value of JSON is called in Python.
+function literal(value) {
+  if (value === null) return "None";
+  if (typeof value === "boolean") return value ? "True" : "False";
+  if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
+  if (typeof value === "object") return `{${Object.entries(value).map(([name, one]) => `${JSON.stringify(name)}: ${literal(one)}`).join(", ")}}`;
+  return JSON.stringify(value);
+}
+
+// The client takes the API key from the environment, as the command line does.
+export function python({ dataset_id: dataset, ...spec }) {
+  const server = new URL(".", document.baseURI).href.replace(/\/$/, "");
+  return [
+    "from service.client import Client", "",
+    `with Client(${literal(server)}) as client:`,
+    "    run = client.submit_run(",
+    `        ${literal(dataset)},`,
+    ...Object.entries(spec).map(([name, value]) => `        ${name}=${literal(value)},`),
+    "    )",
+    '    print(client.wait(run["id"])["state"])', "",
+  ].join("\n");
+}
+
+export async function copy(text) {
+  try {
+    await navigator.clipboard.writeText(text);
+    toast("Copied");
+  } catch {
+    window.prompt("Copy this:", text);
+  }
+}

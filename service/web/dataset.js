@@ -1,0 +1,109 @@
+// The selected dataset: what was recorded, under which conditions, and what was made of it.
+
+import { get, part } from "./api.js";
+import { $, el, plural, significant, size, toast, when } from "./format.js";
+import { badge, runName } from "./lists.js";
+import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
+import { remove } from "./submit.js";
+import { isForces, misfit } from "./words.js";
+
+const LISTED = 10;
+const WAYS = [
+  ["phase_lag_deg", "phase lag, deg"], ["pressure_mbar", "pressure, mbar"], ["airspeed_m_s", "airspeed, m/s"],
+  ["angle_of_attack_deg", "angle of attack, deg"],
+];
+
+let dataset = null;
+let hooks = {};
+
+export function setUpDataset(given) {
+  hooks = given;
+  $("dataset-run").addEventListener("click", () => hooks.onRun(dataset));
+  $("dataset-diagnose").addEventListener("click", () => hooks.onDiagnose(dataset));
+  $("dataset-delete").addEventListener("click", async () => {
+    if (await remove("datasets", dataset.id, dataset.name)) hooks.onDeleted();
+  });
+}
+
+export async function selectDataset(id) {
+  dataset = null;
+  $("dataset").hidden = true;
+  if (!id) return;
+  try {
+    const found = await get(`datasets/${part(id)}`);
+    if (hooks.currentId() !== id) return;
+    dataset = found;
+  } catch (error) {
+    if (hooks.currentId() === id) hooks.onMissing(error, () => !dataset && selectDataset(id));
+    return;
+  }
+  $("dataset").hidden = false;
+  drawHead();
+  drawRecordings();
+  await Promise.all([redrawDataset(), listWork(id)]);
+}
+
+function drawHead() {
+  document.title = `${dataset.name} · wingfit`;
+  $("dataset-name").textContent = dataset.name;
+  $("dataset-about").textContent = [isForces(dataset) ? "forces" : plural(dataset.markers, "tracked marker"),
+    plural(dataset.recordings.length, "recording"), size(dataset.size_bytes), when(dataset.created_at)].join(" · ");
+  $("dataset-description").textContent = dataset.description;
+  $("dataset-sha").textContent = `SHA-256 of the archive: ${dataset.sha256}`;
+  $("dataset-archive").href = `v1/datasets/${part(dataset.id)}/archive`;
+}
+
+function drawRecordings() {
+  const forces = isForces(dataset);
+  const heads = ["Recording", "Use", forces ? "Samples" : "Frames", forces ? "Channels" : "Markers", "Missing, %", "Flap, Hz", "Lag, °", "Pressure, mbar",
+    "Temperature, °C", "Airspeed, m/s", "Angle of attack, °"];
+  const text = new Set(["Recording", "Use", "Channels"]);
+  $("recordings").tHead.replaceChildren(el("tr", {}, ...heads.map((head) => el("th", { scope: "col", className: text.has(head) ? "" : "n" }, head))));
+  const number = (value) => el("td", { className: "n" }, significant(value));
+  $("recordings").tBodies[0].replaceChildren(...dataset.recordings.map((one) => el("tr", {},
+    el("td", {}, one.name), el("td", {}, el("span", { className: one.held_out ? "badge held" : "badge" }, one.held_out ? "held out" : "to fit")),
+    number(one.frames), forces ? el("td", {}, one.channels.map((name) => name.replace("force_", "")).join(", ")) : number(one.markers),
+    number(one.missing_percent), number(one.flap_frequency_hz), number(one.phase_lag_deg), number(one.pressure_mbar),
+    number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
+}
+
+// What the recordings cover: flap frequency against the one other condition that varies most.
+export async function redrawDataset() {
+  if (!dataset) return;
+  const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(dataset.recordings.map((one) => one[name])).size }));
+  const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
+  try {
+    const Plotly = await plotly();
+    const look = theme();
+    const dots = (held, label, symbol) => {
+      const those = dataset.recordings.filter((one) => one.held_out === held);
+      return {
+        type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
+        text: those.map((one) => one.name), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
+        hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
+      };
+    };
+    await Plotly.react($("conditions"), [dots(false, "to fit", "circle"), dots(true, "held out", "circle-open")], layout(look, {
+      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
+      xaxis: axis(look, { title: { text: "flap frequency, Hz", standoff: 6 } }), yaxis: axis(look, { title: { text: title, standoff: 6 } }),
+    }), CONFIG);
+  } catch (error) {
+    toast(error.message);
+  }
+}
+
+async function listWork(id) {
+  const show = async (kind, page, text) => {
+    const list = $(`dataset-${kind}`);
+    list.replaceChildren();
+    const found = await get(`${kind}?dataset_id=${part(id)}&limit=${LISTED}`);
+    if (hooks.currentId() !== id) return;
+    const items = found.items.map((job) => el("li", {}, el("a", { href: `#${page}=${part(job.id)}` }, ...text(job))));
+    if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "all of them")));
+    list.replaceChildren(...(items.length ? items : [el("li", { className: "quiet" }, "None yet.")]));
+  };
+  await Promise.all([
+    show("runs", "run", (run) => [runName(run), " ", badge(run), ` ${misfit(run).value} ${misfit(run).unit}`]),
+    show("diagnoses", "diagnosis", (one) => [one.name, " ", badge(one), ` ${one.verdict ?? ""}`]),
+  ]).catch((error) => toast(error.message));
+}

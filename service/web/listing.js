@@ -1,0 +1,164 @@
+// Pages of everything that there is: #runs, #diagnoses, #datasets; newest first, as many as one asks for.
+
+import { get, part } from "./api.js";
+import { $, DASH, el, plural, size, toast, when } from "./format.js";
+import { badge, runName, stateWord, timeLeft } from "./lists.js";
+import { isForces, METHODS, misfit, modelOf, withEffects } from "./words.js";
+
+const SHOWN = 100;
+export const MOST_COMPARED = 6;
+const STATES = ["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"];
+
+const KINDS = {
+  runs: {
+    title: "Runs", page: "run", states: STATES, row: runRow,
+    heads: ["", "Name", "Dataset", "State", "Misfit", "Model", "Method", "Generations", "Submitted"],
+  },
+  diagnoses: {
+    title: "Diagnoses", page: "diagnosis", states: STATES.filter((state) => state !== "PAUSED"), row: diagnosisRow,
+    heads: ["Name", "Dataset", "State", "Verdict", "Model", "Submitted"],
+  },
+  datasets: {
+    title: "Datasets", page: "dataset", row: datasetRow,
+    heads: ["Name", "Kind", "Recordings", "Held out", "Size", "Uploaded"],
+  },
+};
+
+let kind = null;
+let filters = {};
+let items = [];
+let cursor = null;
+let names = new Map();
+let chosen = new Set();
+let request = 0;
+
+const open = (page, id, text) => el("a", { href: `#${page}=${part(id)}` }, text);
+const datasetName = (id) => names.get(id) ?? id;
+
+export function setUpListing() {
+  for (const name of ["state", "dataset"]) $(`listing-${name}`).addEventListener("change", filtered);
+  $("listing-more").addEventListener("click", () => load());
+  $("compare").addEventListener("click", () => { location.hash = `compare=${[...chosen].map(part).join(",")}`; });
+}
+
+// Show the page of ``next`` ("runs", "diagnoses", "datasets"), or none; ``asked`` are the parameters of the address.
+export async function showListing(next, asked) {
+  kind = next;
+  $("listing").hidden = !kind;
+  if (!kind) return;
+  const { title, heads, states } = KINDS[kind];
+  document.title = `${title} · wingfit`;
+  filters = Object.fromEntries(["state", "dataset_id"].filter((name) => states && asked.get(name)).map((name) => [name, asked.get(name)]));
+  [items, cursor, chosen] = [[], null, new Set()];
+  $("listing-title").textContent = title;
+  $("listing-filters").hidden = !states;
+  $("compare").hidden = kind !== "runs";
+  $("listing-table").tHead.replaceChildren(el("tr", {}, ...heads.map((head) =>
+    el("th", { scope: "col" }, head || el("span", { className: "hidden" }, "Compare")))));
+  draw();
+  if (states) await fillFilters(states);
+  await load(true);
+}
+
+// What the lists at the side have just learnt.
+export function refreshListing(fresh) {
+  if (!kind) return;
+  const known = new Map(fresh[kind].map((item) => [item.id, item]));
+  if (!items.some((item) => known.has(item.id) && JSON.stringify(known.get(item.id)) !== JSON.stringify(item))) return;
+  items = items.map((item) => known.get(item.id) ?? item);
+  draw();
+}
+
+async function fillFilters(states) {
+  const mine = kind;
+  try {
+    const page = await get("datasets?limit=200");
+    names = new Map(page.items.map((dataset) => [dataset.id, dataset.name]));
+  } catch { /* the filter offers what is known; the list itself will say what is wrong */ }
+  if (mine !== kind) return;
+  $("listing-state").replaceChildren(new Option("all", ""), ...states.map((state) => new Option(stateWord(state), state)));
+  $("listing-state").value = filters.state ?? "";
+  const known = [...names].map(([id, name]) => new Option(name, id));
+  if (filters.dataset_id && !names.has(filters.dataset_id)) known.push(new Option(filters.dataset_id, filters.dataset_id));
+  $("listing-dataset").replaceChildren(new Option("all", ""), ...known);
+  $("listing-dataset").value = filters.dataset_id ?? "";
+}
+
+function filtered() {
+  const query = new URLSearchParams([["state", $("listing-state").value], ["dataset_id", $("listing-dataset").value]].filter(([, value]) => value));
+  location.hash = [kind, query.toString()].filter(Boolean).join("&");
+}
+
+async function load(first = false) {
+  const mine = ++request;
+  $("listing-note").textContent = first ? "Loading…" : $("listing-note").textContent;
+  $("listing-more").disabled = true;
+  const query = new URLSearchParams({ limit: SHOWN, ...filters, ...(cursor ? { cursor } : {}) });
+  try {
+    const page = await get(`${kind}?${query}`);
+    if (mine !== request) return;
+    items = [...items, ...page.items];
+    cursor = page.next_cursor;
+  } catch (error) {
+    if (mine !== request) return;
+    toast([error.message, ...error.errors.map((one) => one.message)].join(". "));
+  }
+  $("listing-more").disabled = false;
+  draw(true);
+}
+
+function draw(loaded = false) {
+  const { row, title } = KINDS[kind];
+  const focused = document.activeElement?.dataset?.key;
+  $("listing-table").tBodies[0].replaceChildren(...items.map(row));
+  if (focused) $("listing-table").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+  $("listing-table").hidden = !items.length;
+  $("listing-more").hidden = !cursor;
+  if (loaded) {
+    const none = Object.keys(filters).length ? `No ${title.toLowerCase()} like that.` : `No ${title.toLowerCase()} yet.`;
+    $("listing-note").textContent = items.length ? `${items.length}${cursor ? " newest" : ""}, newest first` : none;
+  }
+  sayChosen();
+}
+
+function sayChosen() {
+  $("compare").disabled = chosen.size < 2;
+  $("compare").textContent = chosen.size ? `Compare ${plural(chosen.size, "run")}` : "Compare";
+}
+
+function choice(run) {
+  const box = el("input", { type: "checkbox", checked: chosen.has(run.id), ariaLabel: `Compare ${runName(run)}` });
+  box.dataset.key = `choose-${run.id}`;
+  box.addEventListener("change", () => {
+    if (box.checked && chosen.size >= MOST_COMPARED) {
+      box.checked = false;
+      toast(`At most ${MOST_COMPARED} runs beside each other`);
+      return;
+    }
+    chosen[box.checked ? "add" : "delete"](run.id);
+    sayChosen();
+  });
+  return box;
+}
+
+const cell = (...content) => el("td", {}, ...content);
+
+function runRow(run) {
+  const { value, unit } = misfit(run);
+  const method = [METHODS[run.spec.method] ?? run.spec.method, run.spec.mode].filter(Boolean).join(", ");
+  return el("tr", {}, cell(choice(run)), cell(open("run", run.id, runName(run))), cell(open("dataset", run.dataset_id, datasetName(run.dataset_id))),
+    cell(badge(run), el("small", {}, timeLeft(run) ? ` ${timeLeft(run)}` : "")), cell(value === DASH ? DASH : `${value} ${unit}`),
+    cell([modelOf(run), withEffects(run.spec)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
+}
+
+function diagnosisRow(diagnosis) {
+  return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id))),
+    cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(diagnosis.verdict ?? DASH),
+    cell(modelOf(diagnosis)), cell(when(diagnosis.created_at)));
+}
+
+function datasetRow(dataset) {
+  const held = dataset.recordings.filter((recording) => recording.held_out).length;
+  return el("tr", {}, cell(open("dataset", dataset.id, dataset.name)), cell(isForces(dataset) ? "forces" : "tracked markers"),
+    cell(String(dataset.recordings.length)), cell(String(held)), cell(size(dataset.size_bytes)), cell(when(dataset.created_at)));
+}
