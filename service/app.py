@@ -23,7 +23,7 @@ from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
 from service.observing import Observer
-from service.routes import backup, datasets, diagnoses, effects, forces, keys, outcomes, runs, system
+from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
 
@@ -36,6 +36,7 @@ ROUTERS = (
     outcomes.router,
     forces.router,
     diagnoses.router,
+    exports.router,
     effects.router,
     keys.router,
     backup.router,

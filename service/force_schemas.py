@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.load_schemas import Number
-from service.schemas import GeneOut
+from service.schemas import GeneOut, ResultOut
 
 Source = Literal["nominal", "local", "joint", "global", "average"]
 Quantity = Literal["lift", "drag", "x", "z"]
@@ -105,6 +105,9 @@ class ForceResultOut(BaseModel):
     agreements: list[AgreementOut]
     left_out: list[AgreementOut]
     held_out: list[str]
+
+
+AnyResult = Annotated[ResultOut | ForceResultOut, Field(discriminator="kind")]
 
 
 class BeatOut(BaseModel):

@@ -22,6 +22,7 @@ from calibration.force_result import (
 from calibration.search import CalibrationSpec
 from records import Condition, Dataset, Recording
 from service import force_schemas as schemas
+from service.schemas import ResultOut
 from service.units import PASCAL_PER_MBAR, ZERO_CELSIUS, finite, mn
 from service.views import gene
 from sim.blades.terms import PRESETS, TERMS
@@ -51,6 +52,12 @@ def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> sch
         left_out=[schemas.AgreementOut.model_validate(agreement(found)) for found in outcome.left_out],
         held_out=list(outcome.held_out),
     )
+
+
+def stored(kind: str, result: Json) -> schemas.AnyResult:
+    """The outcome of a calibration of either kind, as its row keeps it."""
+    shape = ResultOut if kind == "tracks" else schemas.ForceResultOut
+    return shape.model_validate({"kind": kind} | result)
 
 
 def agreement(found: Agreement, source: str | None = None) -> Json:

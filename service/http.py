@@ -110,6 +110,11 @@ def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str
     return Response(body, media_type=media_type, headers=whole)
 
 
+def attachment(filename: str) -> dict[str, str]:
+    """The header by which a browser saves an answer under ``filename``."""
+    return {"Content-Disposition": f'attachment; filename="{filename}"'}
+
+
 def matches(known: str | None, tag: str) -> bool:
     """Whether an ``If-None-Match`` names ``tag``."""
     given = [part.strip().removeprefix("W/") for part in (known or "").split(",")]

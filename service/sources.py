@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from calibration.force_result import GlobalModel, Source
 from records import Dataset
@@ -17,6 +18,8 @@ from workers.jobs import State
 PREFERENCE: tuple[Source, ...] = ("local", "joint", "global", "average", "nominal")
 
 
+# Coefficients by the stage that found them.
+Estimates = Mapping[str, Mapping[str, float]]
 # Coefficients and what must be known about them.
 Give = Callable[[], tuple[Mapping[str, float], tuple[str, ...]]]
 
@@ -32,18 +35,37 @@ class Chosen:
 
 def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, asked: Source | None) -> Chosen:
     """The genome of the source that is ``asked`` for, or of the best one; a 409 where the run does not have it."""
-    spec = store.spec(row)
-    offered = _offered(service, row, dataset, recording)
-    source = asked or next(name for name in PREFERENCE if name in offered)
-    if source not in offered:
-        there_are = ", ".join(name for name in PREFERENCE if name in offered)
+    there = offered(service, row, dataset, recording, estimates(service, row, dataset))
+    source = asked or next(iter(there))
+    if source not in there:
+        there_are = ", ".join(there)
         later = "" if row.result else "; more when the run has SUCCEEDED"
         raise conflict(
             f"run {row.id} has no {source} coefficients for recording {recording!r}; it has: {there_are}{later}",
             state=row.state,
         )
-    values, remarks = offered[source]()
-    return Chosen(source, service.engine.genome(spec, dataset, {}) | dict(values), remarks)
+    return there[source]()
+
+
+def offered(
+    service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates
+) -> dict[Source, Callable[[], Chosen]]:
+    """What makes the genome of each source that the run has for a recording, the best first."""
+    nominal = service.engine.genome(store.spec(row), dataset, {})
+    given = _given(service, row, dataset, recording, found)
+
+    def make(source: Source) -> Chosen:
+        values, remarks = given[source]()
+        return Chosen(source, nominal | dict(values), remarks)
+
+    return {source: partial(make, source) for source in PREFERENCE if source in given}
+
+
+def estimates(service: Service, row: RunRow, dataset: Dataset) -> Estimates:
+    """What each stage of the run has found so far."""
+    with service.database.read() as session:
+        checkpoint = store.checkpoint(session, row.id)
+    return service.engine.found(store.spec(row), dataset, checkpoint) if checkpoint else {}
 
 
 def law(row: RunRow, dataset: Dataset) -> GlobalModel:
@@ -63,26 +85,23 @@ def law(row: RunRow, dataset: Dataset) -> GlobalModel:
     return force_views.law(stored, dataset)
 
 
-def _offered(service: Service, row: RunRow, dataset: Dataset, recording: str) -> dict[Source, Give]:
+def _given(service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates) -> dict[Source, Give]:
     """What gives the coefficients of each source that there is, with remarks."""
     spec = store.spec(row)
-    with service.database.read() as session:
-        checkpoint = store.checkpoint(session, row.id)
-    found = service.engine.found(spec, dataset, checkpoint) if checkpoint else {}
 
     def by_law() -> tuple[Mapping[str, float], tuple[str, ...]]:
         predicted = service.engine.predict(spec, dataset, law(row, dataset), dataset.recording(recording).condition)
         return predicted.values, predicted.remarks
 
-    offered: dict[Source, Give] = {"nominal": lambda: ({}, ())}
+    given: dict[Source, Give] = {"nominal": lambda: ({}, ())}
     fitted: Source
     fitted, stage = ("joint", "joint") if spec.mode == "joint" else ("local", recording)
     if stage in found:
-        offered[fitted] = lambda: (found[stage], ())
+        given[fitted] = lambda: (found[stage], ())
     if row.result is not None and spec.mode == "local":
         # The average of the estimates is what the result calls best.
         average = {gene["name"]: gene["best"] for gene in row.result["genes"]}
-        offered["average"] = lambda: (average, ())
+        given["average"] = lambda: (average, ())
         if row.result["global_model"] is not None:
-            offered["global"] = by_law
-    return offered
+            given["global"] = by_law
+    return given

@@ -154,11 +154,8 @@ ServiceDep = Annotated[Service, Depends(_service)]
 
 
 async def _in_turn(service: ServiceDep) -> AsyncIterator[None]:
-    await service.turns.take()
-    try:
+    async with service.turns.turn():
         yield
-    finally:
-        service.turns.give_back()
 
 
 # Of a route that simulates: it begins when its turn comes.

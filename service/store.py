@@ -160,9 +160,15 @@ def delete_diagnosis(session: Session, diagnosis_id: str) -> None:
     _delete_ended(session, diagnosis(session, diagnosis_id), "diagnosis")
 
 
-def finding(session: Session, diagnosis_id: str) -> dict[str, Any] | None:
-    """What a diagnosis found, as JSON; None before it has succeeded."""
-    return session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
+def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
+    """What a diagnosis found, as JSON; a 404, or a 409 before it has succeeded."""
+    row = diagnosis(session, diagnosis_id)
+    body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
+    if body is None:
+        raise conflict(
+            f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED", state=row.state
+        )
+    return body
 
 
 def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | None = None) -> list[StepRow]:

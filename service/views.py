@@ -20,6 +20,7 @@ from workers.jobs import Wish
 BEFORE_FORCES: dict[str, Any] = {"channels": []}
 # Digits that a page can show; a track in full precision is three times as long on the wire.
 TRACK_DECIMALS = 6
+PHASE_DECIMALS = 9
 
 
 def dataset(row: DatasetRow) -> schemas.DatasetOut:
@@ -119,16 +120,21 @@ def comparison(tracks: Comparison) -> dict[str, Any]:
     """Tracks as plain JSON: validating every coordinate would take longer than simulating them."""
     return {
         "recording": tracks.recording,
-        "phase": np.round(tracks.phase, 9).tolist(),
+        "phase": tidy_phase(tracks.phase).tolist(),
         "markers": list(tracks.markers),
         "recorded_mm": _track(tracks.recorded),
         "simulated_mm": _track(tracks.simulated),
-        "numerics": {
-            "accuracy_mm": tidy_mm(tracks.accuracy),
-            "estimated_error_mm": mm(tracks.solution.error),
-            "steps_per_beat": tracks.solution.steps,
-            "beats": tracks.solution.beats,
-        },
+        "numerics": numerics(tracks),
+    }
+
+
+def numerics(tracks: Comparison) -> dict[str, Any]:
+    """How a simulation was solved (`schemas.NumericsOut`)."""
+    return {
+        "accuracy_mm": tidy_mm(tracks.accuracy),
+        "estimated_error_mm": mm(tracks.solution.error),
+        "steps_per_beat": tracks.solution.steps,
+        "beats": tracks.solution.beats,
     }
 
 
@@ -145,8 +151,18 @@ def misfit(kind: str, distance: float) -> dict[str, float | None]:
     return {"best_mm": mm(distance) if tracks else None, "best_mn": None if tracks else mn(distance)}
 
 
+def track_mm(positions: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Positions (m) in mm, with the digits that go out."""
+    return np.round(positions * MM, TRACK_DECIMALS)
+
+
+def tidy_phase(phase: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Phases with the digits that go out."""
+    return np.round(phase, PHASE_DECIMALS)
+
+
 def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]:
-    rounded = np.round(positions * MM, TRACK_DECIMALS)
+    rounded = track_mm(positions)
     plain = rounded.astype(object)
     plain[~np.isfinite(rounded)] = None
     nested: list[list[list[float | None]]] = plain.tolist()

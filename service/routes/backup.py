@@ -37,7 +37,7 @@ def backup(service: ServiceDep) -> StreamingResponse:
     size = path.stat().st_size
     path.unlink()  # the open file lasts as long as the answer, however that ends
     name = f"wingfit-{store.now()[:19].replace(':', '')}Z.sqlite3"
-    headers = {"Content-Length": str(size), "Content-Disposition": f'attachment; filename="{name}"'}
+    headers = {"Content-Length": str(size), **http.attachment(name)}
     return StreamingResponse(_pieces(opened), media_type=MEDIA_TYPE, headers=headers)
 
 

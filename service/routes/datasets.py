@@ -99,10 +99,7 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
         body = store.archive(session, dataset_id)
     suffix = PurePath(row.filename).suffix.lower()
     known = suffix in MEDIA_TYPES
-    headers = {
-        "ETag": tag,
-        "Content-Disposition": f'attachment; filename="{dataset_id}{suffix if known else ".bin"}"',
-    }
+    headers = {"ETag": tag, **http.attachment(f"{dataset_id}{suffix if known else '.bin'}")}
     return Response(body, media_type=MEDIA_TYPES.get(suffix, "application/octet-stream"), headers=headers)
 
 

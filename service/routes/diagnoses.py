@@ -196,9 +196,4 @@ def _genome(run: RunRow | None) -> dict[str, float]:
 
 def _finding(service: Service, diagnosis_id: str) -> dict[str, Any]:
     with service.database.read() as session:
-        row, found = store.diagnosis(session, diagnosis_id), store.finding(session, diagnosis_id)
-    if found is None:
-        raise conflict(
-            f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED", state=row.state
-        )
-    return found
+        return store.finding(session, diagnosis_id)

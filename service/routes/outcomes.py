@@ -6,16 +6,15 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
-from pydantic import Field
 from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
-from service import force_views, http, load_views, spec_views, store, views
+from service import force_views, genomes, http, load_views, spec_views, store, views
 from service.checks import gene_names
 from service.events import LastEventId, Told, Watched, answer
-from service.force_schemas import ForceResultOut, ForceSimulationOut
+from service.force_schemas import AnyResult, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.remedies import with_remedy
@@ -26,7 +25,6 @@ from service.schemas import (
     HistoryItem,
     LoadsIn,
     Page,
-    ResultOut,
     SimulationIn,
     SimulationOut,
     WingIn,
@@ -37,7 +35,6 @@ from sim.outputs import Outputs
 from workers.jobs import State
 
 router = APIRouter(prefix="/v1", tags=["outcomes"])
-AnyResult = Annotated[ResultOut | ForceResultOut, Field(discriminator="kind")]
 
 _EVENTS = """id: 12
 event: generation
@@ -73,14 +70,7 @@ def history(
 @router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the best genome so far, beside the nominal one."""
-    row = run_row(service, run_id)
-    if row.result is not None:
-        found = GenomeOut(genes=row.result["genes"], final=True)
-    else:
-        dataset = service.datasets.get(row.dataset_id)
-        genes = service.engine.genes(store.spec(row), dataset, _best(row))
-        found = GenomeOut(genes=[views.gene(gene) for gene in genes], final=False)
-    return http.tagged(found, if_none_match)
+    return http.tagged(genomes.standing(service, run_row(service, run_id)), if_none_match)
 
 
 @router.get("/runs/{run_id}/result", response_model=AnyResult, responses=http.errors(404, 409), summary="Result")
@@ -89,8 +79,7 @@ def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
     row = run_row(service, run_id)
     if row.result is None:
         raise conflict(_no_result(row), state=row.state)
-    shape = ResultOut if row.kind == "tracks" else ForceResultOut
-    return http.tagged(shape.model_validate({"kind": row.kind} | row.result), if_none_match)
+    return http.tagged(force_views.stored(row.kind, row.result), if_none_match)
 
 
 @router.get(
@@ -247,7 +236,7 @@ def _chosen(
     dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
-    return dataset, spec, wanted, _best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    return dataset, spec, wanted, genomes.best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
 
 
 def _loads(
@@ -263,12 +252,6 @@ def run_row(service: Service, run_id: str) -> RunRow:
     """The run, or a 404."""
     with service.database.read() as session:
         return store.run(session, run_id)
-
-
-def _best(row: RunRow) -> dict[str, float]:
-    if row.genome is None:
-        raise conflict("no generation has finished yet", state=row.state)
-    return row.genome
 
 
 def _no_result(row: RunRow) -> str:

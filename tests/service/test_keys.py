@@ -145,11 +145,12 @@ def test_nobody_sees_what_belongs_to_others(as_: As) -> None:
         assert bob.get(f"/v1/{kind}")["items"] == []
         assert len(ann.get(f"/v1/{kind}")["items"]) == len(admin.get(f"/v1/{kind}")["items"]) == 1
         assert len(as_("ann-reads").get(f"/v1/{kind}")["items"]) == 1
+    exports = [f"/export?format={form}" for form in ("json", "csv", "netcdf")]
     for path in (
         f"datasets/{dataset}",
         f"datasets/{dataset}/archive",
-        *(f"runs/{run}{rest}" for rest in ("", "/history", "/genome", "/result", "/comparison", "/events")),
-        *(f"diagnoses/{diagnosis}{rest}" for rest in ("", "/finding", "/report", "/events")),
+        *(f"runs/{run}{rest}" for rest in ("", "/history", "/genome", "/result", "/comparison", "/events", *exports)),
+        *(f"diagnoses/{diagnosis}{rest}" for rest in ("", "/finding", "/report", "/events", *exports)),
     ):
         assert bob.client.get(f"/v1/{path}").status_code == 404, path
         assert ann.client.get(f"/v1/{path}").status_code == 200, path

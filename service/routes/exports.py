@@ -1,0 +1,85 @@
+"""Runs and diagnoses as files: to archive, for a spreadsheet, for a program that reads NetCDF."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
+
+from service import csv_text, diagnosis_exports, http, netcdf, run_exports, run_netcdf
+from service.export_schemas import DiagnosisExportOut, Format, RunExportOut
+from service.state import Service, ServiceDep
+
+router = APIRouter(prefix="/v1", tags=["exports"])
+JSON = "application/json"
+FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table; netcdf: series and maps")]
+
+_HISTORY = """sequence,stage,generation,best_m2,mean_m2,diversity,best_mm,evaluations,failed,reasons,elapsed_seconds
+1,structural,0,0.00021,0.0013,0.29,1.84,50,0,,1.2
+"""
+_RANKING = (
+    "rank,effects,title,family,source,signature,probability,evidence,score,freedom,explained,predicted,misfit_m,"
+    "refitted\n1,hinge_offset,Hinge off its place,actuation,,,0.9,41.0,82.0,1,0.91,0.88,0.0005,true\n"
+)
+
+
+def _described(example: str) -> dict[str, Any]:
+    """The answers besides JSON, which the models describe."""
+    saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
+    return {
+        "headers": saved,
+        "content": {
+            csv_text.MEDIA_TYPE: {"schema": {"type": "string"}, "example": example},
+            netcdf.MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
+        },
+    }
+
+
+@router.get(
+    "/runs/{run_id}/export",
+    response_model=RunExportOut,
+    responses={200: _described(_HISTORY), **http.errors(404, 409)},
+    summary="Export a run",
+)
+async def export_run(service: ServiceDep, run_id: str, format: FormatQuery = "json") -> Response:  # noqa: A002
+    """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
+    if format != "netcdf":
+        return await run_in_threadpool(_run, service, run_id, format)
+    async with service.turns.turn():
+        body = await run_in_threadpool(lambda: run_netcdf.file(service, run_exports.of(service, run_id)))
+    return Response(body, media_type=netcdf.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
+
+
+def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A002
+    exported = run_exports.of(service, run_id)
+    if format == "csv":
+        table = run_exports.table(service.database, exported.row)
+        headers = http.attachment(f"{run_id}-history.csv")
+        return StreamingResponse(table, media_type=csv_text.MEDIA_TYPE, headers=headers)
+    document = run_exports.document(service, exported)
+    return StreamingResponse(document, media_type=JSON, headers=http.attachment(f"{run_id}.json"))
+
+
+@router.get(
+    "/diagnoses/{diagnosis_id}/export",
+    response_model=DiagnosisExportOut,
+    responses={200: _described(_RANKING), **http.errors(404, 409)},
+    summary="Export a diagnosis",
+)
+def export_diagnosis(
+    service: ServiceDep,
+    diagnosis_id: str,
+    format: FormatQuery = "json",  # noqa: A002
+) -> Response:
+    """Return a diagnosis that has succeeded as a file: all of it, its ranking, or its maps and misfits."""
+    exported = diagnosis_exports.of(service, diagnosis_id)
+    body: str | bytes
+    if format == "csv":
+        body, media_type, name = diagnosis_exports.table(exported.finding), csv_text.MEDIA_TYPE, "-ranking.csv"
+    elif format == "netcdf":
+        body, media_type, name = diagnosis_exports.file(exported), netcdf.MEDIA_TYPE, ".nc"
+    else:
+        body, media_type, name = diagnosis_exports.document(exported).model_dump_json(), JSON, ".json"
+    return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))
