@@ -28,6 +28,7 @@ from service.key_client import KeyCalls
 from service.transport import (
     DEFAULT_URL,
     CountedFile,
+    Format,
     OnBytes,
     ServerAwayError,
     WingfitError,
@@ -146,6 +147,20 @@ class Client(DiagnosisCalls, KeyCalls):
             if not page or page[-1]["sequence"] == after:
                 return cast(list[a.HistoryItem], items)
             after = page[-1]["sequence"]
+
+    def export_run(
+        self,
+        run_id: str,
+        format: Format,  # noqa: A002
+        path: str | Path,
+        *,
+        on_bytes: OnBytes | None = None,
+    ) -> Path:
+        """Write a run to ``path``, as :meth:`download` does.
+
+        ``format``: json for all of it, csv for its history, netcdf for history, genome, and every recording simulated.
+        """
+        return self._export(_run(run_id), format, Path(path), run_id, on_bytes)
 
     def genome(self, run_id: str) -> a.GenomeInfo:
         """Fetch the best genome so far, beside the nominal one, with units and bounds."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any, cast
 
 from service import answers as a
 from service.diagnosis_answers import Diagnosis
-from service.transport import given, part
+from service.transport import Format, OnBytes, given, part
 from service.watching import Watching
 
 OnDiagnosis = Callable[[Diagnosis], None]
@@ -41,6 +42,20 @@ class DiagnosisCalls(Watching):
     def finding(self, diagnosis_id: str) -> dict[str, Any]:
         """Fetch what a diagnosis found; its schema is at /v1/schemas/finding."""
         return cast(dict[str, Any], self._json("GET", f"{_path(diagnosis_id)}/finding"))
+
+    def export_diagnosis(
+        self,
+        diagnosis_id: str,
+        format: Format,  # noqa: A002
+        path: str | Path,
+        *,
+        on_bytes: OnBytes | None = None,
+    ) -> Path:
+        """Write a diagnosis that has succeeded to ``path``, as :meth:`Client.download` does.
+
+        ``format``: json for all of it, csv for its ranking, netcdf for its maps and its misfit to every recording.
+        """
+        return self._export(_path(diagnosis_id), format, Path(path), diagnosis_id, on_bytes)
 
     def report(self, diagnosis_id: str) -> str:
         """Fetch the report: one HTML file that needs nothing else."""

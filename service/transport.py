@@ -12,7 +12,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self
 from urllib.parse import quote
 
 import httpx
@@ -27,6 +27,8 @@ ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 SENT_TWICE_IS_HARMLESS = {"GET", "DELETE"}
 
 OnBytes = Callable[[int, int], None]
+Format = Literal["json", "csv", "netcdf"]
+ENDINGS: dict[Format, str] = {"json": ".json", "csv": ".csv", "netcdf": ".nc"}
 
 
 class WingfitError(Exception):
@@ -166,9 +168,9 @@ class Transport:
         finally:
             context.__exit__(None, None, None)
 
-    def _file(self, path: str, target: Path, name: str, on_bytes: OnBytes | None) -> Path:
+    def _file(self, path: str, target: Path, name: str, on_bytes: OnBytes | None, **options: Any) -> Path:
         """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it."""
-        with self._stream("GET", path) as response:
+        with self._stream("GET", path, **options) as response:
             if target.is_dir():
                 target = target / _attachment_name(response, name)
             partial = target.with_name(target.name + ".part")
@@ -178,11 +180,17 @@ class Transport:
                         stream.write(block)
                         if on_bytes:
                             on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
-            except httpx.TransportError as error:
+            except BaseException as error:
                 partial.unlink(missing_ok=True)
-                raise ServerAwayError(self.base_url, error) from error
+                if isinstance(error, httpx.TransportError):
+                    raise ServerAwayError(self.base_url, error) from error
+                raise
         partial.replace(target)
         return target
+
+    def _export(self, path: str, format: Format, target: Path, name: str, on_bytes: OnBytes | None) -> Path:  # noqa: A002
+        params, name = {"format": format}, f"{name}{ENDINGS[format]}"
+        return self._file(f"{path}/export", target, name, on_bytes, params=params, timeout=self.simulating)
 
     def _events_once(self, path: str, last_event_id: str | None) -> Iterator[a.Event]:
         headers = {"Accept": "text/event-stream"} | given(**{"Last-Event-ID": last_event_id})

@@ -10,6 +10,7 @@ import typer
 from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.datasets import size
 from service.commands.effects import With, names
+from service.commands.exports import DiagnosisId, export_diagnosis
 from service.commands.findings import print_finding
 from service.commands.loads import check_file
 from service.commands.output import AsJson, Url, duration, moment, note, print_json, progress, say, table
@@ -17,10 +18,10 @@ from service.commands.simulate import read_genome
 from service.diagnosis_answers import Diagnosis
 from service.settings import MOST_WORKERS
 
-app = typer.Typer(no_args_is_help=True, help="List, watch, cancel and delete diagnoses.")
+app = typer.Typer(no_args_is_help=True, help="List, watch, export, cancel and delete diagnoses.")
+app.command("export")(export_diagnosis)
 
 INTERRUPTED = 130
-DiagnosisId = Annotated[str, typer.Argument(help="Id of a diagnosis, from 'wingfit diagnoses list'.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Save the report, one HTML file: FILE.html.")]
 FindingJson = Annotated[bool, typer.Option("--json", help="Print the finding as JSON.")]
 

@@ -12,6 +12,7 @@ import typer
 from service import answers as a
 from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.effects import With, names
+from service.commands.exports import export_run
 from service.commands.force_runs import RunId, force_result, forces, predict
 from service.commands.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
 from service.commands.rounding import with_unit
@@ -22,6 +23,7 @@ app = typer.Typer(no_args_is_help=True, help="Submit, watch and steer calibratio
 
 app.command()(forces)
 app.command()(predict)
+app.command("export")(export_run)
 INTERRUPTED = 130
 CLEAR = 2.0  # standard errors from which a value differs from zero; the page says it alike (web/tables.js)
 

@@ -87,11 +87,12 @@ def test_the_commands_are_those_promised() -> None:
         "result",
         "forces",
         "predict",
+        "export",
     ]
     data = ["list", "upload", "show", "download", "delete", "check"]
     expected = (
         {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects", "diagnose"}
-        | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete")}
+        | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
         | {"backup", "restore"}
