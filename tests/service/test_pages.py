@@ -6,11 +6,13 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from sim.effects.registry import EFFECTS
+from tests.service import toy
 from tests.service.browsing import DRAWN, Seen, chromium
 from tests.service.processes import ServerProcess
 
@@ -239,3 +241,30 @@ def test_nothing_stands_in_anyones_way(
     wrong |= {"form": told} if (told := [one["id"] for one in axe.Axe().run(seen.page).response["violations"]]) else {}
     context.close()
     assert wrong == {}, json.dumps(wrong, indent=1)
+
+
+def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path: Path) -> None:
+    archive = tmp_path / "campaign.zip"
+    archive.write_bytes(toy.archive(name="from bench to verdict"))
+    seen.show("")
+    seen.page.set_input_files("#file", archive)
+    seen.wait("document.getElementById('submit-dialog').open")
+    assert "from bench to verdict" in seen.page.inner_text("#submit-form [name=dataset_id] option:checked")
+    seen.page.fill("#submit-form [name=name]", "first try")
+    seen.wait(TEXT.format("submit-said") + ".includes('first try')")
+    seen.page.click("#submit-form [type=submit]")
+    seen.wait("location.hash.startsWith('#run=')")
+    seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 30)
+    seen.wait(f"{ROWS.format('misfit')} > 0")
+    seen.page.click("#diagnose-run")
+    seen.wait("location.hash.startsWith('#diagnosis=')")
+    seen.wait(TEXT.format("verdict") + " === 'named'", 30)
+    seen.wait(DRAWN.format("phases-map", 0))
+    assert "from the best genome of a run" in seen.page.inner_text("#diagnosis-about")
+    assert seen.errors == []
+
+
+def test_the_description_of_the_api_needs_no_other_origin(seen: Seen) -> None:
+    seen.page.goto(f"{seen.base}/docs")
+    seen.wait("document.body.innerText.includes('/v1/runs')")
+    assert seen.errors == []

@@ -1,0 +1,130 @@
+"""``python -m benchmarks.screenshots``: pictures of the page for the README, of a real server at real work.
+
+The Robird's story (a drive that is not where and not what its description says) is recorded, uploaded, calibrated
+twice and diagnosed, and the page is photographed in Chromium. A few minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from benchmarks import machine
+from benchmarks.proof import robird
+from benchmarks.proof.told import saved
+from benchmarks.ray_nodes import REPOSITORY
+from benchmarks.server_process import Server
+from service.client import Client
+from service.commands.output import progress
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+OUT = REPOSITORY / "docs" / "figures"
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+WIDTH, HEIGHT = 1280, 1200
+PHONE_WIDTH, PHONE_HEIGHT = 390, 780
+DRAWN_SECONDS = 60.0
+
+
+def main() -> None:
+    """Record, work, photograph; the last line is one JSON object."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.screenshots", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for the pictures")
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
+        folder = Path(scratch)
+        dataset = saved(robird.campaign(asked.seed).dataset, folder)
+        server = Server(folder, "processes")
+        server.start()
+        try:
+            pages = worked(f"http://127.0.0.1:{server.port}", dataset)
+            files = photographed(f"http://127.0.0.1:{server.port}", pages, asked.out)
+        finally:
+            server.stop()
+    told = {"files": files, "seconds": round(time.monotonic() - began, 1)}
+    print(json.dumps(told | {"processor": machine.cpu(), "commit": machine.commit()}))
+
+
+def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
+    """Address of every page to photograph, and the figure that is drawn on it last."""
+    with Client(url) as client:
+        its = client.upload_dataset(dataset)["id"]
+        runs = [
+            client.submit_run(its, name=name, division="11", population=30, max_generations=40, seed=1, **more)["id"]
+            for name, more in (
+                ("as described", {}),
+                ("with the drive's effects", {"effects": ["hinge_offset", "drive_harmonics"]}),
+            )
+        ]
+        for number, run in enumerate(runs):
+            with progress(f"calibration {number + 1} of {len(runs)}") as tell:
+                client.wait(run, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or ""))
+        diagnosis = client.submit_diagnosis(its, name="What is left out?", division="11")["id"]
+        with progress("diagnosis") as tell:
+            client.wait_for_diagnosis(
+                diagnosis, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or "")
+            )
+    return {
+        "page-run": (f"run={runs[1]}", "beat"),
+        "page-diagnosis": (f"diagnosis={diagnosis}", "overlay-plot"),
+        "page-compare": (f"compare={','.join(runs)}", "compare-plot"),
+        "page-dataset": (f"dataset={its}", "conditions"),
+    }
+
+
+def photographed(url: str, pages: dict[str, tuple[str, str]], out: Path) -> list[str]:
+    """Each page in light, and the diagnosis in dark and on a phone as well; names of the files."""
+    from playwright.sync_api import sync_playwright  # needed here alone
+
+    path = next((found for name in NAMES if (found := shutil.which(name))), None)
+    if path is None:
+        sys.exit("no chromium to take pictures with; install it, e.g. apt-get install chromium")
+    out.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        files = [_shot(browser, url, page, out / f"{name}.png") for name, page in pages.items()]
+        diagnosis = pages["page-diagnosis"]
+        files.append(_shot(browser, url, diagnosis, out / "page-diagnosis-dark.png", scheme="dark"))
+        size = (PHONE_WIDTH, PHONE_HEIGHT)
+        files.append(_shot(browser, url, diagnosis, out / "page-phone.png", scheme="dark", size=size))
+        browser.close()
+    return files
+
+
+def _shot(
+    browser: Browser,
+    url: str,
+    page: tuple[str, str],
+    path: Path,
+    *,
+    scheme: str = "light",
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+) -> str:
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]}, color_scheme=scheme)  # type: ignore[arg-type]
+    tab = context.new_page()
+    address, figure = page
+    tab.goto(f"{url}/#{address}")
+    deadline = time.monotonic() + DRAWN_SECONDS
+    # Asked from here: waiting in the page needs eval, which its content policy forbids.
+    while not tab.evaluate(f"document.getElementById('{figure}').data?.length > 0"):
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"{figure} was not drawn within {DRAWN_SECONDS:g} s on #{address}")
+        tab.wait_for_timeout(100)
+    tab.wait_for_timeout(1500)  # the 3-D figure draws itself a moment later
+    tab.screenshot(path=path)
+    context.close()
+    return path.name
+
+
+if __name__ == "__main__":
+    main()
