@@ -43,11 +43,12 @@ def main() -> None:
     """Run all kinds of deaths, and print one JSON object as the last line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.durability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
-    parser.add_argument("--kills", type=int, default=KILLS["server"], help="of the server; of the others in proportion")
+    parser.add_argument("--kills", type=int, help="of the server, and of the others in proportion; of the kind of --only")
     parser.add_argument("--only", choices=sorted(KILLS), help="one kind of death")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
-    began, part = time.monotonic(), asked.kills / KILLS["server"]
+    began, most = time.monotonic(), KILLS[asked.only or "server"]
+    part = 1.0 if asked.kills is None else asked.kills / most
     kinds = [asked.only] if asked.only else list(KILLS)
     with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
         expected = undisturbed(Path(scratch) / "undisturbed")
