@@ -85,10 +85,9 @@ function update() {
   $("verdict-part").hidden = !done;
   $("verdict").textContent = diagnosis.verdict ?? "";
   $("diagnosis-summary").textContent = diagnosis.summary ?? "";
-  for (const id of ["report-link", "finding-link"]) $(id).hidden = !done;
+  for (const id of ["report-link", "finding-exports"]) $(id).hidden = !done;
   $("report-link").href = `${path}/report`;
-  $("finding-link").href = `${path}/finding`;
-  $("finding-link").download = `${diagnosis.id}.json`;
+  for (const format of ["csv", "netcdf", "json"]) $(`finding-${format}`).href = `${path}/export?format=${format}`;
   if (done && !fetched) fetchFinding();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
     button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");

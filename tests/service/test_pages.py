@@ -99,6 +99,15 @@ def test_all_runs_are_listed_filtered_and_compared(seen: Seen, dataset: dict[str
     assert seen.errors == []
 
 
+def test_a_run_is_exported(seen: Seen, runs: list[str]) -> None:
+    seen.open(runs[0])
+    seen.wait("!document.getElementById('run').hidden")
+    for name, ending in (("csv", "-history.csv"), ("netcdf", ".nc"), ("json", ".json")):
+        with seen.page.expect_download() as download:
+            seen.page.click(f"#export-{name}")
+        assert download.value.suggested_filename == f"{runs[0]}{ending}"
+
+
 def test_a_comparison_shows_what_the_api_has(seen: Seen, server: ServerProcess, runs: list[str]) -> None:
     seen.show(f"compare={','.join(runs)}")
     seen.wait(DRAWN.format("compare-plot", 2))
@@ -261,6 +270,11 @@ def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path
     seen.wait(TEXT.format("verdict") + " === 'named'", 30)
     seen.wait(DRAWN.format("phases-map", 0))
     assert "from the best genome of a run" in seen.page.inner_text("#diagnosis-about")
+    diagnosis = seen.page.evaluate("location.hash").replace("#diagnosis=", "")
+    for name, ending in (("csv", "-ranking.csv"), ("netcdf", ".nc"), ("json", ".json")):
+        with seen.page.expect_download() as download:
+            seen.page.click(f"#finding-{name}")
+        assert download.value.suggested_filename == f"{diagnosis}{ending}"
     assert seen.errors == []
 
 
