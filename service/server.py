@@ -19,6 +19,7 @@ from service.database import Database, DataFolderError
 from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.observing import set_up_log
+from service.protocol import Protocol
 from service.settings import Settings, SettingsError, is_loopback
 from service.state import MakeEvaluator
 
@@ -73,7 +74,14 @@ def serve(
     elif not is_loopback(settings.host):
         LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
     app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator, diagnoser=diagnoser)
-    config = uvicorn.Config(app, log_level="warning", timeout_graceful_shutdown=GRACE_SECONDS, server_header=False)
+    config = uvicorn.Config(
+        app,
+        loop="uvloop",
+        http=Protocol,
+        log_level="warning",
+        timeout_graceful_shutdown=GRACE_SECONDS,
+        server_header=False,
+    )
     LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
     try:
         _Server(config, app).run(sockets=[listening])

@@ -15,6 +15,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from service.app import create_app
+from service.protocol import Protocol
 from service.settings import Settings
 from tests.service import toy, toy_diagnosis
 
@@ -101,7 +102,10 @@ class Api:
 @contextmanager
 def serving(app: FastAPI) -> Iterator[httpx.Client]:
     """Serve ``app`` on a free loopback port from a thread."""
-    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="critical", timeout_graceful_shutdown=2))
+    config = uvicorn.Config(
+        app, port=0, loop="uvloop", http=Protocol, log_level="critical", timeout_graceful_shutdown=2
+    )
+    server = uvicorn.Server(config)
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
     while not server.started:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
 
 import httpx
 import pytest
 
+from service.protocol import HEAD_LIMIT
 from service.settings import Settings, SettingsError
 from tests.service.conftest import Api
+from tests.service.processes import ServerProcess
 
 
 @pytest.mark.parametrize(("host", "status"), [("localhost", 200), ("LOCALHOST:99", 200), ("[::1]:8321", 200)])
@@ -51,6 +54,19 @@ def test_every_answer_carries_the_security_headers(client: httpx.Client, path: s
     assert "default-src 'self'" in headers["Content-Security-Policy"]
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert headers["X-Frame-Options"] == "DENY"
+
+
+def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(tmp_path: Path) -> None:
+    with ServerProcess(tmp_path / "data", ("tests.service.toy_server", "0")) as server:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as endless:
+            endless.sendall(b"GET /v1/health HTTP/1.1\r\nHost: localhost\r\nX-Long: ")
+            endless.sendall(b"x" * (HEAD_LIMIT + 1))
+            assert endless.recv(1000).startswith(b"HTTP/1.1 400 ")
+        body = b" " * (4 * HEAD_LIMIT)
+        for _ in range(3):
+            assert server.client.post("/v1/runs", content=body).status_code == 422
+        long = {"X-Long": "x" * (HEAD_LIMIT // 2)}
+        assert [server.client.get("/v1/health", headers=long).status_code for _ in range(4)] == [200] * 4
 
 
 def test_unknown_paths_and_methods_are_told_apart(client: httpx.Client) -> None:

@@ -1,0 +1,32 @@
+"""HTTP as it comes in: parsed by httptools, whose parser collects the head of a request for as long as one is sent."""
+
+from __future__ import annotations
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+HEAD_LIMIT = 64 * 2**10
+
+
+class Protocol(HttpToolsProtocol):
+    """One connection; a request whose line and headers do not end within ``HEAD_LIMIT`` bytes is refused."""
+
+    _in_head = True
+    _head = 0
+
+    def data_received(self, data: bytes) -> None:
+        """Take the next bytes of the connection."""
+        if self._in_head:
+            self._head += len(data)
+        super().data_received(data)
+        if self._head > HEAD_LIMIT and not self.transport.is_closing():
+            self.send_400_response(f"The line and headers of the request are longer than {HEAD_LIMIT >> 10} KiB.")
+
+    def on_headers_complete(self) -> None:
+        """Begin the request."""
+        self._in_head, self._head = False, 0
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """End it; the next one may follow."""
+        self._in_head = True
+        super().on_message_complete()
