@@ -63,6 +63,12 @@ def calling(caller: Caller | None) -> Iterator[None]:
         CALLER.reset(token)
 
 
+def whose() -> str | None:
+    """Whose data may be seen now; None: everyone's."""
+    caller = CALLER.get()
+    return caller.sees if caller else None
+
+
 def owner_of_new() -> str | None:
     """To whom belongs what is made now."""
     caller = CALLER.get()
@@ -75,10 +81,9 @@ class OwnSession(Session):
 
 @event.listens_for(OwnSession, "do_orm_execute")
 def _only_own(state: ORMExecuteState) -> None:
-    caller = CALLER.get()
-    whose = caller.sees if caller else None
-    if whose is not None:
-        mine = with_loader_criteria(OwnedRow, lambda table: table.owner == whose, include_aliases=True)
+    owner = whose()
+    if owner is not None:
+        mine = with_loader_criteria(OwnedRow, lambda table: table.owner == owner, include_aliases=True)
         state.statement = state.statement.options(mine)
 
 

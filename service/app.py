@@ -23,6 +23,7 @@ from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
 from service.observing import Observer
+from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
@@ -83,6 +84,7 @@ def create_app(
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
     describe(app)
     _mount_pages(app)
+    app.add_middleware(Quick)
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)

@@ -52,6 +52,12 @@ class Changes:
 
 
 def _wake(watchers: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]]) -> None:
-    for loop, event in watchers:
+    for loop in {loop for loop, _ in watchers}:
         if not loop.is_closed():
-            loop.call_soon_threadsafe(event.set)
+            # All at once: each call from another thread wakes the loop anew.
+            loop.call_soon_threadsafe(_set, [event for one, event in watchers if one is loop])
+
+
+def _set(events: list[asyncio.Event]) -> None:
+    for event in events:
+        event.set()

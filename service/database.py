@@ -10,6 +10,7 @@ import fcntl
 import os
 import sqlite3
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,7 +46,9 @@ class DatabaseClosedError(RuntimeError):
 def is_full(error: Exception) -> bool:
     """Whether a write failed for lack of space, or because the disk does not take it: later it may."""
     text = str(getattr(error, "orig", error))
-    return isinstance(error, OperationalError) and any(sign in text for sign in ("is full", "disk I/O error"))
+    return isinstance(error, OperationalError | sqlite3.OperationalError) and any(
+        sign in text for sign in ("is full", "disk I/O error")
+    )
 
 
 class FolderLock:
@@ -107,6 +110,10 @@ class Database:
                 raise
             raise DataFolderError(f"cannot open the database {path}: {error}") from error
         self._readers = _readers(path)
+        self._path = path
+        self._bare: deque[sqlite3.Connection] = deque()
+        self.version = 0
+        """Another one after every write."""
 
     @contextmanager
     def write(self) -> Iterator[Session]:
@@ -114,9 +121,12 @@ class Database:
         with self._guard:
             if self._closed:
                 raise DatabaseClosedError("the service is stopping")
-            with OwnSession(self._writer, expire_on_commit=False) as session, session.begin():
-                yield session
-                fail_points.passing("commit")
+            try:
+                with OwnSession(self._writer, expire_on_commit=False) as session, session.begin():
+                    yield session
+                    fail_points.passing("commit")
+            finally:
+                self.version += 1
             fail_points.passing("committed")
 
     @contextmanager
@@ -127,6 +137,19 @@ class Database:
         with OwnSession(self._readers, expire_on_commit=False) as session:
             yield session
 
+    @contextmanager
+    def look(self) -> Iterator[sqlite3.Connection]:
+        """One consistent snapshot, of everything, through a bare connection: for reads that must be quick."""
+        if self._closed:
+            raise DatabaseClosedError("the service is stopping")
+        connection = self._bare.pop() if self._bare else _bare(self._path)
+        connection.execute("BEGIN")
+        try:
+            yield connection
+        finally:
+            connection.execute("ROLLBACK")
+            self._bare.append(connection)
+
     def close(self) -> None:
         """Finish the write under way, refuse further ones, give the folder free."""
         with self._guard:
@@ -134,6 +157,8 @@ class Database:
                 return
             self._closed = True
             self._readers.dispose()
+            while self._bare:
+                self._bare.pop().close()
             self._writer.dispose()
             self._lock.release()
 
@@ -168,7 +193,7 @@ def _writer(path: Path) -> Engine:
 
 def _readers(path: Path) -> Engine:
     engine = create_engine(
-        f"sqlite:///file:{quote(str(path))}?mode=ro&uri=true",
+        f"sqlite:///{_read_only(path)}&uri=true",
         poolclass=QueuePool,
         pool_size=READERS,
         max_overflow=READERS,
@@ -177,6 +202,16 @@ def _readers(path: Path) -> Engine:
     event.listen(engine, "connect", _prepare_reader)
     event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
     return engine
+
+
+def _bare(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False)
+    _prepare_reader(connection, None)
+    return connection
+
+
+def _read_only(path: Path) -> str:
+    return f"file:{quote(str(path))}?mode=ro"
 
 
 def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:

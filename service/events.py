@@ -35,11 +35,6 @@ class Told:
     job: RunOut | DiagnosisOut
     steps: Sequence[GenerationEvent | StepEvent]
 
-    @property
-    def complete(self) -> bool:
-        """Whether no step was left out."""
-        return len(self.steps) < CHUNK
-
 
 @dataclass(frozen=True)
 class Watched:
@@ -50,53 +45,99 @@ class Watched:
     look: Callable[[Session, int, int], Told]
 
 
-def answer(database: Database, changes: Changes, watched: Watched, last_event_id: str | None) -> StreamingResponse:
-    """The events after ``last_event_id``; a 422 for one that no stream has sent."""
-    text = (last_event_id or "0").strip()
-    if not (text.isascii() and text.isdecimal() and len(text) <= 15):
-        item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
-        raise invalid("the Last-Event-ID is not one of this stream", [item])
-    headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-    return StreamingResponse(stream(database, changes, watched, int(text)), headers=headers, media_type=MEDIA_TYPE)
+@dataclass(frozen=True)
+class Seen:
+    """What a look found, as it goes out.
+
+    Attributes:
+        steps: their events.
+        after: sequence of the last of them.
+        complete: whether no step was left out.
+        standing: what tells one state from another.
+        state: its event.
+        final: whether it is the last.
+    """
+
+    steps: bytes
+    after: int
+    complete: bool
+    standing: tuple[object, ...]
+    state: bytes
+    final: bool
 
 
-async def stream(database: Database, changes: Changes, watched: Watched, after: int) -> AsyncIterator[bytes]:
-    """Events after sequence ``after``, until the final state is sent or the service stops."""
-    sent: tuple[object, ...] | None = None
-    with changes.watch(watched.id) as changed:
-        while True:
-            changed.clear()
-            told = await run_in_threadpool(_look, database, watched, after)
-            if told is None:
-                return
-            for step in told.steps:
-                after = step.sequence
-                yield _event(watched.step, step, after)
-            if not told.complete:
-                continue
-            if sent != _standing(told.job):
-                sent = _standing(told.job)
-                yield _event("state", told.job, after)
-            if State(told.job.state).final or changes.closed:
-                return
-            try:
-                await asyncio.wait_for(changed.wait(), HEARTBEAT_SECONDS)
-            except TimeoutError:
-                yield b": alive\n\n"
+class Events:
+    """The event streams of one service. Who waits for the same event shares the look at it."""
+
+    def __init__(self, database: Database, changes: Changes) -> None:
+        self._database, self._changes = database, changes
+        self._looks: dict[tuple[str, int, int], asyncio.Future[Seen | None]] = {}
+
+    def answer(self, watched: Watched, last_event_id: str | None) -> StreamingResponse:
+        """The events after ``last_event_id``; a 422 for one that no stream has sent."""
+        text = (last_event_id or "0").strip()
+        if not (text.isascii() and text.isdecimal() and len(text) <= 15):
+            item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
+            raise invalid("the Last-Event-ID is not one of this stream", [item])
+        headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
+        return StreamingResponse(self._stream(watched, int(text)), headers=headers, media_type=MEDIA_TYPE)
+
+    async def _stream(self, watched: Watched, after: int) -> AsyncIterator[bytes]:
+        """Events after sequence ``after``, until the final state is sent or the service stops."""
+        sent: tuple[object, ...] | None = None
+        with self._changes.watch(watched.id) as changed:
+            while True:
+                changed.clear()
+                seen = await self._seen(watched, after)
+                if seen is None:
+                    return
+                after, news = seen.after, seen.steps
+                if seen.complete and sent != seen.standing:
+                    sent, news = seen.standing, news + seen.state
+                if news:
+                    yield news
+                if not seen.complete:
+                    continue
+                if seen.final or self._changes.closed:
+                    return
+                try:
+                    await asyncio.wait_for(changed.wait(), HEARTBEAT_SECONDS)
+                except TimeoutError:
+                    yield b": alive\n\n"
+
+    async def _seen(self, watched: Watched, after: int) -> Seen | None:
+        """What follows ``after``; None where there is no such job any more.
+
+        Every watcher was let in before, so each may see what the first one that looks sees. Of the same version of the
+        database all see the same.
+        """
+        version = self._database.version
+        look = self._looks.get((watched.id, after, version))
+        if look is None:
+            self._looks = {key: old for key, old in self._looks.items() if key[2] == version}
+            look = asyncio.ensure_future(run_in_threadpool(_look, self._database, watched, after))
+            self._looks[watched.id, after, version] = look
+        return await asyncio.shield(look)
 
 
-def _look(database: Database, watched: Watched, after: int) -> Told | None:
+def _look(database: Database, watched: Watched, after: int) -> Seen | None:
     try:
         with database.read() as session:
-            return watched.look(session, after, CHUNK)
+            told = watched.look(session, after, CHUNK)
     except (ProblemError, DatabaseClosedError):
         return None
-
-
-def _standing(job: RunOut | DiagnosisOut) -> tuple[object, ...]:
-    return job.state, job.wish, job.error
+    job, steps = told.job, told.steps
+    last = steps[-1].sequence if steps else after
+    return Seen(
+        steps=b"".join(_event(watched.step, step, step.sequence) for step in steps),
+        after=last,
+        complete=len(steps) < CHUNK,
+        standing=(job.state, job.wish, job.error),
+        # The id of a state is that of the last step sent before it: a reconnect then misses nothing.
+        state=_event("state", job, last),
+        final=State(job.state).final,
+    )
 
 
 def _event(kind: str, data: BaseModel, sequence: int) -> bytes:
-    # The id of a state is that of the last step sent before it: a reconnect then misses nothing.
     return f"id: {sequence}\nevent: {kind}\ndata: {data.model_dump_json()}\n\n".encode()

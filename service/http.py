@@ -18,7 +18,11 @@ from service.access import CALLER
 from service.database import Database
 from service.problems import error_item, invalid
 
-Limit = Annotated[int, Query(ge=1, le=200, description="items on a page")]
+PAGE, LARGEST_PAGE = 50, 200
+HISTORY_PAGE, LARGEST_HISTORY_PAGE = 1000, 10_000
+LARGEST_INTEGER = 2**53 - 1  # that every reader of JSON takes
+
+Limit = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="items on a page")]
 Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the last page")]
 RepeatKey = Annotated[
     str | None,
@@ -32,6 +36,7 @@ RepeatKey = Annotated[
 IfNoneMatch = Annotated[str | None, Header(alias="If-None-Match", description="the ETag that the caller has")]
 
 Responses = dict[int | str, dict[str, Any]]
+JSON = "application/json"
 LOCATION = {"Location": {"description": "where it is", "schema": {"type": "string"}}}
 
 
@@ -98,7 +103,12 @@ def sent(answer: store.Answer) -> Response:
 
 def tagged(model: BaseModel, known: str | None) -> Response:
     """``model`` with an ETag, or 304 when the caller has it."""
-    return marked(model.model_dump_json().encode(), "application/json", known)
+    return marked(model.model_dump_json().encode(), JSON, known)
+
+
+def json_of(body: bytes) -> Response:
+    """``body``, which is JSON already."""
+    return Response(body, media_type=JSON)
 
 
 def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:

@@ -18,7 +18,7 @@ from typing import Any
 from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
-from starlette.datastructures import Headers, MutableHeaders
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service import fail_points
@@ -96,7 +96,7 @@ class Observer:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 fail_points.passing("answer")
-                MutableHeaders(scope=message)[REQUEST_ID] = request
+                message["headers"] = [*message["headers"], (REQUEST_ID.lower().encode(), request.encode())]
             await send(message)
 
         token = REQUEST.set(request)
@@ -116,13 +116,11 @@ def _count(scope: Scope, status: int, seconds: float) -> None:
         service.metrics.requests.labels(known, path, str(status)).inc()
         if not path.endswith("/events"):
             service.metrics.seconds.labels(known, path).observe(seconds)
-    LOG.info(
-        "%s %s %d",
-        scope["method"],
-        scope["path"],
-        status,
-        extra={"ms": round(1e3 * seconds, 2), "client": (scope.get("client") or ("",))[0]},
-    )
+    if LOG.isEnabledFor(logging.INFO):
+        client = (scope.get("client") or ("",))[0]
+        LOG.info(
+            "%s %s %d", scope["method"], scope["path"], status, extra={"ms": round(1e3 * seconds, 2), "client": client}
+        )
 
 
 class JsonFormatter(logging.Formatter):

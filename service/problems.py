@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+import sqlite3
 from collections.abc import Mapping, Sequence
 from http import HTTPStatus
 from typing import Any
@@ -91,6 +92,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(RequestValidationError, _on_validation)
     app.add_exception_handler(DatabaseClosedError, _on_closed)
     app.add_exception_handler(OperationalError, _on_operational)
+    app.add_exception_handler(sqlite3.OperationalError, _on_operational)
     app.add_exception_handler(Exception, _on_bug)
 
 

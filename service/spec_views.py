@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from typing import Any
 
 from pydantic import BaseModel
@@ -34,7 +33,7 @@ def spec_out(given: CalibrationSpec) -> SpecOut:
         "low_pass_hz": given.low_pass,
         "peel_width_beats": given.peel_width,
     }
-    return SpecOut.model_validate(asdict(given) | named)
+    return SpecOut.model_validate(vars(given) | named)
 
 
 def of_run(body: RunIn) -> CalibrationSpec:

@@ -21,9 +21,11 @@ from service.datasets import Datasets
 from service.diagnoser import Diagnoser, ModelDiagnoser
 from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
+from service.events import Events
 from service.housekeeping import Housekeeping
 from service.observing import Gauges, Metrics
 from service.pool import Pool
+from service.reading import Reading
 from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
@@ -54,6 +56,8 @@ class Service:
         self.keys = KeyRing()
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
+        self.reading = Reading(database)
+        self.events = Events(database, self.changes)
         self.turns = Turns()
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
@@ -146,7 +150,7 @@ def _maker(settings: Settings) -> MakeEvaluator:
     return make
 
 
-def _service(request: Request) -> Service:
+async def _service(request: Request) -> Service:
     return cast(Service, request.app.state.service)
 
 

@@ -62,20 +62,22 @@ def page(
     """Up to ``limit`` rows, newest first, and the cursor to the next ones."""
     query = select(table).order_by(table.number.desc()).limit(limit + 1)
     if cursor is not None:
-        query = query.where(table.number < _number(cursor))
+        query = query.where(table.number < number(cursor))
     for column, value in equal.items():
         if value is not None:
             query = query.where(getattr(table, column) == value)
     rows = list(session.scalars(query))
-    following = _cursor(rows[limit - 1].number) if len(rows) > limit else None
+    following = cursor_before(rows[limit - 1].number) if len(rows) > limit else None
     return rows[:limit], following
 
 
-def _cursor(number: int) -> str:
+def cursor_before(number: int) -> str:
+    """The cursor to the rows before ``number``."""
     return base64.urlsafe_b64encode(f"before:{number}".encode()).decode().rstrip("=")
 
 
-def _number(cursor: str) -> int:
+def number(cursor: str) -> int:
+    """The number before which a cursor leads, or a 422."""
     try:
         text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
         if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:

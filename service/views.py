@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,14 @@ def recordings(loaded: Dataset) -> list[dict[str, Any]]:
 
 def run(row: RunRow) -> schemas.RunOut:
     """A run."""
-    wish = None if row.wish == Wish.NONE else row.wish
-    return schemas.RunOut.model_validate(columns(row) | {"wish": wish, "spec": spec_out(store.spec(row))})
+    return run_of(columns(row))
+
+
+def run_of(values: Mapping[str, Any]) -> schemas.RunOut:
+    """A run from the values of its row."""
+    wish = None if values["wish"] == Wish.NONE else values["wish"]
+    spec = spec_out(store.spec_from(values["spec"]))
+    return schemas.RunOut.model_validate({**values, "wish": wish, "spec": spec})
 
 
 def history_item(row: GenerationRow) -> schemas.HistoryItem:

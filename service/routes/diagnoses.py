@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse, Response, StreamingResponse
 
 from service import diagnosis_checks, diagnosis_specs, diagnosis_views, http, spec_views, store
 from service.diagnosis_schemas import DiagnosisIn, DiagnosisOut
-from service.events import MEDIA_TYPE, LastEventId, Told, Watched, answer
+from service.events import MEDIA_TYPE, LastEventId, Told, Watched
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.routes.runs import load
 from service.schemas import Page
@@ -159,7 +159,7 @@ def events(service: ServiceDep, diagnosis_id: str, last_event_id: LastEventId = 
         job = diagnosis_views.diagnosis(store.diagnosis(session, diagnosis_id))
         return Told(job, [diagnosis_views.step(one) for one in steps])
 
-    return answer(service.database, service.changes, Watched(diagnosis_id, "step", look), last_event_id)
+    return service.events.answer(Watched(diagnosis_id, "step", look), last_event_id)
 
 
 def _run(service: Service, run_id: str | None) -> RunRow | None:

@@ -13,7 +13,7 @@ from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service import force_views, genomes, http, load_views, spec_views, store, views
 from service.checks import gene_names
-from service.events import LastEventId, Told, Watched, answer
+from service.events import LastEventId, Told, Watched
 from service.force_schemas import AnyResult, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
@@ -56,15 +56,11 @@ data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
 def history(
     service: ServiceDep,
     run_id: str,
-    after: Annotated[int, Query(ge=0, le=2**53 - 1, description="last sequence that the caller has")] = 0,
-    limit: Annotated[int, Query(ge=1, le=10_000)] = 1000,
-) -> Page[HistoryItem]:
+    after: Annotated[int, Query(ge=0, le=http.LARGEST_INTEGER, description="last sequence that the caller has")] = 0,
+    limit: Annotated[int, Query(ge=1, le=http.LARGEST_HISTORY_PAGE)] = http.HISTORY_PAGE,
+) -> Response:
     """Return finished generations, ascending; ``next_cursor`` is the next ``after``."""
-    with service.database.read() as session:
-        store.run(session, run_id)
-        rows = store.history(session, run_id, after, limit + 1)
-    following = str(rows[limit - 1].sequence) if len(rows) > limit else None
-    return Page(items=[views.history_item(row) for row in rows[:limit]], next_cursor=following)
+    return http.json_of(service.reading.history(run_id, after, limit))
 
 
 @router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
@@ -143,7 +139,7 @@ def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) 
         generations = store.history(session, run_id, after, limit)
         return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
 
-    return answer(service.database, service.changes, Watched(run_id, "generation", look), last_event_id)
+    return service.events.answer(Watched(run_id, "generation", look), last_event_id)
 
 
 @router.post(

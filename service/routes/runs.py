@@ -74,21 +74,17 @@ def list_runs(
     service: ServiceDep,
     dataset_id: Annotated[str | None, Query(max_length=200)] = None,
     state: jobs.State | None = None,
-    limit: http.Limit = 50,
+    limit: http.Limit = http.PAGE,
     cursor: http.Cursor = None,
-) -> Page[RunOut]:
+) -> Response:
     """List runs, newest first."""
-    with service.database.read() as session:
-        rows, following = store.page(session, RunRow, limit, cursor, dataset_id=dataset_id, state=state)
-    return Page(items=[views.run(row) for row in rows], next_cursor=following)
+    return http.json_of(service.reading.runs(limit, cursor, dataset_id, state))
 
 
 @router.get("/{run_id}", response_model=RunOut, responses=http.errors(404), summary="Fetch a run")
 def fetch(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return one run with its progress."""
-    with service.database.read() as session:
-        row = store.run(session, run_id)
-    return http.tagged(views.run(row), if_none_match)
+    return http.marked(service.reading.run(run_id), http.JSON, if_none_match)
 
 
 @router.delete("/{run_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a run")

@@ -1,0 +1,166 @@
+"""The quick way to the commonest reads: the same answers as the shapes and the routes give, and never an old one."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from service import quick, store, views
+from service.app import create_app
+from service.changes import Changes
+from service.database import Database
+from service.events import Events, Told, Watched
+from service.schemas import HistoryItem, Page, RunOut
+from service.settings import Settings
+from service.state import Service
+from service.tables import RunRow
+from tests.service import toy
+from tests.service.conftest import Api, serving
+
+Json = dict[str, Any]
+
+
+class Used:
+    """A server with three runs that have ended, oldest first: of two datasets, one that broke."""
+
+    def __init__(self, service: Service, api: Api) -> None:
+        self.service, self.api = service, api
+        self.one, other = api.upload()["id"], api.upload(name="other")["id"]
+        submitted = ((self.one, 1), (other, 2), (self.one, toy.UNLUCKY))
+        self.runs = [api.submit(dataset, seed=seed)["id"] for dataset, seed in submitted]
+        for run in self.runs:
+            api.finish(run)
+
+    def path(self, form: str) -> str:
+        cursor = self.api.get("/v1/runs?limit=1")["next_cursor"]
+        return "/v1/" + form.replace("RUN", self.runs[0]).replace("ONE", self.one).replace("CURSOR", cursor)
+
+
+@pytest.fixture(scope="module")
+def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
+    settings = Settings(data=tmp_path_factory.mktemp("used"))
+    app = create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        yield Used(app.state.service, Api(client))
+
+
+def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:
+    with used.service.database.read() as session:
+        rows = list(session.scalars(select(RunRow).order_by(RunRow.number.desc())))
+        past = store.history(session, used.runs[0], 0)
+    listed = Page[RunOut](items=[views.run(row) for row in rows], next_cursor=None)
+    assert used.api.get("/v1/runs") == listed.model_dump(mode="json")
+    for row in rows:
+        assert used.api.run(row.id) == views.run(row).model_dump(mode="json")
+    items = Page[HistoryItem](items=[views.history_item(row) for row in past], next_cursor=None)
+    assert used.api.get(f"/v1/runs/{used.runs[0]}/history") == items.model_dump(mode="json")
+    assert len(past) == 10
+
+
+USUAL = (
+    "runs?limit=2", "runs?limit=2&cursor=CURSOR", "runs?dataset_id=ONE", "runs?state=FAILED", "runs?limit=200",
+    "runs?dataset_id=ONE&state=FAILED", "runs?dataset_id=none", "runs/RUN", "runs/RUN/history",
+    "runs/RUN/history?after=3&limit=4", "runs/RUN/history?after=9007199254740991",
+)  # fmt: skip
+UNUSUAL = (
+    "runs/", "runs?limit=0", "runs?limit=201", "runs?limit=-1", "runs?limit=", "runs?limit=1.0", "runs?state=NONE",
+    "runs?state=", "runs?cursor=none", "runs?limit=1&limit=2", "runs?other=1", "runs/RUN?limit=1", "runs/none",
+    "runs/none/history", "runs/RUN/history?after=-1", "runs/RUN/history?limit=10001", "runs/RUN/history?limit=5000",
+    "runs/RUN/history?cursor=1", "runs/RUN/history?after=9007199254740992",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("form", [*USUAL, *UNUSUAL])
+def test_the_routes_answer_alike(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = used.path(form)
+    first = seen(used.api.client.get(path))
+    routed = []
+
+    def leave(scope: Json) -> None:
+        routed.append(scope["path"])
+        raise quick._UnusualError
+
+    monkeypatch.setattr(quick, "_answer", leave)
+    assert seen(used.api.client.get(path)) == first
+    assert routed
+
+
+@pytest.mark.parametrize("form", USUAL)
+def test_what_is_usual_is_not_left_to_the_routes(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = used.path(form)
+    answered = []
+    answer = quick._answer
+
+    def noted(scope: Any) -> Any:
+        answered.append(answer(scope))
+        return answered[-1]
+
+    monkeypatch.setattr(quick, "_answer", noted)
+    assert used.api.client.get(path).status_code == 200
+    assert len(answered) == 1
+
+
+def seen(answer: httpx.Response) -> tuple[object, ...]:
+    own = {"date", "x-request-id"}
+    headers = {name: value for name, value in answer.headers.items() if name not in own}
+    return answer.status_code, answer.json() if answer.content else None, headers
+
+
+def test_what_was_written_is_read_at_once(used: Used) -> None:
+    paths = [f"/v1/runs/{used.runs[1]}", "/v1/runs"]
+    before = [used.api.get(path) for path in paths]
+    for name in ("another", before[0]["name"]):
+        with used.service.database.write() as session:
+            store.run(session, used.runs[1]).name = name
+        after = used.api.get(paths[0]), used.api.get(paths[1])["items"][1]
+        assert [run["name"] for run in after] == [name, name]
+    assert [used.api.get(path) for path in paths] == before
+
+
+def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
+    path = f"/v1/runs/{used.runs[0]}"
+    tag = used.api.client.get(path).headers["ETag"]
+    again = used.api.client.get(path, headers={"If-None-Match": tag})
+    assert (again.status_code, again.content, again.headers["ETag"]) == (304, b"", tag)
+    assert used.api.client.get(path, headers={"If-None-Match": '"other"'}).status_code == 200
+
+
+def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Path) -> None:
+    database, changes = Database(tmp_path), Changes()
+    events, looks = Events(database, changes), []
+    states = ["QUEUED", "RUNNING", "SUCCEEDED"]
+
+    def look(_session: Session, after: int, _limit: int) -> Told:
+        looks.append(after)
+        return Told(job(states[min(database.version - first, 2)]), [])
+
+    async def watch() -> list[bytes]:
+        return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
+
+    async def all_of_them() -> list[list[bytes]]:
+        watching = [asyncio.create_task(watch()) for _ in range(20)]
+        for _ in range(2):
+            await asyncio.sleep(0.05)
+            with database.write():
+                pass
+            changes.publish("run_1")
+        return await asyncio.gather(*watching)
+
+    first = database.version
+    told = asyncio.run(all_of_them())
+    assert [[state for state in states if state.encode() in part] for part in told[0]] == [[state] for state in states]
+    assert told == [told[0]] * 20
+    assert len(looks) == 3
+    database.close()
+
+
+def job(state: str) -> RunOut:
+    example: Json = RunOut.model_config["json_schema_extra"]["examples"][0]  # type: ignore[assignment, index]
+    return RunOut.model_validate(example | {"state": state})
