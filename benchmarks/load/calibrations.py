@@ -1,0 +1,31 @@
+"""What is computed meanwhile: calibrations of the example wing, of a fixed number of generations."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.durability.works import EXAMPLES
+from service.client import Client
+
+Json = dict[str, Any]
+ROBIRD = EXAMPLES / "robird"
+
+
+def search(division: str, population: int, generations: int, **more: Any) -> Json:
+    """A genetic search that does not end before its last generation."""
+    size = {"division": division, "population": population, "max_generations": generations, "stall": generations}
+    return size | {"mode": "joint", "tolerance": 0.0, "seed": 1} | more
+
+
+# Of 11 bodies on all six recordings that are not held out; of 4 on one.
+LONG = search("11", 32, 16)
+SHORT = search("4", 8, 12, recordings=["vac-0010mbar-lag0-2.0hz"])
+
+
+def computed(client: Client, run_id: str) -> tuple[float, int]:
+    """When a run has ended: seconds and evaluations from its first generation to its last."""
+    ended = client.wait(run_id)
+    if ended["state"] != "SUCCEEDED":
+        raise RuntimeError(f"the calibration {ended['state']}: {ended['error']}")
+    first, *_, last = client.history(run_id)
+    return last["elapsed_seconds"] - first["elapsed_seconds"], last["evaluations"] - first["evaluations"]

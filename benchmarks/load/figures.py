@@ -1,0 +1,21 @@
+"""What is told of many times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def percentile(values: Sequence[float], percent: float) -> float | None:
+    """The smallest of ``values`` that at least ``percent`` of them do not exceed; None of none."""
+    if not values:
+        return None
+    return sorted(values)[max(1, math.ceil(percent / 100 * len(values))) - 1]
+
+
+def milliseconds(seconds: Sequence[float]) -> dict[str, float | None]:
+    """Median, 99th percentile and largest."""
+    return {
+        name: None if (found := percentile(seconds, percent)) is None else round(1e3 * found, 2)
+        for name, percent in (("p50_ms", 50), ("p99_ms", 99), ("most_ms", 100))
+    }

@@ -1,0 +1,146 @@
+"""A database as years of use leave it: copies, under names of their own, of a run that a server computed and stored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import func, insert, literal, select
+from sqlalchemy.orm import Session
+
+from service import store
+from service.database import Database
+from service.tables import ArchiveRow, DatasetRow, GenerationRow, RunRow
+from service.views import columns
+from workers.jobs import State
+
+Values = dict[str, Any]
+DATASETS = 20
+# Of every ten runs; of the others one failed and one was cancelled.
+SUCCEEDED = 8
+BETWEEN = timedelta(minutes=50)
+
+
+@dataclass(frozen=True)
+class Filled:
+    """What is stored.
+
+    Attributes:
+        runs: their number.
+        generations: of all runs.
+        longest: id of the run with the most generations.
+        longest_generations: their number.
+    """
+
+    runs: int
+    generations: int
+    longest: str
+    longest_generations: int
+
+
+def fill(folder: Path, runs: int, each: int, longest: int) -> Filled:
+    """Copy the run that a stopped server left in ``folder`` until there are ``runs``.
+
+    Every copy has ``each`` generations, those of the original again and again, and the newest one ``longest``.
+    """
+    database = Database(folder)
+    try:
+        with database.write() as session:
+            original = session.scalars(select(RunRow).where(RunRow.state == State.SUCCEEDED.value)).first()
+            if original is None:
+                raise RuntimeError(f"no run in {folder} has succeeded; one is needed to be copied")
+            past = [columns(row) for row in store.history(session, original.id, 0)]
+            copies = _copies(columns(original), _datasets(session, original.dataset_id), runs - 1)
+            first, last = copies[0], copies[-1]
+            for copy in copies:
+                copy |= _length(past, longest if copy is last else each)
+            session.execute(insert(RunRow), copies)
+            for copy in (first, last):
+                session.execute(insert(GenerationRow), _generations(past, copy))
+            _copy_generations(session, first["id"], [original.id, first["id"], last["id"]])
+        with database.read() as session:
+            return Filled(_count(session, RunRow), _count(session, GenerationRow), last["id"], longest)
+    finally:
+        database.close()
+
+
+def _datasets(session: Session, dataset_id: str) -> list[str]:
+    """Ids of the dataset and of copies of it."""
+    row, body = store.dataset(session, dataset_id), store.archive(session, dataset_id)
+    copies = [_unnumbered(row) | {"id": store.new_id("ds"), "name": f"{row.name} {n}"} for n in range(2, DATASETS + 1)]
+    session.execute(insert(DatasetRow), copies)
+    session.execute(insert(ArchiveRow), [{"dataset_id": copy["id"], "body": body} for copy in copies])
+    return [dataset_id, *(copy["id"] for copy in copies)]
+
+
+def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
+    """Rows of runs that ended, one every 50 minutes until now, on every dataset, each with a seed of its own."""
+    until, copies = datetime.now(UTC), []
+    for place in range(number):
+        ended = until - (number - place) * BETWEEN
+        began = store.timestamp(ended - timedelta(seconds=original["elapsed_seconds"]))
+        copy = original | {
+            "id": store.new_id("run"),
+            "name": f"{original['name']}, seed {place}",
+            "dataset_id": datasets[place % len(datasets)],
+            "spec": original["spec"] | {"seed": place},
+            "created_at": began,
+            "started_at": began,
+            "finished_at": store.timestamp(ended),
+        }
+        del copy["number"]
+        copies.append(copy | _ending(place))
+    return copies
+
+
+def _ending(place: int) -> Values:
+    if place % 10 < SUCCEEDED:
+        return {}
+    if place % 2:
+        return {"state": State.CANCELLED.value, "result": None}
+    return {"state": State.FAILED.value, "result": None, "error": "every individual of generation 3 diverged"}
+
+
+def _unnumbered(row: DatasetRow) -> Values:
+    return {name: value for name, value in columns(row).items() if name != "number"}
+
+
+def _generations(past: list[Values], run: Values) -> list[Values]:
+    """As many as ``run`` has, out of those of another."""
+    return [
+        past[(sequence - 1) % len(past)]
+        | {
+            "run_id": run["id"],
+            "sequence": sequence,
+            "generation": sequence - 1,
+            "evaluations": after["evaluations"],
+            "elapsed_seconds": after["elapsed_seconds"],
+            "progress": sequence / run["generations"],
+        }
+        for sequence in range(1, run["generations"] + 1)
+        for after in [_length(past, sequence)]
+    ]
+
+
+def _length(past: list[Values], generations: int) -> Values:
+    """What a run has taken after so many ``generations``, at the pace of another."""
+    part = generations / len(past)
+    return {
+        "generations": generations,
+        "evaluations": round(past[-1]["evaluations"] * part),
+        "elapsed_seconds": past[-1]["elapsed_seconds"] * part,
+    }
+
+
+def _copy_generations(session: Session, model: str, have: list[str]) -> None:
+    """Those of ``model`` for every run but those that ``have`` some: one statement, for there are a million."""
+    names = [column.key for column in GenerationRow.__table__.columns]
+    theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
+    rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.run_id == model, RunRow.id.not_in(have))
+    session.execute(insert(GenerationRow).from_select(names, rows))
+
+
+def _count(session: Session, table: type[RunRow] | type[GenerationRow]) -> int:
+    return session.scalar(select(func.count()).select_from(table)) or 0

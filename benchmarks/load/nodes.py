@@ -1,0 +1,65 @@
+"""The same calibration on one and on two Ray nodes of one processor each, all on this machine, in turn."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.durability.cluster import Cluster
+from benchmarks.load.calibrations import ROBIRD, computed
+from benchmarks.server_process import Server
+from service.client import Client
+
+Json = dict[str, Any]
+SETTLE_SECONDS = 120.0
+
+
+def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
+    """Pace with one and with two nodes, and the part of twice the first that the second reaches."""
+    folder.mkdir()
+    cluster = Cluster(folder)
+    server = Server(folder, "ray", cluster.token, cluster.address)
+    paces: dict[int, list[float]] = {1: [], 2: []}
+    now = 2
+    try:
+        server.start()
+        with Client(f"http://127.0.0.1:{server.port}") as client:
+            dataset = client.upload_dataset(ROBIRD)["id"]
+            for number in range(rounds):
+                for nodes in (2, 1) if number % 2 == 0 else (1, 2):
+                    now = _have(cluster, nodes, now)
+                    _settle(client, short | {"dataset_id": dataset}, nodes)
+                    seconds, evaluations = computed(client, client.submit_run(**work | {"dataset_id": dataset})["id"])
+                    paces[nodes].append(evaluations / seconds)
+    finally:
+        server.stop()
+        cluster.kill()
+    one, two = (statistics.median(paces[nodes]) for nodes in (1, 2))
+    return {
+        "evaluations_per_second": {nodes: [round(pace, 2) for pace in found] for nodes, found in paces.items()},
+        "efficiency": round(two / (2 * one), 3),
+        "processors": len(os.sched_getaffinity(0)),
+    }
+
+
+def _have(cluster: Cluster, nodes: int, now: int) -> int:
+    """Let ``nodes`` be there where ``now`` are."""
+    if nodes < now:
+        cluster.kill_node()
+    elif nodes > now:
+        cluster.start_node()
+    return nodes
+
+
+def _settle(client: Client, short: Json, nodes: int) -> None:
+    """Compute a little until the server knows of the nodes, and these have all that they need."""
+    deadline = time.monotonic() + SETTLE_SECONDS
+    while True:
+        computed(client, client.submit_run(**short)["id"])
+        if client.health()["workers"] == nodes:
+            return
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"the server knows of {client.health()['workers']} processors, and there are {nodes}")

@@ -1,0 +1,60 @@
+"""How long pages of the list and of a long history take, while a calibration uses all processors.
+
+No page is asked for twice, so that a server which remembers is not flattered.
+"""
+
+from __future__ import annotations
+
+import http.client
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from benchmarks.load.figures import milliseconds
+from benchmarks.load.filling import Filled
+from benchmarks.load.mix import Stored
+from service.http import HISTORY_PAGE, LARGEST_HISTORY_PAGE, LARGEST_PAGE, PAGE
+
+Json = dict[str, Any]
+TIMES, TIMES_LARGEST = 100, 20
+
+
+def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
+    """Times of each kind of page."""
+    rng = np.random.default_rng(1)
+    cursors = rng.permutation(stored.cursors)
+    last = max(0, filled.longest_generations - HISTORY_PAGE - TIMES)
+    history = f"/v1/runs/{filled.longest}/history"
+    some: dict[str, Callable[[int], str]] = {
+        "list, newest": lambda n: f"/v1/runs?limit={PAGE + n}",
+        "list, any page": lambda n: f"/v1/runs?cursor={cursors[n % len(cursors)]}",
+        "list, of a state": lambda n: f"/v1/runs?state=FAILED&cursor={cursors[n % len(cursors)]}",
+        "list, of a dataset": lambda n: f"/v1/runs?dataset_id={dataset_id}&cursor={cursors[n % len(cursors)]}",
+        "list, of both": lambda n: f"/v1/runs?dataset_id={dataset_id}&state=FAILED&limit={1 + n}",
+        "list, largest page": lambda n: f"/v1/runs?limit={LARGEST_PAGE}&cursor={cursors[n % len(cursors)]}",
+        "history, first page": lambda n: f"{history}?after={n}",
+        "history, in the middle": lambda n: f"{history}?after={last // 2 + n}",
+        "history, last page": lambda n: f"{history}?after={last + n}",
+    }
+    largest = [f"{history}?after={n}&limit={LARGEST_HISTORY_PAGE}" for n in range(TIMES_LARGEST)]
+    asked = {name: [path(n) for n in range(TIMES)] for name, path in some.items()}
+    asked["history, largest page"] = largest
+    return {name: timed(port, paths) for name, paths in asked.items()}
+
+
+def timed(port: int, paths: list[str]) -> Json:
+    """Times of ``paths``, one after the other, and the length of the longest answer."""
+    connection, took, longest = http.client.HTTPConnection("127.0.0.1", port, timeout=60.0), list[float](), 0
+    for path in paths:
+        began = time.perf_counter()
+        connection.request("GET", path)
+        answer = connection.getresponse()
+        body = answer.read()
+        took.append(time.perf_counter() - began)
+        if answer.status != 200:
+            raise RuntimeError(f"{path} is answered with {answer.status}: {body[:300]!r}")
+        longest = max(longest, len(body))
+    connection.close()
+    return milliseconds(took) | {"kilobytes": round(longest / 1000, 1)}
