@@ -1,8 +1,8 @@
 """What is read, and how often: as where a few people follow a run, and others look into old ones.
 
-Of ten reads six are of a run, three of the one under way and three of any other. Two are of the list of runs, 50 to a
-page: nine of ten of its first page, the others of any. Two are of the history of any run, 50 generations after any.
-Every other run and page is drawn anew among all that are stored, so that a server which remembers is not flattered.
+Of ten reads six are of a run, two of the list of runs, 50 to a page, and two of 50 generations of a history.
+Half of the runs and histories are those of the run under way, the others of any run; of ten lists nine are the first
+page, the others any page. Any is drawn anew among all that are stored: a server which remembers is not flattered.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 KINDS = ("run", "list", "history")
 SHARES = (0.6, 0.2, 0.2)
-UNDER_WAY, FIRST_PAGE = 0.5, 0.9  # of the reads of a run, of a list
+UNDER_WAY, FIRST_PAGE = 0.5, 0.9
 PAGE = 50
 
 
@@ -48,12 +48,14 @@ def reads(stored: Stored, under_way: str, number: int, seed: int) -> list[tuple[
 
 
 def _read(kind: str, stored: Stored, under_way: str, rng: np.random.Generator) -> tuple[str, str]:
-    place = int(rng.integers(len(stored.ids)))
-    if kind == "run":
-        return kind, f"/v1/runs/{under_way if rng.random() < UNDER_WAY else stored.ids[place]}"
     if kind == "list":
         further = rng.random() >= FIRST_PAGE and stored.cursors
         cursor = f"&cursor={stored.cursors[int(rng.integers(len(stored.cursors)))]}" if further else ""
         return kind, f"/v1/runs?limit={PAGE}{cursor}"
-    after = rng.integers(max(1, stored.generations[place] - PAGE))
-    return kind, f"/v1/runs/{stored.ids[place]}/history?after={after}&limit={PAGE}"
+    place = int(rng.integers(len(stored.ids)))
+    run, generations = stored.ids[place], stored.generations[place]
+    if rng.random() < UNDER_WAY:
+        run, generations = under_way, PAGE
+    if kind == "run":
+        return kind, f"/v1/runs/{run}"
+    return kind, f"/v1/runs/{run}/history?after={rng.integers(max(1, generations - PAGE))}&limit={PAGE}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pytest
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from service import quick, store, views
+from service import quick, reading, store, views
 from service.app import create_app
 from service.changes import Changes
 from service.database import Database
@@ -64,6 +65,7 @@ def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:
     assert len(past) == 10
 
 
+FILTERS = ("dataset_id", "state", "owner", "before")
 USUAL = (
     "runs?limit=2", "runs?limit=2&cursor=CURSOR", "runs?dataset_id=ONE", "runs?state=FAILED", "runs?limit=200",
     "runs?dataset_id=ONE&state=FAILED", "runs?dataset_id=none", "runs/RUN", "runs/RUN/history",
@@ -164,3 +166,18 @@ def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Pa
 def job(state: str) -> RunOut:
     example: Json = RunOut.model_config["json_schema_extra"]["examples"][0]  # type: ignore[assignment, index]
     return RunOut.model_validate(example | {"state": state})
+
+
+@pytest.mark.parametrize("filters", [some for n in range(5) for some in combinations(FILTERS, n)])
+def test_pages_are_found_through_an_index_and_need_no_sorting(used: Used, filters: tuple[str, ...]) -> None:
+    where = tuple("number < :before" if name == "before" else f"{name} = :{name}" for name in filters)
+    values = {"dataset_id": used.one, "state": "FAILED", "owner": None, "before": 9, "most": 51}
+    with used.service.database.look() as look:
+        plans = [
+            *look.execute(f"EXPLAIN QUERY PLAN {reading._page_of_runs(where)}", values),
+            *look.execute(f"EXPLAIN QUERY PLAN {reading._HISTORY}", ("run_1", 0, 51)),
+        ]
+    told = [str(step[3]) for step in plans]
+    assert not any("TEMP B-TREE" in step for step in told), told
+    # Without a filter the newest are taken from the end of the table.
+    assert all(step.startswith("SEARCH") for step in told[bool(not filters) :]), told
