@@ -25,6 +25,9 @@ from service.state import MakeEvaluator
 
 LOG = logging.getLogger("wingfit")
 GRACE_SECONDS = 2
+# For which a thread that computes may keep others from running Python. Reading gives its turn away at every row, so
+# that with the usual 5 ms a page of some rows could wait for longer than it takes.
+SWITCH_SECONDS = 0.0005
 
 
 class ServeError(RuntimeError):
@@ -62,6 +65,7 @@ def serve(
 ) -> None:
     """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
     set_up_log(settings.log)
+    sys.setswitchinterval(SWITCH_SECONDS)
     listening = _listen(settings)
     try:
         database = Database(settings.data)

@@ -18,7 +18,7 @@ def search(division: str, population: int, generations: int, **more: Any) -> Jso
 
 
 # Of 11 bodies on all six recordings that are not held out; of 4 on one.
-LONG = search("11", 32, 16)
+LONG = search("11", 32, 12)
 SHORT = search("4", 8, 12, recordings=["vac-0010mbar-lag0-2.0hz"])
 
 

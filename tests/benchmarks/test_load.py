@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import httpx
 import pytest
 
-from benchmarks.load.__main__ import FULL, LIMITS, missed
+from benchmarks.load.__main__ import FULL, LIMITS, missed, within_limit
 from benchmarks.load.beside import Load, Turn, _told, per_read_us
 from benchmarks.load.crowd import Crowd, Told, answered, visit
 from benchmarks.load.figures import milliseconds, percentile
@@ -160,6 +160,13 @@ def test_slowdown_and_shares_are_beside_the_undisturbed_run_of_the_same_round() 
     assert found["reads_by_kind"]["run"]["most_ms"] == 99.0
     assert found["reads_by_kind"]["history"]["most_ms"] is None
     assert per_read_us(found, {"server_processor_seconds": 1.5}) == 5000.0
+
+
+def test_the_rate_within_the_limit_is_the_largest_that_was_measured_so() -> None:
+    rates = {"none": (0.0, 0.0), "calm": (100.0, 10.0), "brisk": (300.0, 10.1), "full": (1000.0, 30.0)}
+    loads = {name: {"asked_per_second": rate, "slowdown_percent": slow} for name, (rate, slow) in rates.items()}
+    assert within_limit(loads) == 100.0
+    assert within_limit({"full": loads["full"]}) == 0.0
 
 
 def test_everything_that_is_not_as_it_must_be_is_named() -> None:
