@@ -62,6 +62,7 @@ def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(
             endless.sendall(b"GET /v1/health HTTP/1.1\r\nHost: localhost\r\nX-Long: ")
             endless.sendall(b"x" * (HEAD_LIMIT + 1))
             assert endless.recv(1000).startswith(b"HTTP/1.1 400 ")
+        assert server.client.request("X" * 100, "/v1/runs").json()["type"] == "urn:wingfit:problem:not-http"
         body = b" " * (4 * HEAD_LIMIT)
         for _ in range(3):
             assert server.client.post("/v1/runs", content=body).status_code == 422
