@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -82,10 +83,13 @@ def serve(
         app,
         loop="uvloop",
         http=Protocol,
+        access_log=False,
         log_level="warning",
         timeout_graceful_shutdown=GRACE_SECONDS,
         server_header=False,
     )
+    # What is loaded by now stays: to look through it for garbage would hold up every answer for a tenth of a second.
+    gc.freeze()
     LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
     try:
         _Server(config, app).run(sockets=[listening])
