@@ -43,7 +43,9 @@ def main() -> None:
     """Run all kinds of deaths, and print one JSON object as the last line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.durability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
-    parser.add_argument("--kills", type=int, help="of the server, and of the others in proportion; of the kind of --only")
+    parser.add_argument(
+        "--kills", type=int, help="of the server, and of the others in proportion; of the kind of --only"
+    )
     parser.add_argument("--only", choices=sorted(KILLS), help="one kind of death")
     parser.add_argument("--seed", type=int, default=1)
     asked = parser.parse_args()
