@@ -16,6 +16,7 @@ MADE = (
     ("/v1/diagnoses", "202", "diagnosis_id"),
 )
 ID = "$response.body#/id"
+FORM = "multipart/form-data"
 
 
 def describe(app: FastAPI) -> None:
@@ -28,6 +29,7 @@ def describe(app: FastAPI) -> None:
         if not known:
             _problems(specification)
             _links(specification)
+            _nothing_is_null(specification)
         return specification
 
     app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents
@@ -53,9 +55,21 @@ def _links(specification: Json) -> None:
                     links[title] = {"operationId": operation["operationId"], "requestBody": {name: ID}}
 
 
-def _fields(specification: Json, operation: Json) -> Json:
-    """Fields of the JSON body that an operation takes."""
-    content = operation.get("requestBody", {}).get("content", {}).get("application/json", {})
+def _fields(specification: Json, operation: Json, media_type: str = "application/json") -> Json:
+    """Fields of the body that an operation takes."""
+    content = operation.get("requestBody", {}).get("content", {}).get(media_type, {})
     name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
     fields: Json = specification["components"]["schemas"].get(name, {}).get("properties", {})
     return fields
+
+
+def _nothing_is_null(specification: Json) -> None:
+    """A parameter or field of a form that is not given is left out: unlike JSON, a text cannot say null."""
+    for methods in specification["paths"].values():
+        for operation in methods.values():
+            given = [parameter["schema"] for parameter in operation.get("parameters", ())]
+            for schema in [*given, *_fields(specification, operation, FORM).values()]:
+                kept = [one for one in schema.get("anyOf", ()) if one != {"type": "null"}]
+                if len(kept) == 1:
+                    schema.update(kept[0])
+                    del schema["anyOf"]

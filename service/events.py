@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import Header
 from pydantic import BaseModel
@@ -118,6 +118,14 @@ class Events:
             look = asyncio.ensure_future(run_in_threadpool(_look, self._database, watched, after))
             self._looks[watched.id, after, version] = look
         return await asyncio.shield(look)
+
+
+def described(step: str, example: str) -> dict[str, Any]:
+    """A stream in the published description; the schema is that of one event."""
+    data = {"type": "string", "contentMediaType": "application/json"}
+    properties = {"id": {"type": "string"}, "event": {"enum": [step, "state"]}, "data": data}
+    schema = {"type": "object", "properties": properties, "required": list(properties)}
+    return {"content": {MEDIA_TYPE: {"schema": schema, "example": example}}}
 
 
 def _look(database: Database, watched: Watched, after: int) -> Seen | None:

@@ -13,7 +13,6 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -21,9 +20,8 @@ from typing import Any
 import httpx
 
 from benchmarks import machine
-from benchmarks.abuse import requests, uploads
+from benchmarks.abuse import fuzz, good, requests, uploads
 from benchmarks.abuse.cases import Case
-from benchmarks.durability.works import archive
 from benchmarks.server_process import Server
 
 Json = dict[str, Any]
@@ -34,17 +32,16 @@ WORKING = {"WINGFIT_MAX_ACTIVE": "100000", "WINGFIT_MAX_RUNS": "1"}
 
 def main() -> None:
     """Send everything, and print one JSON object as the last line."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
-    parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
+    asked = _asked()
+    st = None if asked.no_fuzz else fuzz.program()
+    if st is None and not asked.no_fuzz:
+        sys.exit(fuzz.MISSING)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
         server = Server(Path(scratch), "in_process", settings=WORKING)
         server.start()
         try:
-            told = abused(server, [*uploads.cases(asked.seed), *requests.cases()])
-            told["peak_rss_mb"] = round(server.peak_mb(), 1)
+            told = _told(server, st, asked, Path(scratch))
         finally:
             server.kill()
     told |= {"seconds": round(time.monotonic() - began, 1), "processor": machine.cpu(), "commit": machine.commit()}
@@ -52,46 +49,40 @@ def main() -> None:
     sys.exit(1 if told["server_errors"] or told["failures"] or told["peak_rss_mb"] > ENOUGH_MB else 0)
 
 
-def abused(server: Server, cases: list[Case]) -> Json:
-    """How the server answers ``cases``."""
-    statuses, failures = Counter[int](), list[str]()
+def _asked() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--fuzz-cases", type=int, default=10_000, help="at least so many cases of the fuzzer")
+    parser.add_argument("--no-fuzz", action="store_true", help="leave the fuzzer out")
+    return parser.parse_args()
+
+
+def _told(server: Server, st: str | None, asked: argparse.Namespace, scratch: Path) -> Json:
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
-        names = _good(http)
-        for number, case in enumerate(cases):
-            status, wrong = _sent(http, server.port, case, names)
-            statuses[status] += 1
-            if wrong:
-                failures.append(f"{case.method} {case.path[:80]}, {case.name}: {wrong}")
-            if number % 100 == 0 or number + 1 == len(cases):
-                _still_well(http, names, failures, case)
-                print(f"\rabused {number + 1} of {len(cases)}  ", end="", file=sys.stderr, flush=True)
+        names = good.names(http)
+        told = abused(http, server.port, names, [*uploads.cases(asked.seed), *requests.cases()])
+        if st is not None:
+            found = fuzz.fuzzed(st, http, names, asked.fuzz_cases, asked.seed, scratch)
+            told |= found | {"failures": told["failures"] + found["failures"]}
+    return told | {"peak_rss_mb": round(server.peak_mb(), 1)}
+
+
+def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Case]) -> Json:
+    """How the server at ``port`` answers ``cases``."""
+    statuses, failures = Counter[int](), list[str]()
+    for number, case in enumerate(cases):
+        status, wrong = _sent(http, port, case, names)
+        statuses[status] += 1
+        if wrong:
+            failures.append(f"{case.method} {case.path[:80]}, {case.name}: {wrong}")
+        if number % 100 == 0 or number + 1 == len(cases):
+            _still_well(http, names, failures, case)
+            print(f"\rabused {number + 1} of {len(cases)}  ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     errors = sum(count for status, count in statuses.items() if status >= 500)
     counted = {str(status): count for status, count in sorted(statuses.items())}
     return {"cases": len(cases), "server_errors": errors, "failures": failures, "statuses": counted}
-
-
-def _good(http: httpx.Client) -> dict[str, str]:
-    """Good datasets of either kind, and a run on each that has ended."""
-    dataset = http.post("/v1/datasets", files={"file": ("good.zip", uploads.small_archive())}).json()
-    forces = http.post("/v1/datasets", files={"file": ("good.zip", archive("delfly"))}).json()
-    search = {"division": "4", "population": 8, "max_generations": 1, "mode": "joint"}
-    return {
-        "{dataset}": dataset["id"],
-        "{forces}": forces["id"],
-        "{recording}": dataset["recordings"][0]["name"],
-        "{run}": _ended(http, {"dataset_id": dataset["id"]} | search),
-        "{run of forces}": _ended(http, {"dataset_id": forces["id"]}),
-    }
-
-
-def _ended(http: httpx.Client, body: Json) -> str:
-    run = str(http.post("/v1/runs", json=body).json()["id"])
-    while (now := http.get(f"/v1/runs/{run}").json())["state"] != "SUCCEEDED":
-        if now["state"] == "FAILED":
-            raise RuntimeError(now["error"])
-        time.sleep(0.05)
-    return run
 
 
 def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, str]:
@@ -140,14 +131,7 @@ def _still_well(http: httpx.Client, names: Json, failures: list[str], after: Cas
     answer = http.get(f"/v1/runs/{names['{run}']}")
     if answer.status_code != 200:
         failures.append(f"after {after.name}: a good request is answered with {answer.status_code}")
-    _cancel(http, (one["id"] for one in http.get("/v1/runs?state=QUEUED&limit=200").json()["items"]), "runs")
-    _cancel(http, (one["id"] for one in http.get("/v1/diagnoses?state=QUEUED&limit=200").json()["items"]), "diagnoses")
-
-
-def _cancel(http: httpx.Client, ids: Iterable[str], kind: str) -> None:
-    """What was accepted need not be computed."""
-    for one in ids:
-        http.post(f"/v1/{kind}/{one}/cancel")
+    good.cancel_queued(http)
 
 
 if __name__ == "__main__":

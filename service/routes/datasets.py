@@ -21,6 +21,8 @@ from service.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 MEDIA_TYPES = {".zip": "application/zip", ".nc": "application/x-netcdf"}
+OTHER_TYPE = "application/octet-stream"
+ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
 
 
 @router.post(
@@ -84,7 +86,7 @@ def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch 
     "/{dataset_id}/archive",
     response_class=Response,
     responses={
-        200: {"content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}}},
+        200: {"content": {kind: {"schema": {"type": "string", "format": "binary"}} for kind in ARCHIVE_TYPES}},
         **http.errors(404),
     },
     summary="Fetch the archive",
@@ -100,7 +102,7 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
     suffix = PurePath(row.filename).suffix.lower()
     known = suffix in MEDIA_TYPES
     headers = {"ETag": tag, **http.attachment(f"{dataset_id}{suffix if known else '.bin'}")}
-    return Response(body, media_type=MEDIA_TYPES.get(suffix, "application/octet-stream"), headers=headers)
+    return Response(body, media_type=MEDIA_TYPES.get(suffix, OTHER_TYPE), headers=headers)
 
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")

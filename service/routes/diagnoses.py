@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse, Response, StreamingResponse
 
 from service import diagnosis_checks, diagnosis_specs, diagnosis_views, http, spec_views, store
 from service.diagnosis_schemas import DiagnosisIn, DiagnosisOut
-from service.events import MEDIA_TYPE, LastEventId, Told, Watched
+from service.events import LastEventId, Told, Watched, described
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.routes.runs import load
 from service.schemas import Page
@@ -143,10 +143,7 @@ def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMat
 @router.get(
     "/{diagnosis_id}/events",
     response_class=StreamingResponse,
-    responses={
-        200: {"content": {MEDIA_TYPE: {"schema": {"type": "string"}, "example": _EVENTS}}},
-        **http.errors(404),
-    },
+    responses={200: described("step", _EVENTS), **http.errors(404)},
     summary="Watch a diagnosis",
 )
 def events(service: ServiceDep, diagnosis_id: str, last_event_id: LastEventId = None) -> StreamingResponse:

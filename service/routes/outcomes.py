@@ -13,7 +13,7 @@ from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service import force_views, genomes, http, load_views, spec_views, store, views
 from service.checks import gene_names
-from service.events import LastEventId, Told, Watched
+from service.events import LastEventId, Told, Watched, described
 from service.force_schemas import AnyResult, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
@@ -125,10 +125,7 @@ def loads(
 @router.get(
     "/runs/{run_id}/events",
     response_class=StreamingResponse,
-    responses={
-        200: {"content": {"text/event-stream": {"schema": {"type": "string"}, "example": _EVENTS}}},
-        **http.errors(404),
-    },
+    responses={200: described("generation", _EVENTS), **http.errors(404)},
     summary="Watch a run",
 )
 def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:

@@ -1,16 +1,30 @@
-"""Hostile requests are many, the same for the same seed, and their answers are judged."""
+"""Hostile requests are many, the same for the same seed, and their answers are judged; so is what a fuzzer reports."""
 
 from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
 
-from benchmarks.abuse import requests, uploads
+from benchmarks.abuse import __main__ as abuse
+from benchmarks.abuse import fuzz, requests, uploads
 from benchmarks.abuse.__main__ import _wrong
 from benchmarks.abuse.cases import Case
-from records import load_archive
+from benchmarks.abuse.filling import Filling
+from calibration.result import Comparison
+from calibration.search import CalibrationSpec
+from records import Dataset, load_archive
+from service.app import create_app
+from service.settings import Settings
+from tests.service import toy
+from tests.service.conftest import Api, serving
 
 PROBLEM = {"Content-Type": "application/problem+json"}
+Json = dict[str, Any]
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -41,3 +55,88 @@ def test_an_answer_is_judged(answer: str, status: int, headers: dict[str, str], 
     case = Case("x", answer=answer)  # type: ignore[arg-type]  # as above
     found = httpx.Response(status, headers=headers, content=text.encode())
     assert (_wrong(case, found) == "") is fine
+
+
+WELL: Json = {
+    "complete": True,
+    "stop_reason": "completed",
+    "operations": {"total": 45, "tested": 45},
+    "test_cases": {"generated": 1960},
+    "failures": [],
+    "errors": [],
+}
+FAILURE = {"title": "Server error", "count": 3, "operations": ["POST /v1/runs", "GET /v1/runs"]}
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({}, []),
+        ({"failures": [FAILURE]}, ["fuzz: Server error, 3 times in POST /v1/runs, GET /v1/runs"]),
+        ({"errors": [{"title": "Network Error", "count": 1}]}, ["fuzz: Network Error, 1 times"]),
+        ({"stop_reason": "interrupted"}, ["fuzz: ended early, interrupted"]),
+        ({"complete": False, "stop_reason": "error"}, ["fuzz: ended early, error"]),
+        ({"operations": {"total": 45, "tested": 44}}, ["fuzz: 44 of 45 calls of the API"]),
+        ({"operations": None}, ["fuzz: 0 of all calls of the API"]),
+    ],
+)
+def test_a_report_of_the_fuzzer_is_judged(changed: Json, said: list[str]) -> None:
+    assert fuzz.judged(WELL | changed) == said
+    assert fuzz.counted(WELL | changed) == 1960
+
+
+def test_without_the_fuzzer_the_benchmark_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz, "program", lambda: None)
+    monkeypatch.setattr(sys, "argv", ["abuse", "--json"])
+    with pytest.raises(SystemExit, match=r"pip install -e \.\[fuzz\]"):
+        abuse.main()
+
+
+def good_of(dataset: str, run: str) -> Json:
+    kind = {"dataset_id": dataset, "run_id": run, "recordings": ["slow"], "effects": ["added_mass"], "terms": []}
+    kinds = {name: kind | {"genes": {"stiffness": 1.0}} for name in ("tracks", "forces")}
+    more = {"diagnosis_id": "dx_" + "3" * 16, "key_id": "key_" + "4" * 16, "key": "x"}
+    return kinds | more | {"effects": ["added_mass"], "examples": []}
+
+
+def test_what_is_valid_is_filled_alike_for_the_same_request_and_what_others_need_is_not_deleted() -> None:
+    dataset, run = "ds_" + "1" * 16, "run_" + "2" * 16
+    filling = Filling(good_of(dataset, run), [b"zip"], seed=1)
+    asked = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
+    filled = [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
+    assert filled == [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
+    assert 25 < sum(one["dataset_id"] == dataset for one in filled) < 50
+    assert all(one["population"] == 8 and one["seed"] == 5 for one in filled)
+    assert all("preset" not in one for one in filled if one["dataset_id"] == dataset)
+    assert filling.spared({"run_id": run}) == {"run_id": "run_" + "0" * 16}
+    assert filling.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
+
+
+class FaultyEngine(toy.ToyEngine):
+    """Fails where only a request arrives that names a dataset, a recording and genes that exist."""
+
+    def compare(
+        self,
+        spec: CalibrationSpec,  # noqa: ARG002
+        dataset: Dataset,  # noqa: ARG002
+        genome: Mapping[str, float],  # noqa: ARG002
+        recording: str,
+    ) -> Comparison:
+        raise RuntimeError(f"a mistake with {recording}")
+
+
+@pytest.mark.skipif(fuzz.program() is None, reason="schemathesis is not installed")
+@pytest.mark.parametrize("engine", [toy.ToyEngine(), FaultyEngine()], ids=["sound", "faulty"])
+def test_the_fuzzer_finds_a_fault_deep_inside(tmp_path: Path, engine: toy.ToyEngine) -> None:
+    st = fuzz.program()
+    assert st is not None
+    app = create_app(Settings(data=tmp_path / "data"), engine=engine, make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        api = Api(client)
+        run = api.submit(dataset := api.upload()["id"])["id"]
+        api.finish(run)
+        folder = fuzz._given(good_of(dataset, run), 1, tmp_path / "fuzz")
+        report = fuzz._round(st, f"{client.base_url}{fuzz.SPECIFICATION}", "fuzzing", 8, 1, folder)
+    assert fuzz.counted(report) > 200
+    found = fuzz.judged(report)
+    assert any("POST /v1/simulations" in one for one in found) == isinstance(engine, FaultyEngine), found

@@ -13,8 +13,11 @@ from pydantic import BaseModel
 from calibration.spec import CalibrationSpec, resolved
 from records import Dataset
 from service import diagnosis_schemas, force_schemas, schemas, spec_schemas
+from service.transport import parse_events
 from sim.balance import delfly
 from sim.rig import robird_wing
+from tests.service import toy
+from tests.service.conftest import Api
 
 DOCS = Path(__file__).parents[2] / "docs" / "api.md"
 Specification = dict[str, Any]
@@ -61,6 +64,36 @@ def test_what_is_made_leads_to_the_calls_on_it(specification: Specification) -> 
     of_dataset = specification["paths"]["/v1/datasets"]["post"]["responses"]["201"]["links"]
     assert of_dataset["Submit a calibration"]["requestBody"] == {"dataset_id": "$response.body#/id"}
     assert of_dataset["Fetch a dataset"]["parameters"] == {"dataset_id": "$response.body#/id"}
+
+
+def test_nothing_is_null_that_is_sent_as_text(specification: Specification) -> None:
+    for method, path, operation in operations(specification):
+        for parameter in operation.get("parameters", ()):
+            assert "null" not in str(parameter["schema"]), (method, path, parameter["name"])
+    form = specification["components"]["schemas"]["Body_upload_v1_datasets_post"]["properties"]
+    assert form["name"]["maxLength"] == 200
+    assert "anyOf" not in form["name"]
+
+
+def test_events_are_as_described(api: Api, specification: Specification) -> None:
+    dataset = api.upload()["id"]
+    run, diagnosis = api.submit(dataset)["id"], api.diagnose(dataset)["id"]
+    api.finish(run)
+    api.diagnosed(diagnosis)
+    for kind, job in (("run", run), ("diagnosis", diagnosis)):
+        path = f"/v1/{'runs' if kind == 'run' else 'diagnoses'}/{{{kind}_id}}/events"
+        described = specification["paths"][path]["get"]["responses"]["200"]["content"]["text/event-stream"]["schema"]
+        with api.client.stream("GET", path.replace(f"{{{kind}_id}}", job)) as answer:
+            events = list(parse_events(answer.iter_lines()))
+        assert {event["event"] for event in events} == set(described["properties"]["event"]["enum"])
+        assert all(set(described["required"]) == set(event) and event["id"] for event in events)
+
+
+@pytest.mark.parametrize("filename", ["a.zip", "a.nc", "a", "a.tar"])
+def test_an_archive_comes_back_as_described(api: Api, specification: Specification, filename: str) -> None:
+    dataset = api.client.post("/v1/datasets", files={"file": (filename, toy.archive())}).json()["id"]
+    described = specification["paths"]["/v1/datasets/{dataset_id}/archive"]["get"]["responses"]["200"]["content"]
+    assert api.client.get(f"/v1/datasets/{dataset}/archive").headers["Content-Type"] in described
 
 
 def test_every_call_is_in_the_documentation_and_every_documented_one_exists(specification: Specification) -> None:

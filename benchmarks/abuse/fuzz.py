@@ -1,0 +1,172 @@
+"""schemathesis over the server's own description of its API: every phase, and thousands of cases.
+
+The check ``positive_data_acceptance`` is left out. It takes for a fault that a request valid in form is answered with
+422, as it must be where its content cannot be meant, such as a dataset that does not exist.
+
+Most made-up requests would end at the first name in them, so what is meant to be valid gets good values
+(:mod:`benchmarks.abuse.filling`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What the
+fuzzer submits is cancelled while it waits; a job that fails by a mistake of the server counts as a failure as well.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+from benchmarks.abuse import good, uploads
+from benchmarks.durability.works import archive
+from benchmarks.ray_nodes import REPOSITORY
+
+Json = dict[str, Any]
+MISSING = "the fuzzer is not installed; install it: pip install -e .[fuzz], or do without: --no-fuzz"
+SPECIFICATION = "/openapi.json"
+MISTAKE = "the server made a mistake"
+ANSWER_SECONDS, STREAM_SECONDS, RELIEF_SECONDS, ROUND_SECONDS = 60.0, 5.0, 2.0, 7200.0
+MOST_ROUNDS = 20
+PHASES, FURTHER_PHASES = "examples,coverage,fuzzing,stateful", "fuzzing,stateful"
+LONGEST_LINE, LAST_LINES = 200, 400
+CONFIGURATION = f"""
+request-timeout = {ANSWER_SECONDS}
+max-stream-events = 50
+
+[[operations]]
+include-path-regex = "/events$"
+request-timeout = {STREAM_SECONDS}
+"""
+
+
+def program() -> str | None:
+    """Where schemathesis is: beside this Python, or on the path."""
+    beside = Path(sys.executable).with_name("st")
+    return str(beside) if beside.is_file() else shutil.which("st")
+
+
+def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed: int, scratch: Path) -> Json:
+    """At least ``cases`` cases, and what failed; of one ``seed`` the same ones, but for ids."""
+    folder = _given(good.values(http, named), seed, scratch / "fuzz")
+    sent, failures = 0, list[str]()
+    with _relieved(str(http.base_url)):
+        for report in _rounds(st, http, cases, seed, folder):
+            sent += counted(report)
+            failures += judged(report)
+            print(f"fuzzed {sent} of {cases}", file=sys.stderr, flush=True)
+    failures += _mistakes(http)
+    if sent < cases:
+        failures.append(f"fuzz: {sent} cases in {MOST_ROUNDS} rounds; {cases} were asked for")
+    return {"fuzz_cases": sent, "fuzz_failures": len(failures), "failures": failures}
+
+
+def counted(report: Json) -> int:
+    """How many requests a round sent."""
+    return int(report["test_cases"]["generated"])
+
+
+def judged(report: Json) -> list[str]:
+    """What is wrong by the report of a round; a round that ended early or left out a call is wrong as well."""
+    found = [(one, f" in {', '.join(one['operations'])}") for one in report["failures"]]
+    found += [(one, "") for one in report["errors"]]
+    said = [f"fuzz: {one['title']}, {one['count']} times{where}" for one, where in found]
+    calls = report["operations"] or {"tested": 0, "total": "all"}
+    if not report["complete"] or report["stop_reason"] != "completed":
+        said.append(f"fuzz: ended early, {report['stop_reason']}")
+    if calls["tested"] != calls["total"]:
+        said.append(f"fuzz: {calls['tested']} of {calls['total']} calls of the API")
+    return said
+
+
+def _given(values: Json, seed: int, folder: Path) -> Path:
+    """What the hooks read, and the configuration."""
+    folder.mkdir()
+    (folder / "good.json").write_text(json.dumps({"good": values, "seed": seed}), encoding="utf-8")
+    (folder / "tracks.zip").write_bytes(uploads.small_archive())
+    (folder / "forces.zip").write_bytes(archive("delfly"))
+    (folder / "schemathesis.toml").write_text(CONFIGURATION, encoding="utf-8")
+    return folder
+
+
+def _rounds(st: str, http: httpx.Client, cases: int, seed: int, folder: Path) -> Iterator[Json]:
+    """Reports, until the cases are enough. Only the first has the phases that do not depend on chance."""
+    url = str(http.base_url.join(SPECIFICATION))
+    calls = sum(len(methods) for methods in http.get(SPECIFICATION).json()["paths"].values())
+    missing = cases
+    for number in range(MOST_ROUNDS):
+        phases = FURTHER_PHASES if number else PHASES
+        report = _round(st, url, phases, -(-missing // calls), seed + number, folder)
+        yield report
+        missing -= counted(report)
+        if missing <= 0:
+            return
+
+
+def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Path) -> Json:
+    report, log = folder / f"{seed}.json", folder / f"{seed}.log"
+    # fmt: off
+    command = [
+        st, "--config-file", str(folder / "schemathesis.toml"), "--no-color", "run", url, "--phases", phases,
+        "--max-examples", str(examples), "--seed", str(seed), "--exclude-checks", "positive_data_acceptance",
+        "--continue-on-failure", "--no-shrink", "--generation-database", "none",
+        "--report", "json", "--report-json-path", str(report),
+    ]
+    # fmt: on
+    hooks = {"SCHEMATHESIS_HOOKS": "benchmarks.abuse.fuzz_hooks", "WINGFIT_FUZZ_GOOD": str(folder)}
+    with log.open("wb") as stream:
+        ended = subprocess.run(  # noqa: S603  the fuzzer that was asked for
+            command,
+            env={**os.environ, "PYTHONPATH": str(REPOSITORY), **hooks},
+            cwd=folder,
+            stdout=stream,
+            stderr=subprocess.STDOUT,
+            timeout=ROUND_SECONDS,
+            check=False,
+        )
+    if ended.returncode:
+        lines = log.read_text(encoding="utf-8", errors="replace").splitlines()[-LAST_LINES:]
+        print("\n".join(line[:LONGEST_LINE] for line in lines), file=sys.stderr)
+    if not report.is_file():
+        raise RuntimeError(f"schemathesis ended with {ended.returncode} and without a report; its words stand above")
+    told: Json = json.loads(report.read_text(encoding="utf-8"))
+    return told
+
+
+@contextmanager
+def _relieved(url: str) -> Iterator[None]:
+    """Within the block, what was submitted and waits is cancelled."""
+    done = threading.Event()
+
+    def relieve() -> None:
+        with httpx.Client(base_url=url, timeout=ANSWER_SECONDS) as http:
+            while not done.wait(RELIEF_SECONDS):
+                with suppress(httpx.TransportError):  # of a server that is gone the fuzzer will tell
+                    good.cancel_queued(http)
+
+    thread = threading.Thread(target=relieve, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
+def _mistakes(http: httpx.Client) -> list[str]:
+    """Jobs that failed by no fault of the request."""
+    failed = [one for kind in ("runs", "diagnoses") for one in _all(http, f"/v1/{kind}?state=FAILED&limit=200")]
+    return [f"fuzz: {one['id']}: {one['error']}" for one in failed if MISTAKE in (one["error"] or "")]
+
+
+def _all(http: httpx.Client, path: str) -> Iterator[Json]:
+    page = http.get(path).json()
+    yield from page["items"]
+    while page["next_cursor"]:
+        page = http.get(f"{path}&cursor={page['next_cursor']}").json()
+        yield from page["items"]
