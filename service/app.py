@@ -85,6 +85,7 @@ def create_app(
     describe(app)
     _mount_pages(app)
     app.add_middleware(Quick)
+    app.add_middleware(problems.Unforeseen)
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)

@@ -15,6 +15,7 @@ from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.database import DatabaseClosedError, is_full
 
@@ -93,7 +94,33 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(DatabaseClosedError, _on_closed)
     app.add_exception_handler(OperationalError, _on_operational)
     app.add_exception_handler(sqlite3.OperationalError, _on_operational)
-    app.add_exception_handler(Exception, _on_bug)
+
+
+class Unforeseen:
+    """Answers errors that nothing else does, without a word about them.
+
+    The framework's own way is to answer outside all other layers, which would leave out their headers, and to let the
+    error go on, which ends the connection.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Handle one connection."""
+        begun = False
+
+        async def noted(message: Message) -> None:
+            nonlocal begun
+            begun = begun or message["type"] == "http.response.start"
+            await send(message)
+
+        try:
+            await self.app(scope, receive, noted)
+        except Exception as error:
+            if begun or scope["type"] != "http":
+                raise
+            await (await _on_bug(Request(scope), error))(scope, receive, send)
 
 
 async def _on_problem(_: Request, error: Exception) -> Response:

@@ -21,7 +21,8 @@ from service.reading import Reading
 from workers.jobs import State
 
 START = ["", "v1", "runs"]
-QUERY = re.compile(rb"([a-z_]+=[A-Za-z0-9_-]{1,200}(&|$))*")
+_PAIR = rb"[a-z_]+=[A-Za-z0-9_-]{1,200}"
+QUERY = re.compile(rb"(%b(&%b)*)?" % (_PAIR, _PAIR))
 STATES = frozenset({None, *State})
 
 

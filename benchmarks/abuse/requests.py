@@ -138,6 +138,8 @@ QUERIES = (
     "limit=1e3",
     "limit=",
     "limit=1&limit=2",
+    "limit=1&",
+    "&limit=1",
     "cursor=",
     "cursor=%00",
     "cursor=YmVmb3JlOjk5OTk5OTk5OTk5OTk5OTk5OTk5",

@@ -73,9 +73,9 @@ USUAL = (
 )  # fmt: skip
 UNUSUAL = (
     "runs/", "runs?limit=0", "runs?limit=201", "runs?limit=-1", "runs?limit=", "runs?limit=1.0", "runs?state=NONE",
-    "runs?state=", "runs?cursor=none", "runs?limit=1&limit=2", "runs?other=1", "runs/RUN?limit=1", "runs/none",
-    "runs/none/history", "runs/RUN/history?after=-1", "runs/RUN/history?limit=10001", "runs/RUN/history?limit=5000",
-    "runs/RUN/history?cursor=1", "runs/RUN/history?after=9007199254740992",
+    "runs?state=", "runs?cursor=none", "runs?limit=1&limit=2", "runs?limit=1&", "runs?&limit=1", "runs?other=1",
+    "runs/RUN?limit=1", "runs/none", "runs/none/history", "runs/RUN/history?after=-1", "runs/RUN/history?limit=10001",
+    "runs/RUN/history?limit=5000", "runs/RUN/history?cursor=1", "runs/RUN/history?after=9007199254740992",
 )  # fmt: skip
 
 
