@@ -80,7 +80,8 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
     text = decode(raw, file)
     if not text.strip():
         raise fail(file, None, f"the file is empty; it needs a header and at least {MIN_FRAMES} rows")
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    # Not io.StringIO, which takes four bytes for each character.
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(raw), "utf-8-sig", newline=""), strict=True)
     try:
         header = [name.strip() for name in next(reader)]
         if not header:

@@ -22,9 +22,10 @@ def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple
 
 
 def unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
-    """Faults for the recordings of a body that its dataset does not have."""
+    """Faults for the recordings of a body that its dataset does not have; what it has is listed once."""
+    unknown = [(place, name) for place, name in enumerate(names) if name not in known]
+    remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]
     return [
-        error_item(f"body.recordings.{place}", name, f"unknown; known are {', '.join(known)}")
-        for place, name in enumerate(names)
-        if name not in known
+        error_item(f"body.recordings.{place}", name, f"unknown; {remedy}")
+        for (place, name), remedy in zip(unknown, remedies, strict=False)
     ]

@@ -12,11 +12,11 @@ from service import store
 from service.database import Database
 from service.engine import Engine
 
-KEPT = 8
+KEPT, KEPT_BYTES = 8, 2**28
 
 
 class Datasets:
-    """The last few datasets used. They never change once uploaded."""
+    """The last few datasets used, of the largest only the last. They never change once uploaded."""
 
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
@@ -40,8 +40,12 @@ class Datasets:
         """Remember a dataset that was just parsed."""
         with self._lock:
             self._kept[dataset_id] = loaded
-            while len(self._kept) > KEPT:
+            while len(self._kept) > KEPT or (len(self._kept) > 1 and self._bytes > KEPT_BYTES):
                 self._kept.popitem(last=False)
+
+    @property
+    def _bytes(self) -> int:
+        return sum(recording.values.nbytes for one in self._kept.values() for recording in one.recordings)
 
     def delete(self, session: Session, dataset_id: str) -> None:
         """Delete a dataset here and there."""

@@ -22,6 +22,7 @@ from workers.jobs import State
 
 HEARTBEAT_SECONDS = 15.0
 CHUNK = 500
+MOST_STREAMS = 500
 MEDIA_TYPE = "text/event-stream"
 LastEventId = Annotated[
     str | None, Header(alias="Last-Event-ID", description="id of the last event that the caller has")
@@ -74,11 +75,15 @@ class Events:
         self._looks: dict[tuple[str, int, int], asyncio.Future[Seen | None]] = {}
 
     def answer(self, watched: Watched, last_event_id: str | None) -> StreamingResponse:
-        """The events after ``last_event_id``; a 422 for one that no stream has sent."""
+        """The events after ``last_event_id``; a 422 for one that no stream has sent, a 503 where too many are open."""
         text = (last_event_id or "0").strip()
         if not (text.isascii() and text.isdecimal() and len(text) <= 15):
             item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
             raise invalid("the Last-Event-ID is not one of this stream", [item])
+        if (opened := self._changes.watchers) >= MOST_STREAMS:
+            raise ProblemError(
+                503, "busy", f"{opened} event streams are open, the most that may; try again in some seconds"
+            )
         headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
         return StreamingResponse(self._stream(watched, int(text)), headers=headers, media_type=MEDIA_TYPE)
 

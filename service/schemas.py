@@ -256,6 +256,7 @@ class ResultOut(BaseModel):
     genes: list[GeneOut]
 
 
+MOST_COORDINATES = 1_000_000  # recorded ones in one answer
 Point = Annotated[list[float | None], Field(min_length=3, max_length=3)]
 
 
@@ -272,13 +273,17 @@ class NumericsOut(BaseModel):
 
 
 class ComparisonOut(BaseModel):
-    """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded."""
+    """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded.
+
+    ``every``: one of how many instants is here; 1, but for recordings that are too long for one answer.
+    """
 
     recording: str
     phase: list[float]
     markers: list[str]
     recorded_mm: list[list[Point]]
     simulated_mm: list[list[Point]]
+    every: int
     numerics: NumericsOut
 
 

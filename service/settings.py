@@ -34,6 +34,7 @@ class Settings:
         max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
         max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
         max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
+        max_stored_mb: MB of archives of one owner (``WINGFIT_MAX_STORED_MB``).
         keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
         log: text, or json, one object a line and requests as well (``WINGFIT_LOG``).
         require_keys: ask for an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
@@ -50,6 +51,7 @@ class Settings:
     max_runs: int = 2
     max_runs_per_owner: int | None = None
     max_active: int = 200
+    max_stored_mb: int = 10_000
     keep_days: int | None = None
     log: LogFormat = "text"
     require_keys: bool = False
@@ -60,6 +62,7 @@ class Settings:
         _in_range("WINGFIT_PORT", self.port, 0, 65535)
         _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
         _in_range("WINGFIT_MAX_ACTIVE", self.max_active, 1, 100_000)
+        _in_range("WINGFIT_MAX_STORED_MB", self.max_stored_mb, 1, 10**9)
         if self.max_runs_per_owner is not None:
             _in_range("WINGFIT_MAX_RUNS_PER_OWNER", self.max_runs_per_owner, 1, 64)
         if self.keep_days is not None:
@@ -93,6 +96,7 @@ class Settings:
             max_runs=_integer(read, "WINGFIT_MAX_RUNS", cls.max_runs),
             max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
             max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
+            max_stored_mb=_integer(read, "WINGFIT_MAX_STORED_MB", cls.max_stored_mb),
             keep_days=_some(read, "WINGFIT_KEEP_DAYS"),
             log=read.get("WINGFIT_LOG", cls.log),  # type: ignore[arg-type]  # checked above
             require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),

@@ -6,7 +6,7 @@ import logging
 import sqlite3
 from collections.abc import AsyncIterator, Callable
 from importlib.metadata import PackageNotFoundError, version
-from typing import Annotated, cast
+from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
 
@@ -30,7 +30,7 @@ from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
 from service.tables import DiagnosisRow, RunRow
-from service.turns import Turns
+from service.turns import UPLOADS_AT_ONCE, Turns
 from service.work import Work
 
 LOG = logging.getLogger("wingfit")
@@ -58,7 +58,7 @@ class Service:
         self.changes = Changes()
         self.reading = Reading(database)
         self.events = Events(database, self.changes)
-        self.turns = Turns()
+        self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
@@ -157,10 +157,14 @@ async def _service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(_service)]
 
 
-async def _in_turn(service: ServiceDep) -> AsyncIterator[None]:
-    async with service.turns.turn():
-        yield
+def _in_turn(turns_of: Callable[[Service], Turns]) -> Any:
+    async def taken(service: ServiceDep) -> AsyncIterator[None]:
+        async with turns_of(service).turn():
+            yield
+
+    return Depends(taken)
 
 
-# Of a route that simulates: it begins when its turn comes.
-IN_TURN = Depends(_in_turn)
+# Of a route that simulates, or reads an upload: it begins when its turn comes.
+IN_TURN = _in_turn(lambda service: service.turns)
+IN_TURN_OF_UPLOADS = _in_turn(lambda service: service.uploads)

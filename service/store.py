@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from calibration.search import CalibrationSpec
@@ -25,12 +25,14 @@ from service.tables import (
     FindingRow,
     GenerationRow,
     JobRow,
+    OwnedRow,
     RunRow,
     StepRow,
 )
 from workers.jobs import Job, State, Wish
 
 ANSWERS_KEPT = timedelta(days=7)
+MB = 10**6
 # What specifications meant that were stored before there was a choice.
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
@@ -107,6 +109,18 @@ def archive(session: Session, dataset_id: str) -> bytes:
     if body is None:
         raise not_found("dataset", dataset_id)
     return body
+
+
+def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
+    """A 429 where the archives of an owner would take more than ``most_mb``."""
+    held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
+    if held + size > most_mb * MB:
+        raise ProblemError(
+            429,
+            "too-many",
+            f"the archives of one owner may take {most_mb} MB (WINGFIT_MAX_STORED_MB); these take {held / MB:.1f} MB, "
+            f"this one {size / MB:.1f} MB more; delete datasets that are not needed",
+        )
 
 
 def delete_dataset(session: Session, dataset_id: str) -> None:
@@ -201,8 +215,12 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
 
 
 def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
-    his = table.owner.is_(None) if owner is None else table.owner == owner
-    return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE), his)) or 0
+    his = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+    return session.scalar(his) or 0
+
+
+def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
+    return table.owner.is_(None) if owner is None else table.owner == owner
 
 
 def states(session: Session, table: type[JobRow]) -> list[tuple[str, int]]:

@@ -1,4 +1,4 @@
-"""Lets a few simulations in at a time; the others wait without a thread, so that reading goes on meanwhile."""
+"""Lets a few requests in at a time that take time or memory; the others wait without a thread, and reading goes on."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from contextlib import asynccontextmanager
 from service.problems import ProblemError
 
 AT_ONCE = 4
+# A dataset of the largest size takes some gigabytes while it is read.
+UPLOADS_AT_ONCE = 2
 MOST_WAITING = 64
 
 
 class Turns:
     """``at_once`` may work, ``most_waiting`` may wait; who comes then is told to come later."""
 
-    def __init__(self, at_once: int = AT_ONCE, most_waiting: int = MOST_WAITING) -> None:
-        self._free = asyncio.Semaphore(at_once)
+    def __init__(self, what: str = "simulations", at_once: int = AT_ONCE, most_waiting: int = MOST_WAITING) -> None:
+        self._what, self._free = what, asyncio.Semaphore(at_once)
         self._most, self._waiting = most_waiting, 0
 
     async def take(self) -> None:
         """Wait for a turn; a 503 where too many do."""
         if self._free.locked() and self._waiting >= self._most:
             raise ProblemError(
-                503, "busy", f"{self._waiting} simulations wait already, the most that may; try again in some seconds"
+                503, "busy", f"{self._waiting} {self._what} wait already, the most that may; try again in some seconds"
             )
         self._waiting += 1
         try:

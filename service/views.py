@@ -125,12 +125,14 @@ def result(outcome: Result) -> schemas.ResultOut:
 
 def comparison(tracks: Comparison) -> dict[str, Any]:
     """Tracks as plain JSON: validating every coordinate would take longer than simulating them."""
+    every = max(1, -(-tracks.recorded.size // schemas.MOST_COORDINATES))
     return {
         "recording": tracks.recording,
-        "phase": tidy_phase(tracks.phase).tolist(),
+        "phase": tidy_phase(tracks.phase[::every]).tolist(),
         "markers": list(tracks.markers),
-        "recorded_mm": _track(tracks.recorded),
-        "simulated_mm": _track(tracks.simulated),
+        "recorded_mm": _track(tracks.recorded[::every]),
+        "simulated_mm": _track(tracks.simulated[::every]),
+        "every": every,
         "numerics": numerics(tracks),
     }
 

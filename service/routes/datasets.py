@@ -16,7 +16,7 @@ from service.access import owner_of_new
 from service.guard import UPLOAD_LIMIT
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import DatasetOut, Page
-from service.state import Service, ServiceDep
+from service.state import IN_TURN_OF_UPLOADS, Service, ServiceDep
 from service.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
@@ -29,8 +29,9 @@ ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
     "",
     status_code=201,
     response_model=DatasetOut,
-    responses={201: {"headers": http.LOCATION}, **http.errors(400, 413)},
+    responses={201: {"headers": http.LOCATION}, **http.errors(400, 413, 429)},
     summary="Upload a dataset",
+    dependencies=[IN_TURN_OF_UPLOADS],
 )
 def upload(
     request: Request,
@@ -54,6 +55,7 @@ def upload(
 
     def create(session: Session) -> store.Answer:
         row = _row(loaded, name, filename, digest, len(data))
+        store.make_room(session, row.owner, len(data), service.settings.max_stored_mb)
         session.add(row)
         session.flush()
         session.add(ArchiveRow(dataset_id=row.id, body=data))

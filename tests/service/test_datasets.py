@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import httpx
 import pytest
 
-from service import guard
+from service import datasets, guard
+from service.database import Database
 from tests.service import toy
 from tests.service.conftest import Api
 
@@ -87,6 +89,26 @@ def test_what_is_too_large_is_a_413(api: Api, monkeypatch: pytest.MonkeyPatch) -
     answer = api.client.post("/v1/datasets", content=chunks(), headers=headers)  # type: ignore[arg-type]
     assert (answer.status_code, answer.json()["type"]) == (413, "urn:wingfit:problem:too-large")
     assert api.get("/v1/datasets")["items"] == []
+
+
+def test_of_large_datasets_only_the_last_is_kept_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = toy.ToyEngine()
+    loaded = [engine.load(toy.archive(name=f"{k}"), "a.zip") for k in range(datasets.KEPT + 2)]
+    database = Database(tmp_path)
+    kept = datasets.Datasets(database, engine)
+
+    def held() -> list[int]:
+        for number, dataset in enumerate(loaded):
+            kept.keep(str(number), dataset)
+        return [int(name) for name in kept._kept]
+
+    assert held() == list(range(2, datasets.KEPT + 2))
+    size = sum(recording.values.nbytes for recording in loaded[0].recordings)
+    monkeypatch.setattr(datasets, "KEPT_BYTES", 3 * size)
+    assert held() == [datasets.KEPT - 1, datasets.KEPT, datasets.KEPT + 1]
+    monkeypatch.setattr(datasets, "KEPT_BYTES", 1)
+    assert held() == [datasets.KEPT + 1]
+    database.close()
 
 
 def test_lists_come_in_pages_with_opaque_cursors(api: Api) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
+from service import events as streams
 from tests.service.conftest import Api, Gate
 
 Event = tuple[str, str, dict[str, Any]]
@@ -46,6 +47,18 @@ def test_a_stream_tells_everything_and_ends(api: Api) -> None:
     history = api.history(run)
     assert [{key: data[key] for key in history[0]} for data in generations] == history
     assert all(data["eta_seconds"] is not None for data in generations)
+
+
+def test_a_crowd_of_streams_is_told_to_come_later(api: Api, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(streams, "MOST_STREAMS", 1)
+    run = api.submit(api.upload()["id"])["id"]
+    open_stream = events(api, run)
+    assert next(open_stream)[1] == "state"
+    refused = api.client.get(f"/v1/runs/{run}/events")
+    assert (refused.status_code, refused.json()["type"]) == (503, "urn:wingfit:problem:busy")
+    gate.let(10)
+    list(open_stream)
+    assert list(events(api, run))[-1][1] == "state"
 
 
 def test_a_reconnect_misses_nothing_and_repeats_nothing(api: Api, gate: Gate) -> None:

@@ -17,7 +17,7 @@ from records import Dataset
 from service.app import create_app
 from service.problems import ProblemError
 from service.settings import Settings
-from service.turns import AT_ONCE, Turns
+from service.turns import AT_ONCE, UPLOADS_AT_ONCE, Turns
 from tests.service import toy
 from tests.service.conftest import Api, serving
 
@@ -59,9 +59,40 @@ def test_reading_goes_on_while_simulations_wait(tmp_path: Path) -> None:
             assert {one.result() for one in asked} == {200}
 
 
+class HeldReader(toy.ToyEngine):
+    """Its reading of an upload lasts until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entered, self.go = threading.Semaphore(0), threading.Event()
+
+    def load(self, data: bytes, filename: str) -> Dataset:
+        self.entered.release()
+        assert self.go.wait(20)
+        return super().load(data, filename)
+
+
+def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
+    engine, crowd = HeldReader(), UPLOADS_AT_ONCE + 4
+    with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
+
+        def upload(_: int) -> int:
+            with httpx.Client(base_url=client.base_url, timeout=30) as one:
+                return one.post("/v1/datasets", files={"file": ("a.zip", toy.archive())}).status_code
+
+        with ThreadPoolExecutor(crowd) as pool:
+            asked = [pool.submit(upload, k) for k in range(crowd)]
+            for _ in range(UPLOADS_AT_ONCE):
+                assert engine.entered.acquire(timeout=20)
+            assert not engine.entered.acquire(timeout=0.2)  # no more at once
+            assert client.get("/v1/datasets", timeout=5).status_code == 200
+            engine.go.set()
+            assert {one.result() for one in asked} == {201}
+
+
 def test_a_crowd_is_told_to_come_later() -> None:
     async def scene() -> None:
-        turns = Turns(at_once=1, most_waiting=2)
+        turns = Turns("simulations", at_once=1, most_waiting=2)
         await turns.take()
         waiting = [asyncio.create_task(turns.take()) for _ in range(2)]
         await asyncio.sleep(0)

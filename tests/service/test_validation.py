@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from service import schemas
 from tests.service.conftest import Api
 
 
@@ -78,6 +79,14 @@ def test_an_unknown_name_lists_the_known_ones(api: Api) -> None:
     assert errors[1]["value"] == "stifness"
 
 
+def test_what_is_known_is_listed_once(api: Api) -> None:
+    body = {"dataset_id": api.upload()["id"], "recordings": [f"r{k}" for k in range(1000)]}
+    answer = api.client.post("/v1/runs", json=body)
+    errors = answer.json()["errors"]
+    assert len(errors) == 1000
+    assert [error["message"].count("slow") for error in errors] == [1] + [0] * 999
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"dataset_id": "\\ud800"}', '{"dataset_id": "x", "tolerance": NaN}'])
 def test_a_body_that_is_no_json_object_is_a_problem(api: Api, text: str) -> None:
     answer = api.client.post("/v1/runs", content=text, headers={"Content-Type": "application/json"})
@@ -97,6 +106,18 @@ def test_a_simulation(api: Api) -> None:
     assert tracks["mean_distance_mm"] == pytest.approx(1.01 * 3**0.5)
     nominal = api.client.post("/v1/simulations", json=body | {"genome": {}}).json()
     assert nominal["mean_distance_mm"] > tracks["mean_distance_mm"]
+
+
+def test_of_a_long_recording_some_instants_are_answered(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    body: dict[str, Any] = {"dataset_id": api.upload()["id"], "recording": "fast"}
+    whole = api.client.post("/v1/simulations", json=body).json()
+    assert (whole["every"], len(whole["phase"])) == (1, 4)
+    monkeypatch.setattr(schemas, "MOST_COORDINATES", 4 * 6 // 2)
+    thinned = api.client.post("/v1/simulations", json=body).json()
+    assert thinned["every"] == 2
+    for name in ("phase", "recorded_mm", "simulated_mm"):
+        assert thinned[name] == whole[name][::2]
+    assert thinned["mean_distance_mm"] == whole["mean_distance_mm"]
 
 
 @pytest.mark.parametrize(
