@@ -14,7 +14,9 @@ import pytest
 import uvicorn
 from fastapi import FastAPI
 
+from service import keys
 from service.app import create_app
+from service.database import Database
 from service.protocol import Protocol
 from service.settings import Settings
 from tests.service import toy, toy_diagnosis
@@ -99,6 +101,9 @@ class Api:
         return list(self.get(f"/v1/runs/{run_id}/history?limit=10000")["items"])
 
 
+As = Callable[[str], Api]
+
+
 @contextmanager
 def serving(app: FastAPI) -> Iterator[httpx.Client]:
     """Serve ``app`` on a free loopback port from a thread."""
@@ -147,8 +152,50 @@ def diagnoser(request: pytest.FixtureRequest) -> toy_diagnosis.ToyDiagnoser:
     return toy_diagnosis.ToyDiagnoser(gate=request.getfixturevalue("gate") if held else None)
 
 
+def made(folder: Path, name: str, *scopes: str, owner: str = "") -> str:
+    """The secret of a new key."""
+    database = Database(folder)
+    with database.write() as session:
+        _, secret = keys.make(session, name, owner or name, scopes)  # type: ignore[arg-type]
+    database.close()
+    return secret
+
+
 @pytest.fixture
-def client(settings: Settings, engine: toy.ToyEngine, diagnoser: toy_diagnosis.ToyDiagnoser) -> Iterator[httpx.Client]:
+def secrets(settings: Settings) -> dict[str, str]:
+    folder = settings.data
+    return {
+        "admin": made(folder, "admin", "admin"),
+        "ann": made(folder, "ann", "read", "write"),
+        "ann-reads": made(folder, "ann-reads", "read", owner="ann"),
+        "bob": made(folder, "bob", "read", "write"),
+    }
+
+
+@pytest.fixture
+def as_(client: httpx.Client, secrets: dict[str, str]) -> Iterator[As]:
+    """The API as it answers to whom a key belongs."""
+    opened = []
+
+    def api(name: str) -> Api:
+        headers = {"Authorization": f"Bearer {secrets[name]}"}
+        opened.append(httpx.Client(base_url=client.base_url, headers=headers, timeout=20.0))
+        return Api(opened[-1])
+
+    yield api
+    for one in opened:
+        one.close()
+
+
+@pytest.fixture
+def client(
+    request: pytest.FixtureRequest,
+    settings: Settings,
+    engine: toy.ToyEngine,
+    diagnoser: toy_diagnosis.ToyDiagnoser,
+) -> Iterator[httpx.Client]:
+    if settings.keys:
+        request.getfixturevalue("secrets")  # before the server has the folder
     app = create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator, diagnoser=diagnoser)
     with serving(app) as client:
         yield client

@@ -4,75 +4,25 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 from typer.testing import CliRunner
 
-from service import keys
 from service.app import create_app
 from service.cli import app as commands
 from service.client import Client, WingfitError
 from service.database import FILE_NAME, Database
 from service.server import ServeError, serve
 from service.settings import Settings, SettingsError
-from tests.service import toy, toy_diagnosis
-from tests.service.conftest import Api, Gate, Json, serving
-
-As = Callable[..., Api]
-
-
-def made(folder: Path, name: str, *scopes: str, owner: str = "") -> str:
-    database = Database(folder)
-    with database.write() as session:
-        _, secret = keys.make(session, name, owner or name, scopes)  # type: ignore[arg-type]
-    database.close()
-    return secret
+from tests.service import toy
+from tests.service.conftest import Api, As, Gate, Json, made, serving
 
 
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     return Settings(data=tmp_path / "data", require_keys=True, max_active=3, max_runs_per_owner=1)
-
-
-@pytest.fixture
-def secrets(settings: Settings) -> dict[str, str]:
-    folder = settings.data
-    return {
-        "admin": made(folder, "admin", "admin"),
-        "ann": made(folder, "ann", "read", "write"),
-        "ann-reads": made(folder, "ann-reads", "read", owner="ann"),
-        "bob": made(folder, "bob", "read", "write"),
-    }
-
-
-@pytest.fixture
-def client(
-    secrets: dict[str, str],
-    settings: Settings,
-    engine: toy.ToyEngine,
-    diagnoser: toy_diagnosis.ToyDiagnoser,
-) -> Iterator[httpx.Client]:
-    assert secrets
-    with serving(create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator, diagnoser=diagnoser)) as client:
-        yield client
-
-
-@pytest.fixture
-def as_(client: httpx.Client, secrets: dict[str, str]) -> Iterator[As]:
-    """The API as it answers to whom a key belongs."""
-    opened = []
-
-    def api(name: str) -> Api:
-        headers = {"Authorization": f"Bearer {secrets[name]}"}
-        opened.append(httpx.Client(base_url=client.base_url, headers=headers, timeout=20.0))
-        return Api(opened[-1])
-
-    yield api
-    for one in opened:
-        one.close()
 
 
 def bearer(secret: str) -> dict[str, str]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.service.browsing import Seen, chromium
+from tests.service.conftest import made
 from tests.service.processes import ServerProcess
-from tests.service.test_keys import bearer, made
+from tests.service.test_keys import bearer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
