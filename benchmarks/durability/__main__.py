@@ -25,8 +25,8 @@ import numpy as np
 from benchmarks import machine
 from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
-from benchmarks.durability.visitors import FINAL, Visitor, outcome, settle
-from benchmarks.durability.works import WORKS, archive
+from benchmarks.durability.visitors import FINAL, Visitor, finding, outcome, settle, settle_diagnosis
+from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, archive
 from benchmarks.server_process import Server
 from service.database import FILE_NAME
 
@@ -34,6 +34,7 @@ Json = dict[str, Any]
 KILLS = {"server": 300, "workers": 60, "nodes": 20, "stack": 20}
 VISITORS = 2
 LONGEST_LIFE = 2.5  # s
+OF_DIAGNOSES = "diagnosis"
 PLACES = ("commit", "committed", "answer")
 QUIET_SECONDS = 600.0
 EVALUATORS = {"server": "in_process", "workers": "processes", "nodes": "ray", "stack": "ray"}
@@ -85,14 +86,22 @@ def undisturbed(folder: Path) -> dict[str, Json]:
             for example in {work.example for work in WORKS}
         }
         for work in WORKS:
-            run = http.post("/v1/runs", json=work.body | {"dataset_id": uploaded[work.example]}).json()["id"]
-            while (now := http.get(f"/v1/runs/{run}").json())["state"] not in FINAL:
-                time.sleep(0.05)
-            if now["state"] != "SUCCEEDED":
-                raise RuntimeError(f"{work.name} {now['state']}: {now['error']}")
+            run = _ended(http, "runs", work.body | {"dataset_id": uploaded[work.example]})
             ends[work.name] = outcome(run, lambda path: http.get(path).json())
+        diagnosis = _ended(http, "diagnoses", DIAGNOSIS | {"dataset_id": uploaded[DIAGNOSED]})
+        ends[OF_DIAGNOSES] = finding(diagnosis, lambda path: http.get(path).json())
     server.stop()
     return ends
+
+
+def _ended(http: httpx.Client, kind: str, body: Json) -> str:
+    """Id of a run or a diagnosis that was submitted and has succeeded."""
+    job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
+    while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:
+        time.sleep(0.05)
+    if now["state"] != "SUCCEEDED":
+        raise RuntimeError(f"{now['name']} {now['state']}: {now['error']}")
+    return job
 
 
 def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
@@ -126,6 +135,7 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
         "kills": kills,
         "acknowledged": ledger.acknowledged,
         "runs": len(ledger.runs),
+        "diagnoses": len(ledger.diagnoses),
         "results": ledger.results,
         "identical": ledger.identical,
         "different": ledger.different,
@@ -209,9 +219,27 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
                     continue
                 left.remove(run)
             time.sleep(0.2)
+        waiting = _diagnoses(ledger, fetch, expected[OF_DIAGNOSES], deadline)
         for run in ledger.runs:
             items = fetch(f"/v1/runs/{run}/history?limit=10000")
             ledger.history(run, items["items"] if items else [])
+    return len(left) + waiting
+
+
+def _diagnoses(ledger: Ledger, fetch: Callable[[str], Json | None], expected: Json, deadline: float) -> int:
+    """The same for diagnoses."""
+    left = [diagnosis for diagnosis, state in ledger.diagnoses.items() if state is None]
+    while left and time.monotonic() < deadline:
+        for diagnosis in list(left):
+            now = fetch(f"/v1/diagnoses/{diagnosis}")
+            if now is None:
+                ledger.lose(f"diagnosis {diagnosis} is unknown")
+            elif now["state"] in FINAL:
+                settle_diagnosis(ledger, diagnosis, now, fetch, expected)
+            else:
+                continue
+            left.remove(diagnosis)
+        time.sleep(0.2)
     return len(left)
 
 

@@ -33,7 +33,8 @@ class Ledger:
 
     datasets: dict[str, str] = field(default_factory=dict)
     runs: dict[str, KnownRun] = field(default_factory=dict)
-    deleted: set[str] = field(default_factory=set)
+    diagnoses: dict[str, str | None] = field(default_factory=dict)
+    """State of each once seen to have ended."""
     lost: list[str] = field(default_factory=list)
     acknowledged: int = 0
     results: int = 0
@@ -63,7 +64,7 @@ class Ledger:
             seen.update(now)
 
     def result(self, run: str, found: Json, expected: Json) -> None:
-        """Compare how a run ended with how an undisturbed one did."""
+        """Compare how a run or a diagnosis ended with how an undisturbed one did."""
         with self.lock:
             self.results += 1
             self.identical += found == expected

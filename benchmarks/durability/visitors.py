@@ -12,12 +12,13 @@ import httpx
 import numpy as np
 
 from benchmarks.durability.ledger import KnownRun, Ledger, without_times
-from benchmarks.durability.works import WORKS, Work, archive
+from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, Work, archive
 
 Json = dict[str, Any]
 FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
 ACTIVE = 3  # runs of one visitor at a time
 MOST_DATASETS = 3
+MOST_DIAGNOSES = 2  # of all visitors
 WAIT_SECONDS = 0.02
 ANSWERED = frozenset(range(200, 500))
 
@@ -63,7 +64,8 @@ class Visitor(threading.Thread):
             return
         run = open_[self._rng.integers(len(open_))]
         acts: list[tuple[Callable[[str], None], float]] = [
-            (self._look, 0.75),
+            (self._look, 0.73),
+            (self._diagnose, 0.02),
             (self._pause_and_resume, 0.13),
             (self._cancel, 0.07),
             (self._read_dataset, 0.05),
@@ -123,6 +125,18 @@ class Visitor(threading.Thread):
             known.endings = ("CANCELLED",)
             self._ledger.acknowledge()
 
+    def _diagnose(self, _run: str) -> None:
+        dataset, known = self._dataset(DIAGNOSED), list(self._ledger.diagnoses)
+        if len(known) < MOST_DIAGNOSES:
+            answer = self._ask("POST", "/v1/diagnoses", json=DIAGNOSIS | {"dataset_id": dataset}, repeated=True)
+            if answer.status_code != 202:
+                raise AssertionError(f"a good diagnosis was refused: {answer.text}")
+            with self._ledger.lock:
+                self._ledger.diagnoses[answer.json()["id"]] = None
+            self._ledger.acknowledge()
+        elif self._fetch(f"/v1/diagnoses/{known[self._rng.integers(len(known))]}") is None:
+            self._ledger.lose("a diagnosis is unknown")
+
     def _read_dataset(self, _run: str) -> None:
         with self._ledger.lock:
             known = list(self._ledger.datasets.items())
@@ -164,6 +178,24 @@ def settle(
     if now["state"] == "SUCCEEDED":
         ledger.result(run, outcome(run, fetch), expected[known.work])
     known.final = now["state"]
+
+
+def settle_diagnosis(
+    ledger: Ledger, diagnosis: str, now: Json, fetch: Callable[[str], Json | None], expected: Json
+) -> None:
+    """Judge a diagnosis that has ended."""
+    if now["state"] != "SUCCEEDED":
+        ledger.lose(f"diagnosis {diagnosis} is {now['state']}: {now['error']}")
+    else:
+        ledger.result(diagnosis, finding(diagnosis, fetch), expected)
+    ledger.diagnoses[diagnosis] = now["state"]
+
+
+def finding(diagnosis: str, fetch: Callable[[str], Json | None]) -> Json:
+    """All that a diagnosis found, without what a clock says."""
+    return {
+        key: value for key, value in (fetch(f"/v1/diagnoses/{diagnosis}/finding") or {}).items() if key != "seconds"
+    }
 
 
 def outcome(run: str, fetch: Callable[[str], Json | None]) -> Json:

@@ -40,6 +40,11 @@ WORKS = (
 )
 
 
+DIAGNOSIS: Json = {"axes": ["x", "z"], "seed": 1}
+"""Of what a balance recorded; begun again after every death of the server, it ends when there is peace."""
+DIAGNOSED = "delfly"
+
+
 def archive(example: str) -> bytes:
     """An example's folder as a zip, the same bytes every time."""
     packed, folder = io.BytesIO(), EXAMPLES / example
