@@ -34,6 +34,8 @@ Json = dict[str, Any]
 KILLS = {"server": 300, "workers": 60, "nodes": 20, "stack": 20}
 VISITORS = 2
 LONGEST_LIFE = 2.5  # s
+# A diagnosis begins again with every life of the server: it must not stand in the way of the runs.
+ROOMY = {"WINGFIT_MAX_RUNS": "4"}
 OF_DIAGNOSES = "diagnosis"
 PLACES = ("commit", "committed", "answer")
 QUIET_SECONDS = 600.0
@@ -108,7 +110,8 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
     """Deaths of one kind under visitors, then quiet, then the reckoning."""
     folder.mkdir()
     cluster = Cluster(folder) if EVALUATORS[kind] == "ray" else None
-    server = Server(folder, EVALUATORS[kind], cluster.token if cluster else None, cluster.address if cluster else "")
+    token, address = (cluster.token, cluster.address) if cluster else (None, "")
+    server = Server(folder, EVALUATORS[kind], token, address, ROOMY)
     server.start()
     ledger, rng = Ledger(), np.random.default_rng([seed, kills])
     visitors = [Visitor(number, seed, server.port, ledger, expected) for number in range(VISITORS)]
