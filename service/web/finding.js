@@ -10,7 +10,7 @@ const ALMOST = 0.999;
 
 let finding = null;
 const stage = () => document.querySelector("input[name=stage]:checked").value;
-export const unit = () => (finding.unit === "m" ? "mm" : "mN");
+const unit = () => (finding.unit === "m" ? "mm" : "mN");
 const size = (value) => (value === null ? DASH : `${significant(1e3 * value, 3)} ${unit()}`);
 const percent = (part) => (part === null || part === undefined ? DASH : `${significant(100 * part, part > 0.1 ? 3 : 2)} %`);
 const chance = (part) => (part > ALMOST && part < 1 ? "> 99.9 %" : part > 0 && part < 1 - ALMOST ? "< 0.1 %" : percent(part));
