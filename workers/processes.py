@@ -13,7 +13,6 @@ import queue
 import signal
 import threading
 import traceback
-from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -26,8 +25,9 @@ from calibration.problem import Evaluation, Misfit, Problem
 from workers.errors import EvaluatorClosedError, WorkerLostError
 from workers.share import ProblemMemory, Task, child_environment, lower_priority
 
-ATTEMPTS = 3
-Answer = tuple[Literal["done", "raised", "need problem"], Any]
+# Deaths in a row after which a unit is given up: of processes that had begun it, as with Ray, and of any.
+ATTEMPTS, STARTS = 6, 60
+Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
 class ProcessPoolEvaluator:
@@ -83,20 +83,22 @@ class ProcessPoolEvaluator:
             raise EvaluatorClosedError(self.kind)
 
     def _run(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
-        worker = self._idle.get()
+        worker, blamed, died = self._idle.get(), 0, 0
         try:
-            for _ in range(ATTEMPTS):
+            while blamed < ATTEMPTS and died < STARTS:
                 try:
                     return worker.run(problem, task, residuals)
-                except _Died:
+                except _Died as death:
+                    # One that dies while it starts has not seen the unit yet.
+                    blamed, died = blamed + death.begun, died + 1
                     self._restart(worker)
         finally:
             self._idle.put(worker)
         name = problem.recordings[task.unit.recording].name
+        where = f"on the same {len(task.values)} individuals" if blamed == ATTEMPTS else "before any of them had begun"
         raise WorkerLostError(
-            f"{ATTEMPTS} worker processes died one after the other on the same {len(task.values)} "
-            f"individuals against recording {name!r} (the last with {worker.last_exit}); if memory ran out, "
-            f"use fewer workers than {self.workers}"
+            f"{died} worker processes died one after the other {where} against recording {name!r} "
+            f"(the last with {worker.last_exit}); if memory ran out, use fewer workers than {self.workers}"
         )
 
     def _restart(self, worker: _Worker) -> None:
@@ -107,7 +109,11 @@ class ProcessPoolEvaluator:
 
 
 class _Died(Exception):  # noqa: N818  internal
-    """The process at the other end of the pipe is gone."""
+    """The process at the other end of the pipe is gone; ``begun``: with a unit that it had begun."""
+
+    def __init__(self, *, begun: bool) -> None:
+        super().__init__()
+        self.begun = begun
 
 
 class _Worker:
@@ -131,23 +137,22 @@ class _Worker:
 
     def run(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
         """Have ``task`` done; _Died when the process is dead, or what the model raised."""
-        kind, content = self._ask((problem.key, task, residuals))
-        if kind == "need problem":
-            kind, content = self._ask(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
+        if self._connection is None:
+            raise _Died(begun=False)
+        kind: str = "not yet"
+        try:
+            self._connection.send((problem.key, task, residuals))
+            while kind not in ("done", "raised"):
+                answer: Answer = self._connection.recv()
+                kind, content = answer
+                if kind == "need problem":
+                    self._connection.send(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
+        except (EOFError, OSError) as error:
+            raise _Died(begun=kind == "begun") from error
         if kind == "raised":
             raise content
         assert isinstance(content, Misfit)  # noqa: S101
         return content
-
-    def _ask(self, message: object) -> Answer:
-        if self._connection is None:
-            raise _Died
-        try:
-            self._connection.send(message)
-            answer: Answer = self._connection.recv()
-        except (EOFError, OSError) as error:
-            raise _Died from error
-        return answer
 
     def kill(self) -> None:
         """End the process at once; a thread that waits for it gets _Died."""
@@ -172,23 +177,24 @@ def _serve(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
     problems = ProblemMemory()
-
-    def fetch() -> bytes:
-        connection.send(("need problem", None))
-        content: bytes = connection.recv()
-        return content
-
     while True:
         try:
             key, task, residuals = connection.recv()
         except (EOFError, OSError):
             return
-        connection.send(_attempt(problems, fetch, key, task, residuals))
+        connection.send(_attempt(connection, problems, key, task, residuals))
 
 
-def _attempt(problems: ProblemMemory, fetch: Callable[[], bytes], key: str, task: Task, residuals: bool) -> Answer:
+def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Task, residuals: bool) -> Answer:
+    def fetch() -> bytes:
+        connection.send(("need problem", None))
+        content: bytes = connection.recv()
+        return content
+
     try:
-        return "done", task.run(problems.get(key, fetch), residuals=residuals)
+        problem = problems.get(key, fetch)
+        connection.send(("begun", None))
+        return "done", task.run(problem, residuals=residuals)
     except Exception as error:
         error.add_note(f"raised in worker process {os.getpid()}:\n{traceback.format_exc()}")
         return "raised", _portable(error)

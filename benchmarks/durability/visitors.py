@@ -64,11 +64,12 @@ class Visitor(threading.Thread):
             return
         run = open_[self._rng.integers(len(open_))]
         acts: list[tuple[Callable[[str], None], float]] = [
-            (self._look, 0.73),
+            # A run is looked at some hundred times: most shall end by themselves.
+            (self._look, 0.93),
             (self._diagnose, 0.02),
-            (self._pause_and_resume, 0.13),
-            (self._cancel, 0.07),
-            (self._read_dataset, 0.05),
+            (self._pause_and_resume, 0.01),
+            (self._cancel, 0.002),
+            (self._read_dataset, 0.038),
         ]
         choice = int(self._rng.choice(len(acts), p=[weight for _, weight in acts]))
         acts[choice][0](run)

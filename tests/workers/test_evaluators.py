@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +21,7 @@ from calibration.evaluator import gather, run_unit, units
 from calibration.problem import Evaluation, Problem
 from tests.workers import pendulum
 from workers import EvaluatorClosedError, EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator
+from workers.processes import ATTEMPTS
 
 KINDS: tuple[EvaluatorKind, ...] = ("in_process", "processes", "ray")
 DISTRIBUTED: tuple[EvaluatorKind, ...] = ("processes", "ray")
@@ -141,6 +146,34 @@ def test_gives_up_on_what_always_kills_its_worker(distributed: RunningEvaluator)
         distributed.evaluate(pendulum.problem(pendulum.die_always, (9.81,)), pendulum.population(3))
     problem, values = pendulum.problem(), pendulum.population(3)
     assert_same_bits(distributed.evaluate(problem, values, residuals=True), reference(problem, values))
+
+
+def test_a_death_before_the_work_begins_is_not_the_works_fault(tmp_path: Path) -> None:
+    others = set(_workers())
+    evaluator = make_evaluator("processes", 1)
+    try:
+        problem, values = pendulum.problem(pendulum.Note(tmp_path), (9.81,)), pendulum.population(3)
+        killed: set[int] = set()
+        with ThreadPoolExecutor(1) as thread:
+            asked = thread.submit(evaluator.evaluate, problem, values, residuals=True)
+            # More of them than a unit may kill; starting takes far longer than it takes to notice one.
+            while len(killed) < ATTEMPTS + 2 and not asked.done():
+                for pid in set(_workers()) - others - killed:
+                    os.kill(pid, signal.SIGKILL)
+                    killed.add(pid)
+                time.sleep(0.005)
+            got = asked.result(60.0)
+    finally:
+        evaluator.close()
+    assert len(killed) == ATTEMPTS + 2
+    assert_same_bits(got, reference(pendulum.problem(None, (9.81,)), values))
+
+
+def _workers() -> list[int]:
+    """Living processes of the evaluators of this one."""
+    with suppress(ValueError):  # one that is being let go of just now
+        return [one.pid for one in multiprocessing.active_children() if one.name == "wingfit-worker" and one.pid]
+    return []
 
 
 def test_workers_are_polite_and_single_threaded(distributed: RunningEvaluator, tmp_path: Path) -> None:
