@@ -130,10 +130,13 @@ class Reads:
         self._idle.append(reader)
         self._send()
 
-    def lost(self, reader: _Reader) -> None:
-        """The server hung up, as it does after some seconds without a request."""
+    def lost(self, reader: _Reader, asked: tuple[int, float] | None) -> None:
+        """The server hung up, as it does after some seconds; what was just ``asked`` is asked again, as clients do."""
         self._open -= 1
-        if reader in self._idle:
+        if asked:
+            self._waiting.appendleft(asked)
+            self._send()
+        else:
             self._idle.remove(reader)
 
     def answered(self, number: int, status: int, seconds: float) -> None:
@@ -158,7 +161,8 @@ class _Reader(asyncio.Protocol):
 
     def __init__(self, reads: Reads) -> None:
         self._reads = reads
-        self._number, self._due, self._data = 0, 0.0, b""
+        self._asked: tuple[int, float] | None = None
+        self._data = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Be ready."""
@@ -167,20 +171,22 @@ class _Reader(asyncio.Protocol):
 
     def ask(self, request: bytes, number: int, due: float) -> None:
         """Send a request."""
-        self._number, self._due, self._data = number, due, b""
+        self._asked, self._data = (number, due), b""
         self._transport.write(request)
 
     def data_received(self, data: bytes) -> None:
         """Take a part of the answer."""
         self._data = self._data + data if self._data else data
         status = answered(self._data)
-        if status:
-            self._reads.answered(self._number, status, time.monotonic() - self._due)
+        if status and self._asked:
+            number, due = self._asked
+            self._asked = None
+            self._reads.answered(number, status, time.monotonic() - due)
             self._reads.free(self)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  as asyncio calls it
         """Be no more."""
-        self._reads.lost(self)
+        self._reads.lost(self, self._asked)
 
     def close(self) -> None:
         """Hang up."""

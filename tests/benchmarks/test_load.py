@@ -68,6 +68,7 @@ class Slow(socketserver.StreamRequestHandler):
     opens, ends = 0.0, 0.0
     ending: ClassVar[bytes] = b"SUCCEEDED"
     started = ""
+    drops: ClassVar[Iterator[int]] = iter(())
 
     def handle(self) -> None:
         while line := self.rfile.readline():
@@ -77,6 +78,8 @@ class Slow(socketserver.StreamRequestHandler):
                 self._events()
                 return
             time.sleep(max(0.0, self.opens - time.monotonic()))
+            if b"/dropped" in line and next(self.drops, None) is not None:
+                return
             status = b"503 Busy" if b"busy" in line else b"200 OK"
             self.wfile.write(b"HTTP/1.1 " + status + b"\r\ncontent-length: 2\r\n\r\n{}")
 
@@ -103,7 +106,7 @@ def slow(opens_after: float, ends_after: float, ending: bytes = b"SUCCEEDED") ->
         opens, ends = time.monotonic() + opens_after, time.monotonic() + ends_after
         started = (datetime.now(UTC) - timedelta(seconds=98.5)).isoformat()
 
-    Handler.ending = ending
+    Handler.ending, Handler.drops = ending, iter(range(5))
     with _Server(("127.0.0.1", 0), Handler) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
         thread.start()
@@ -126,6 +129,13 @@ def test_a_read_is_timed_from_when_it_was_due_also_behind_those_that_wait() -> N
     assert (told.unanswered, told.cut) == (0, 0)
     assert told.refused == sum(number == 1 for number, _ in told.latencies) == len(told.latencies) // 2
     assert len(told.latencies) == pytest.approx(400 * told.reading_seconds, abs=2)
+
+
+def test_a_read_on_a_connection_that_was_just_closed_is_asked_again() -> None:
+    with slow(0.0, 0.3) as port:
+        told = visit(Crowd(port, "run", watchers=1, rate=100.0, paths=["/dropped"]))
+    assert (told.unanswered, told.refused) == (0, 0)
+    assert len(told.latencies) == pytest.approx(100 * told.reading_seconds, abs=2)
 
 
 def test_lags_are_from_the_end_of_a_computation_and_only_of_what_came_live() -> None:
