@@ -27,6 +27,7 @@ from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
 from service.state import MakeEvaluator, Service, wingfit_version
+from service.unforeseen import Unforeseen
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"
@@ -85,10 +86,10 @@ def create_app(
     describe(app)
     _mount_pages(app)
     app.add_middleware(Quick)
-    app.add_middleware(problems.Unforeseen)
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(Unforeseen)
     app.add_middleware(Observer)
     return app
 

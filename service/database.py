@@ -12,7 +12,7 @@ import sqlite3
 import threading
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, ClassVar
 from urllib.parse import quote
@@ -142,13 +142,23 @@ class Database:
         """One consistent snapshot, of everything, through a bare connection: for reads that must be quick."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
-        connection = self._bare.pop() if self._bare else _bare(self._path)
+        try:
+            connection = self._bare.pop()
+        except IndexError:
+            connection = _bare(self._path)
         connection.execute("BEGIN")
         try:
             yield connection
         finally:
             connection.execute("ROLLBACK")
             self._bare.append(connection)
+            if self._closed:
+                self._close_bare()
+
+    def _close_bare(self) -> None:
+        with suppress(IndexError):
+            while True:
+                self._bare.pop().close()
 
     def close(self) -> None:
         """Finish the write under way, refuse further ones, give the folder free."""
@@ -157,8 +167,7 @@ class Database:
                 return
             self._closed = True
             self._readers.dispose()
-            while self._bare:
-                self._bare.pop().close()
+            self._close_bare()
             self._writer.dispose()
             self._lock.release()
 

@@ -20,21 +20,30 @@ class Datasets:
 
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
-        self._lock = threading.Lock()
+        self._lock, self._loading = threading.Lock(), threading.Lock()
         self._kept: OrderedDict[str, Dataset] = OrderedDict()
 
     def get(self, dataset_id: str) -> Dataset:
         """The dataset, or a 404."""
         with self._database.read() as session:
             row = store.dataset(session, dataset_id)
+        if (known := self._known(dataset_id)) is not None:
+            return known
+        # One at a time, and once: a large one takes a minute, and gigabytes.
+        with self._loading:
+            if (known := self._known(dataset_id)) is not None:
+                return known
+            with self._database.read() as session:
+                body = store.archive(session, dataset_id)
+            loaded = self._engine.load(body, row.filename)
+            self.keep(dataset_id, loaded)
+        return loaded
+
+    def _known(self, dataset_id: str) -> Dataset | None:
         with self._lock:
             if dataset_id in self._kept:
                 self._kept.move_to_end(dataset_id)
-                return self._kept[dataset_id]
-        with self._database.read() as session:
-            loaded = self._engine.load(store.archive(session, dataset_id), row.filename)
-        self.keep(dataset_id, loaded)
-        return loaded
+            return self._kept.get(dataset_id)
 
     def keep(self, dataset_id: str, loaded: Dataset) -> None:
         """Remember a dataset that was just parsed."""

@@ -116,12 +116,12 @@ class Events:
         Every watcher was let in before, so each may see what the first one that looks sees. Of the same version of the
         database all see the same.
         """
-        version = self._database.version
-        look = self._looks.get((watched.id, after, version))
+        key = watched.id, after, self._database.version
+        look = self._looks.get(key)
         if look is None:
-            self._looks = {key: old for key, old in self._looks.items() if key[2] == version}
-            look = asyncio.ensure_future(run_in_threadpool(_look, self._database, watched, after))
-            self._looks[watched.id, after, version] = look
+            self._looks[key] = look = asyncio.ensure_future(run_in_threadpool(_look, self._database, watched, after))
+            # Shared while it is under way, not kept: nobody reads the same again, and a failure must not stay.
+            look.add_done_callback(lambda _: self._looks.pop(key, None))
         return await asyncio.shield(look)
 
 

@@ -81,10 +81,17 @@ def _name(host: str) -> str:
         return ""
 
 
+def _place(origin: str) -> str | None:
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return None
+
+
 def _is_foreign(headers: Headers, host: str) -> bool:
     origin = headers.get("origin")
     if origin is not None:
-        return urlsplit(origin).netloc.lower() != host.lower() if _name(host) else True
+        return not _name(host) or _place(origin) != host.lower()
     return headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
 
 

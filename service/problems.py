@@ -15,7 +15,6 @@ from fastapi.exceptions import RequestValidationError
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.database import DatabaseClosedError, is_full
 
@@ -96,33 +95,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(sqlite3.OperationalError, _on_operational)
 
 
-class Unforeseen:
-    """Answers errors that nothing else does, without a word about them.
-
-    The framework's own way is to answer outside all other layers, which would leave out their headers, and to let the
-    error go on, which ends the connection.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self.app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one connection."""
-        begun = False
-
-        async def noted(message: Message) -> None:
-            nonlocal begun
-            begun = begun or message["type"] == "http.response.start"
-            await send(message)
-
-        try:
-            await self.app(scope, receive, noted)
-        except Exception as error:
-            if begun or scope["type"] != "http":
-                raise
-            await (await _on_bug(Request(scope), error))(scope, receive, send)
-
-
 async def _on_problem(_: Request, error: Exception) -> Response:
     assert isinstance(error, ProblemError)  # noqa: S101  # for the type checker; registered for it alone
     return response(error)
@@ -145,13 +117,14 @@ async def _on_closed(_: Request, error: Exception) -> Response:
 
 async def _on_operational(request: Request, error: Exception) -> Response:
     if not is_full(error):
-        return await _on_bug(request, error)
+        return of_a_mistake(request, error)
     LOG.error("%s %s: %s", request.method, request.url.path, error)
     detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
     return response(ProblemError(507, "disk-full", detail), {"Retry-After": "30"})
 
 
-async def _on_bug(request: Request, error: Exception) -> Response:
+def of_a_mistake(request: Request, error: Exception) -> Response:
+    """The answer to an error that nobody foresaw; the log has what it was."""
     LOG.error("%s %s failed", request.method, request.url.path, exc_info=error)
     return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
 

@@ -1,4 +1,4 @@
-"""HTTP as it comes in: parsed by httptools, whose parser collects the head of a request for as long as one is sent."""
+"""HTTP as it comes in, parsed by httptools, which collects heads and trailers for as long as they are sent."""
 
 from __future__ import annotations
 
@@ -11,27 +11,30 @@ HEAD_LIMIT = 64 * 2**10
 
 
 class Protocol(HttpToolsProtocol):
-    """One connection; a request whose line and headers do not end within ``HEAD_LIMIT`` bytes is refused."""
+    """One connection; what is neither body nor ends within ``HEAD_LIMIT`` bytes is refused: a head, or trailers."""
 
-    _in_head = True
-    _head = 0
+    _unended = 0
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes of the connection."""
-        if self._in_head:
-            self._head += len(data)
+        self._unended += len(data)
         super().data_received(data)
-        if self._head > HEAD_LIMIT and not self.transport.is_closing():
+        if self._unended > HEAD_LIMIT and not self.transport.is_closing():
             self._refuse(f"the line and headers of the request are longer than {HEAD_LIMIT >> 10} KiB; send less")
 
     def on_headers_complete(self) -> None:
         """Begin the request."""
-        self._in_head, self._head = False, 0
+        self._unended = 0
         super().on_headers_complete()
+
+    def on_body(self, body: bytes) -> None:
+        """Take a part of the body, whose size is watched elsewhere."""
+        self._unended = 0
+        super().on_body(body)
 
     def on_message_complete(self) -> None:
         """End it; the next one may follow."""
-        self._in_head = True
+        self._unended = 0
         super().on_message_complete()
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002  uvicorn's signature

@@ -9,6 +9,7 @@ twice, a recording at a time.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,9 @@ from records.folder import RECORDINGS
 from service import force_views, genomes, netcdf, sources, store, views
 from service.answers import CONDITION
 from service.database import Database
+from service.problems import ProblemError
 from service.run_exports import Exported, blocks, request
-from service.schemas import GeneOut
+from service.schemas import GeneOut, GenomeOut
 from service.state import Service
 from service.tables import RunRow
 
@@ -37,16 +39,15 @@ GENE_NUMBERS = (
 )
 
 
-def file(service: Service, exported: Exported) -> bytes:
-    """The file; a 409 before the first generation."""
-    genome = genomes.standing(service, exported.row)
+def file(service: Service, exported: Exported, genome: GenomeOut, gone: Callable[[], bool]) -> bytes:
+    """The file; once ``gone``, for whom it is, a 503 before the next recording."""
     dataset = service.datasets.get(exported.row.dataset_id)
 
     def write(root: Any) -> None:
         root.dimensions = {"generation": exported.row.generations, "gene": len(genome.genes)}
         _history(root, service.database, exported.row)
         _genes(root, genome.genes)
-        _recordings(root, service, exported.row, dataset)
+        _recordings(root, service, exported.row, dataset, gone)
 
     row, model = exported.row, "flexible wing" if exported.row.kind == "tracks" else "blade-element model"
     attributes = netcdf.provenance(row, exported.dataset, model, exported.at) | {
@@ -99,9 +100,11 @@ def _genes(root: Any, genes: list[GeneOut]) -> None:
     netcdf.flags(root, "gene_identifiable", "gene", "whether the data tell it", (gene.identifiable for gene in genes))
 
 
-def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset) -> None:
+def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone: Callable[[], bool]) -> None:
     found = sources.estimates(service, row, dataset) if row.kind == "forces" else {}
     for recording in dataset.recordings:
+        if gone():
+            raise ProblemError(503, "unavailable", "the caller has hung up; ask again")
         group = root.create_group(f"{RECORDINGS}/{recording.name}")
         described = views.recording(recording, recording.name in dataset.held_out).model_dump()
         held_out = {"held_out": "yes" if described["held_out"] else "no"}

@@ -30,7 +30,7 @@ from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
 from service.tables import DiagnosisRow, RunRow
-from service.turns import UPLOADS_AT_ONCE, Turns
+from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
 from service.work import Work
 
 LOG = logging.getLogger("wingfit")
@@ -59,6 +59,7 @@ class Service:
         self.reading = Reading(database)
         self.events = Events(database, self.changes)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
+        self.exports = Turns("exports", EXPORTS_AT_ONCE)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)

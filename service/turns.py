@@ -11,6 +11,8 @@ from service.problems import ProblemError
 AT_ONCE = 4
 # A dataset of the largest size takes some gigabytes while it is read.
 UPLOADS_AT_ONCE = 2
+# Each simulates every recording, which may take an hour, and is made in memory.
+EXPORTS_AT_ONCE = 1
 MOST_WAITING = 64
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
+from collections.abc import Callable
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from service import csv_text, diagnosis_exports, http, netcdf, run_exports, run_netcdf
+from service import csv_text, diagnosis_exports, genomes, http, netcdf, run_exports, run_netcdf
 from service.export_schemas import DiagnosisExportOut, Format, RunExportOut
 from service.state import Service, ServiceDep
 
 router = APIRouter(prefix="/v1", tags=["exports"])
 JSON = "application/json"
+LOOK_SECONDS = 1.0
 FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table; netcdf: series and maps")]
 
 _HISTORY = """sequence,stage,generation,best_m2,mean_m2,diversity,best_mm,evaluations,failed,reasons,elapsed_seconds
@@ -43,13 +47,31 @@ def _described(example: str) -> dict[str, Any]:
     responses={200: _described(_HISTORY), **http.errors(404, 409)},
     summary="Export a run",
 )
-async def export_run(service: ServiceDep, run_id: str, format: FormatQuery = "json") -> Response:  # noqa: A002
+async def export_run(
+    request: Request,
+    service: ServiceDep,
+    run_id: str,
+    format: FormatQuery = "json",  # noqa: A002
+) -> Response:
     """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
     if format != "netcdf":
         return await run_in_threadpool(_run, service, run_id, format)
-    async with service.turns.turn():
-        body = await run_in_threadpool(lambda: run_netcdf.file(service, run_exports.of(service, run_id)))
+    exported = await run_in_threadpool(run_exports.of, service, run_id)
+    genome = await run_in_threadpool(genomes.standing, service, exported.row)
+    async with service.exports.turn():
+        body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
     return Response(body, media_type=netcdf.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
+
+
+async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
+    """What ``make`` makes in a thread; it is told, by what it is given, whether nobody waits for it any more."""
+    gone = threading.Event()
+    making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
+    while not making.done():
+        await asyncio.wait([making], timeout=LOOK_SECONDS)
+        if not making.done() and await request.is_disconnected():
+            gone.set()
+    return making.result()
 
 
 def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A002

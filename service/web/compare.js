@@ -25,7 +25,7 @@ export async function showComparison(ids, { onMissing }) {
     if (asked !== ids) return;
     shown = found;
   } catch (error) {
-    if (asked === ids) onMissing(error, () => showComparison(ids, { onMissing }));
+    if (asked === ids) onMissing(error, () => asked === ids && showComparison(ids, { onMissing }));
     return;
   }
   $("comparison").hidden = false;
@@ -73,7 +73,11 @@ function drawOutcome() {
       forces ? number(DASH) : of("noise"), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
   }));
   const datasets = new Set(shown.map(({ dataset }) => dataset.id));
-  $("compare-note").textContent = datasets.size > 1 ? "These runs are fitted to different datasets: their misfits say nothing about each other." : "";
+  const kinds = new Set(shown.map(({ run }) => run.kind));
+  $("compare-note").textContent = [
+    datasets.size > 1 ? "These runs are fitted to different datasets: their misfits say nothing about each other." : null,
+    kinds.size > 1 ? "Convergence is drawn of those on forces alone." : null,
+  ].filter(Boolean).join(" ");
 }
 
 function drawSetup() {
@@ -127,7 +131,7 @@ export async function redrawComparison() {
     const look = theme();
     const forces = shown.some(({ run }) => isForces(run));
     const value = (item) => (forces ? item.best_mn : item.best_mm);
-    const traces = shown.map(({ run, past }, k) => ({
+    const traces = shown.map(({ run, past }, k) => ({ run, past, k })).filter(({ run }) => isForces(run) === forces).map(({ run, past, k }) => ({
       type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: runName(run), x: past.map((item) => item.evaluations), y: past.map(value),
       text: past.map((item) => item.stage), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
     }));

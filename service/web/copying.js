@@ -1,6 +1,6 @@
 // A request as something to paste: a line of curl, a few lines of Python.
 
-import { toast } from "./format.js";
+import { $, toast } from "./format.js";
 
 const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
@@ -40,6 +40,9 @@ export async function copy(text) {
     await navigator.clipboard.writeText(text);
     toast("Copied");
   } catch {
-    window.prompt("Copy this:", text);
+    // Pages on a private network without TLS may not write to the clipboard.
+    $("copy-text").value = text;
+    $("copy-dialog").showModal();
+    $("copy-text").select();
   }
 }

@@ -60,23 +60,26 @@ function drawRecordings() {
   const text = new Set(["Recording", "Use", "Channels"]);
   $("recordings").tHead.replaceChildren(el("tr", {}, ...heads.map((head) => el("th", { scope: "col", className: text.has(head) ? "" : "n" }, head))));
   const number = (value) => el("td", { className: "n" }, significant(value));
+  const count = (value) => el("td", { className: "n" }, value.toLocaleString("en"));
   $("recordings").tBodies[0].replaceChildren(...dataset.recordings.map((one) => el("tr", {},
     el("td", {}, one.name), el("td", {}, el("span", { className: one.held_out ? "badge held" : "badge" }, one.held_out ? "held out" : "to fit")),
-    number(one.frames), forces ? el("td", {}, one.channels.map((name) => name.replace("force_", "")).join(", ")) : number(one.markers),
+    count(one.frames), forces ? el("td", {}, one.channels.map((name) => name.replace("force_", "")).join(", ")) : count(one.markers),
     number(one.missing_percent), number(one.flap_frequency_hz), number(one.phase_lag_deg), number(one.pressure_mbar),
     number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
 }
 
 // What the recordings cover: flap frequency against the one other condition that varies most.
 export async function redrawDataset() {
-  if (!dataset) return;
-  const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(dataset.recordings.map((one) => one[name])).size }));
+  const shown = dataset;
+  if (!shown) return;
+  const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(shown.recordings.map((one) => one[name])).size }));
   const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
   try {
     const Plotly = await plotly();
+    if (shown !== dataset) return;
     const look = theme();
     const dots = (held, label, symbol) => {
-      const those = dataset.recordings.filter((one) => one.held_out === held);
+      const those = shown.recordings.filter((one) => one.held_out === held);
       return {
         type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
         text: those.map((one) => one.name), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },

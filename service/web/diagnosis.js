@@ -52,6 +52,7 @@ export async function selectDiagnosis(id) {
 }
 
 function listen() {
+  stopFollowing();
   stopFollowing = follow(`diagnoses/${part(diagnosis.id)}`, "step", {
     onStep(step) {
       if (step.sequence <= diagnosis.steps) return;

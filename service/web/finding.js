@@ -26,6 +26,7 @@ export function showFinding(next) {
   finding = next;
   $("finding").hidden = !finding;
   if (!finding) return;
+  for (const id of ["where-note", "overlay-note"]) $(id).textContent = "";
   drawNumbers();
   drawChances();
   drawRanking();

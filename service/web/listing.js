@@ -32,7 +32,12 @@ let names = new Map();
 let chosen = new Set();
 let request = 0;
 
-const open = (page, id, text) => el("a", { href: `#${page}=${part(id)}` }, text);
+// With a key, by which a focus survives that the rows are drawn anew.
+function open(page, id, text, row = id) {
+  const link = el("a", { href: `#${page}=${part(id)}` }, text);
+  link.dataset.key = `${page}-${row}`;
+  return link;
+}
 const datasetName = (id) => names.get(id) ?? id;
 
 export function setUpListing() {
@@ -43,6 +48,7 @@ export function setUpListing() {
 
 // Show the page of ``next`` ("runs", "diagnoses", "datasets"), or none; ``asked`` are the parameters of the address.
 export async function showListing(next, asked) {
+  const mine = ++request;
   kind = next;
   $("listing").hidden = !kind;
   if (!kind) return;
@@ -56,8 +62,8 @@ export async function showListing(next, asked) {
   $("listing-table").tHead.replaceChildren(el("tr", {}, ...heads.map((head) =>
     el("th", { scope: "col" }, head || el("span", { className: "hidden" }, "Compare")))));
   draw();
-  if (states) await fillFilters(states);
-  await load(true);
+  if (states) await fillFilters(states, mine);
+  if (mine === request) await load(true);
 }
 
 // What the lists at the side have just learnt.
@@ -69,13 +75,12 @@ export function refreshListing(fresh) {
   draw();
 }
 
-async function fillFilters(states) {
-  const mine = kind;
+async function fillFilters(states, mine) {
   try {
     const page = await get("datasets?limit=200");
     names = new Map(page.items.map((dataset) => [dataset.id, dataset.name]));
   } catch { /* the filter offers what is known; the list itself will say what is wrong */ }
-  if (mine !== kind) return;
+  if (mine !== request) return;
   $("listing-state").replaceChildren(new Option("all", ""), ...states.map((state) => new Option(stateWord(state), state)));
   $("listing-state").value = filters.state ?? "";
   const known = [...names].map(([id, name]) => new Option(name, id));
@@ -146,13 +151,13 @@ const cell = (...content) => el("td", {}, ...content);
 function runRow(run) {
   const { value, unit } = misfit(run);
   const method = [METHODS[run.spec.method] ?? run.spec.method, run.spec.mode].filter(Boolean).join(", ");
-  return el("tr", {}, cell(choice(run)), cell(open("run", run.id, runName(run))), cell(open("dataset", run.dataset_id, datasetName(run.dataset_id))),
+  return el("tr", {}, cell(choice(run)), cell(open("run", run.id, runName(run))), cell(open("dataset", run.dataset_id, datasetName(run.dataset_id), run.id)),
     cell(badge(run), el("small", {}, timeLeft(run) ? ` ${timeLeft(run)}` : "")), cell(value === DASH ? DASH : `${value} ${unit}`),
     cell([modelOf(run), withEffects(run.spec)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
 }
 
 function diagnosisRow(diagnosis) {
-  return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id))),
+  return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id), diagnosis.id)),
     cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(diagnosis.verdict ?? DASH),
     cell(modelOf(diagnosis)), cell(when(diagnosis.created_at)));
 }

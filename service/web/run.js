@@ -155,6 +155,7 @@ function drawHead() {
     plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
   $("run-progress").textContent = parts.filter(Boolean).join(" · ");
   $("diagnose-run").hidden = run.generations === 0;
+  $("run-exports").hidden = run.generations === 0;
   for (const format of ["csv", "netcdf", "json"]) $(`export-${format}`).href = `v1/runs/${part(run.id)}/export?format=${format}`;
   for (const button of $("actions").querySelectorAll("[data-action]")) {
     button.hidden = !ALLOWED[button.dataset.action].includes(run.state);

@@ -13,6 +13,7 @@ let models = null;
 let effects = null;
 let typing = null;
 let checked = 0;
+let asking = Promise.resolve();
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");
@@ -40,7 +41,7 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
       button.disabled = false;
     }
   });
-  form.dataset_id.addEventListener("change", () => suit(form));
+  form.dataset_id.addEventListener("change", () => suit(form).then(() => check(form)));
   form.method.addEventListener("change", () => suitMethod(form));
   form.preset.addEventListener("change", () => suitPreset(form));
   $("effect-choices").addEventListener("change", sayEffects);
@@ -70,11 +71,15 @@ export function openSubmit(known, dataset = known[0]) {
   $("submit-dialog").showModal();
 }
 
-// What the server would say to the form as it stands; nothing is submitted.
+// What the server would say to the form as it stands; nothing is submitted. One question at a time: the last is asked when
+// the one before is answered.
 async function check(form) {
   const mine = ++checked;
+  await asking.catch(() => {});
+  if (mine !== checked) return;
   try {
-    const { name, spec } = await postJson("runs?validate_only=true", values(form));
+    asking = postJson("runs?validate_only=true", values(form));
+    const { name, spec } = await asking;
     if (mine !== checked) return;
     showErrors(form, $("submit-errors"), null);
     $("submit-said").textContent = `Would run as “${name}”: ${setup({ kind: chosenDataset(form).kind, spec }).join(" · ")}`;

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
 import pytest
 
+from records import Dataset
 from service import datasets, guard
+from service.app import create_app
 from service.database import Database
+from service.settings import Settings
 from tests.service import toy
-from tests.service.conftest import Api
+from tests.service.conftest import Api, serving
 
 
 def test_an_archive_comes_back_byte_for_byte(api: Api) -> None:
@@ -160,3 +164,26 @@ def test_a_failed_request_does_not_use_up_its_key(api: Api) -> None:
 def _upload(api: Api, headers: dict[str, str], name: str) -> httpx.Response:
     files = {"file": ("a.zip", toy.archive(name=name))}
     return api.client.post("/v1/datasets", files=files, headers=headers)
+
+
+def test_many_who_need_one_dataset_have_it_loaded_once(tmp_path: Path) -> None:
+    loads = []
+
+    class Slow(toy.ToyEngine):
+        def load(self, data: bytes, filename: str) -> Dataset:
+            loads.append(filename)
+            time.sleep(0.2)
+            return super().load(data, filename)
+
+    app = create_app(Settings(data=tmp_path), engine=Slow(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        body = {"dataset_id": Api(client).upload()["id"]}
+        app.state.service.datasets._kept.clear()
+        loads.clear()
+
+        def check(_: int) -> int:
+            return httpx.post(f"{client.base_url}/v1/runs?validate_only=true", json=body, timeout=20).status_code
+
+        with ThreadPoolExecutor(6) as pool:
+            assert list(pool.map(check, range(6))) == [200] * 6
+    assert len(loads) == 1

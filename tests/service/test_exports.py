@@ -231,7 +231,7 @@ def test_only_what_simulates_takes_its_turn(tmp_path: Path) -> None:
 
     app = create_app(Settings(data=tmp_path), engine=Held(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client, ThreadPoolExecutor(1) as pool:
-        api, app.state.service.turns = Api(client), Turns(at_once=1, most_waiting=0)
+        api, app.state.service.exports = Api(client), Turns("exports", 1, most_waiting=0)
         run = api.finish(api.submit(api.upload()["id"])["id"])["id"]
         held = pool.submit(exported, api, f"runs/{run}", "netcdf")
         try:

@@ -63,11 +63,26 @@ def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(
             endless.sendall(b"x" * (HEAD_LIMIT + 1))
             assert endless.recv(1000).startswith(b"HTTP/1.1 400 ")
         assert server.client.request("X" * 100, "/v1/runs").json()["type"] == "urn:wingfit:problem:not-http"
+        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as trailing:
+            trailing.sendall(
+                b"POST /v1/runs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n"
+            )
+            with pytest.raises(ConnectionError):  # hung up on
+                trailing.sendall(b"X-Trailer: x\r\n" * 10**6)
+        pieces = (b" " * 3 for _ in range(HEAD_LIMIT))  # each in a frame of its own, together far more than the limit
+        assert server.client.post("/v1/runs", content=pieces).status_code == 422
         body = b" " * (4 * HEAD_LIMIT)
         for _ in range(3):
             assert server.client.post("/v1/runs", content=body).status_code == 422
         long = {"X-Long": "x" * (HEAD_LIMIT // 2)}
         assert [server.client.get("/v1/health", headers=long).status_code for _ in range(4)] == [200] * 4
+
+
+@pytest.mark.parametrize("origin", ["http://[", "http://[::1", "null", "http://evil.example", "//", ""])
+def test_an_origin_that_is_none_is_a_foreign_one(client: httpx.Client, origin: str) -> None:
+    answer = client.post("/v1/runs", json={}, headers={"Origin": origin})
+    assert (answer.status_code, answer.json()["status"]) == (403, 403)
+    assert answer.headers["X-Frame-Options"] == "DENY"
 
 
 def test_unknown_paths_and_methods_are_told_apart(client: httpx.Client) -> None:

@@ -67,11 +67,12 @@ def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:
 
 FILTERS = ("dataset_id", "state", "owner", "before")
 USUAL = (
-    "runs?limit=2", "runs?limit=2&cursor=CURSOR", "runs?dataset_id=ONE", "runs?state=FAILED", "runs?limit=200",
-    "runs?dataset_id=ONE&state=FAILED", "runs?dataset_id=none", "runs/RUN", "runs/RUN/history",
+    "runs?limit=2", "runs?limit=2&cursor=CURSOR", "runs?limit=50", "runs/RUN", "runs/RUN/history",
     "runs/RUN/history?after=3&limit=4", "runs/RUN/history?after=9007199254740991",
 )  # fmt: skip
 UNUSUAL = (
+    "runs?dataset_id=ONE", "runs?state=FAILED", "runs?dataset_id=ONE&state=FAILED", "runs?dataset_id=none",
+    "runs?limit=200",
     "runs/", "runs?limit=0", "runs?limit=201", "runs?limit=-1", "runs?limit=", "runs?limit=1.0", "runs?state=NONE",
     "runs?state=", "runs?cursor=none", "runs?limit=1&limit=2", "runs?limit=1&", "runs?&limit=1", "runs?other=1",
     "runs/RUN?limit=1", "runs/none", "runs/none/history", "runs/RUN/history?after=-1", "runs/RUN/history?limit=10001",
@@ -160,6 +161,26 @@ def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Pa
     assert [[state for state in states if state.encode() in part] for part in told[0]] == [[state] for state in states]
     assert told == [told[0]] * 20
     assert len(looks) == 3
+    assert not events._looks, "nothing is kept of what was sent"
+    database.close()
+
+
+def test_a_look_that_fails_is_done_anew(tmp_path: Path) -> None:
+    database = Database(tmp_path)
+    events, looks = Events(database, Changes()), []
+
+    def look(_session: Session, after: int, _limit: int) -> Told:
+        looks.append(after)
+        if len(looks) == 1:
+            raise OSError("the disk did not answer")
+        return Told(job("SUCCEEDED"), [])
+
+    async def watch() -> list[bytes]:
+        return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
+
+    with pytest.raises(OSError, match="did not answer"):
+        asyncio.run(watch())
+    assert b"SUCCEEDED" in asyncio.run(watch())[0]
     database.close()
 
 

@@ -20,7 +20,7 @@ from calibration.search import CalibrationSpec
 from diagnosis import DiagnosisSpec
 from records import Dataset, limits
 from records.schema import dataset_schema
-from service import diagnosis_schemas, events, guard, protocol, schemas, settings, spec_schemas, turns
+from service import diagnosis_schemas, events, guard, http, protocol, schemas, settings, spec_schemas, turns
 from service.app import create_app
 from service.settings import Settings
 from sim import division
@@ -259,11 +259,13 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "effects that a diagnosis refits": highest(diagnosis, "refits"),
         "population": highest(run, "population"),
         "generations of a stage": highest(run, "max_generations"),
-        "items on a page": 200,
+        "items on a page": http.LARGEST_PAGE,
+        "generations on a page of a history": http.LARGEST_HISTORY_PAGE,
         "coordinates in an answer": schemas.MOST_COORDINATES,
         "simulations at once": turns.AT_ONCE,
         "uploads read at once": turns.UPLOADS_AT_ONCE,
-        "requests that wait for either": turns.MOST_WAITING,
+        "exports as NetCDF at once": turns.EXPORTS_AT_ONCE,
+        "requests that wait for each of these": turns.MOST_WAITING,
         "event streams": events.MOST_STREAMS,
         "jobs of an owner that have not ended": settings.Settings.max_active,
         "jobs computed at once": settings.Settings.max_runs,
