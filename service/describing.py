@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
@@ -30,6 +31,7 @@ def describe(app: FastAPI) -> None:
             _problems(specification)
             _links(specification)
             _nothing_is_null(specification)
+            _unchanged(specification)
         return specification
 
     app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents
@@ -73,3 +75,11 @@ def _nothing_is_null(specification: Json) -> None:
                 if len(kept) == 1:
                     schema.update(kept[0])
                     del schema["anyOf"]
+
+
+def _unchanged(specification: Json) -> None:
+    """Who may say what he has may be told that it is still so."""
+    for methods in specification["paths"].values():
+        for operation in methods.values():
+            if any(parameter["name"] == "If-None-Match" for parameter in operation.get("parameters", ())):
+                operation["responses"]["304"] = {"description": HTTPStatus(304).phrase}

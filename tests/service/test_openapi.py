@@ -75,6 +75,23 @@ def test_nothing_is_null_that_is_sent_as_text(specification: Specification) -> N
     assert "anyOf" not in form["name"]
 
 
+def test_what_is_unchanged_is_answered_as_described(api: Api, specification: Specification) -> None:
+    run = api.submit(api.upload()["id"])["id"]
+    diagnosis = api.diagnose(api.run(run)["dataset_id"])["id"]
+    api.finish(run)
+    api.diagnosed(diagnosis)
+    ids = {"run_id": run, "dataset_id": api.run(run)["dataset_id"], "diagnosis_id": diagnosis}
+    tried = 0
+    for method, path, operation in operations(specification):
+        marked = any(parameter["name"] == "If-None-Match" for parameter in operation.get("parameters", ()))
+        assert ("304" in operation["responses"]) is marked, path
+        if marked:
+            answer = api.client.request(method, path.format(**ids), headers={"If-None-Match": "*"})
+            assert (answer.status_code, answer.content) == (304, b""), path
+            tried += 1
+    assert tried >= 8
+
+
 def test_events_are_as_described(api: Api, specification: Specification) -> None:
     dataset = api.upload()["id"]
     run, diagnosis = api.submit(dataset)["id"], api.diagnose(dataset)["id"]
