@@ -13,7 +13,7 @@ START_SECONDS = 120.0
 
 
 class Cluster:
-    """A Ray head without processors and one node that computes, as Compose starts them."""
+    """A Ray head and one more node that computes."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.token, self._lives = folder, folder / "token", 0
