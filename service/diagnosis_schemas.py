@@ -18,6 +18,7 @@ from service.spec_schemas import (
     Effects,
     ForceAxis,
     Name,
+    Title,
     VehicleModel,
     Whole,
 )
@@ -69,7 +70,7 @@ class DiagnosisIn(DiagnosisSettings):
 
     dataset_id: Annotated[Name | None, Field(description="null: that of the run")] = None
     run_id: Annotated[Name | None, Field(description="run to start from: its best genome and its settings")] = None
-    name: Name | None = None
+    name: Title | None = None
     axes: Annotated[Axes | None, Field(description="vehicles only; null: all that every recording has")] = None
 
 

@@ -24,6 +24,20 @@ FINEST_MM, COARSEST_MM = 0.02, 1.0
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Whole = Annotated[int, Field(strict=True)]
+# Control characters, and those that take no room or turn the text after them around.
+_HIDDEN = r"\u0000-\u001f\u007f-\u009f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff"
+TITLE = rf"^[^{_HIDDEN}]*[^{_HIDDEN}\s][^{_HIDDEN}]*$"
+
+
+def _visible(title: str) -> str:
+    if not re.fullmatch(TITLE, title):
+        raise PydanticCustomError("title", "must be one line of text that can be seen, without control characters")
+    return title
+
+
+Title = Annotated[
+    str, AfterValidator(_visible), Field(min_length=1, max_length=200, json_schema_extra={"pattern": TITLE})
+]
 
 
 def _readable(division: str) -> str:
@@ -163,6 +177,6 @@ class RunIn(Spec):
     )
 
     dataset_id: Name
-    name: Name | None = None
+    name: Title | None = None
     mode: Annotated[Mode | None, Field(description="null: staged for a wing, local for a vehicle")] = None
     method: Annotated[Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle")] = None

@@ -180,9 +180,9 @@ def _serve(connection: Connection) -> None:
     while True:
         try:
             key, task, residuals = connection.recv()
+            connection.send(_attempt(connection, problems, key, task, residuals))
         except (EOFError, OSError):
             return
-        connection.send(_attempt(connection, problems, key, task, residuals))
 
 
 def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Task, residuals: bool) -> Answer:

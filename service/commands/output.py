@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+import unicodedata
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated, Any
@@ -38,14 +39,20 @@ def err() -> Console:
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
+def _shown(text: str, *, lines: bool = True) -> str:
+    """``text`` without characters that steer a terminal: a name may be somebody else's."""
+    kept = "\n\t" if lines else ""
+    return "".join(one if one in kept or unicodedata.category(one) != "Cc" else "\ufffd" for one in text)
+
+
 def say(text: str) -> None:
     """Print one result line as it is."""
-    out().print(Text(text), soft_wrap=True)
+    out().print(Text(_shown(text)), soft_wrap=True)
 
 
 def note(text: str) -> None:
     """Print one line that is no result to standard error."""
-    err().print(Text(text))
+    err().print(Text(_shown(text)))
 
 
 def print_json(value: Any) -> None:
@@ -62,7 +69,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], empty: str = "n
     for index, name in enumerate(columns):
         grid.add_column(name.removeprefix(">"), justify="right" if name.startswith(">") else "left", no_wrap=index == 0)
     for row in rows:
-        grid.add_row(*(Text(cell) for cell in row))
+        grid.add_row(*(Text(_shown(cell, lines=False)) for cell in row))
     out().print(grid)
 
 

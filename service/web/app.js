@@ -58,6 +58,7 @@ async function poll() {
     showHealth(health);
     drawLists();
     refreshListing(lists);
+    await missed();
   } catch (error) {
     if (isRefused(error)) askForKey();
     else if (error.away) setAway(true);
@@ -70,12 +71,13 @@ async function poll() {
 async function route() {
   drawLists();
   const params = asked();
-  const page = PAGES.find((name) => params.has(name)) ?? null;
+  // A page of one thing needs to know of which.
+  const page = PAGES.find((name) => params.get(name) || (params.has(name) && (name === "effects" || LISTINGS.includes(name)))) ?? null;
   const value = (name) => (page === name ? params.get(name) : null);
   $("empty").hidden = page !== null;
   document.body.classList.toggle("home", page === null);
   document.body.classList.toggle("broad", page === "compare" || LISTINGS.includes(page)); // the lists at the side would say it twice
-  if (!page) document.title = "wingfit";
+  if (!page) nothing("Nothing selected");
   for (const link of document.querySelectorAll(".menu a")) {
     if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
@@ -86,9 +88,22 @@ async function route() {
   ]);
 }
 
+function nothing(why) {
+  document.title = "wingfit";
+  $("empty-title").textContent = why;
+}
+
+// What is shown may have been deleted elsewhere; of what the lists hold they tell.
+async function missed() {
+  const page = Object.keys(SECTIONS).find((name) => name !== "compare" && current(name));
+  if (!page || lists[SECTIONS[page]].some((one) => one.id === current(page))) return;
+  await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
+}
+
 // The server may be back in a moment; what is unknown stays unknown.
 function onMissing(error, again) {
   $("empty").hidden = false;
+  nothing(error.message);
   toast(error.message);
   if (error.away) setTimeout(() => { $("empty").hidden = Boolean(location.hash); again(); }, AGAIN_MS);
 }

@@ -1,7 +1,7 @@
 // Runs beside each other (#compare=ID,ID): how they were set, how they went, what they found.
 
 import { get, history, part } from "./api.js";
-import { $, DASH, duration, el, significant, toast } from "./format.js";
+import { $, DASH, duration, el, kept, plain, significant, toast } from "./format.js";
 import { badge, runName } from "./lists.js";
 import { MOST_COMPARED } from "./listing.js";
 import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
@@ -58,7 +58,7 @@ const body = (id, rows) => $(id).tBodies[0].replaceChildren(...rows);
 // A misfit with its unit: runs on markers and on forces may stand beside each other.
 function misfit(forces, value) {
   if (value === null || value === undefined) return DASH;
-  return forces ? `${significant(value, 3)} mN` : `${significant(value, 3)} mm`;
+  return `${kept(value, 3)} ${forces ? "mN" : "mm"}`;
 }
 
 function drawOutcome() {
@@ -132,8 +132,8 @@ export async function redrawComparison() {
     const forces = shown.some(({ run }) => isForces(run));
     const value = (item) => (forces ? item.best_mn : item.best_mm);
     const traces = shown.map(({ run, past }, k) => ({ run, past, k })).filter(({ run }) => isForces(run) === forces).map(({ run, past, k }) => ({
-      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: runName(run), x: past.map((item) => item.evaluations), y: past.map(value),
-      text: past.map((item) => item.stage), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
+      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations), y: past.map(value),
+      text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
     }));
     await Plotly.react($("compare-plot"), traces, layout(look, {
       margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),

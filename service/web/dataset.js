@@ -1,7 +1,7 @@
 // The selected dataset: what was recorded, under which conditions, and what was made of it.
 
 import { get, part } from "./api.js";
-import { $, el, plural, significant, size, toast, when } from "./format.js";
+import { $, el, plain, plural, significant, size, toast, when } from "./format.js";
 import { badge, runName } from "./lists.js";
 import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
 import { remove } from "./submit.js";
@@ -82,7 +82,7 @@ export async function redrawDataset() {
       const those = shown.recordings.filter((one) => one.held_out === held);
       return {
         type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
-        text: those.map((one) => one.name), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
+        text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
         hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
       };
     };

@@ -5,7 +5,7 @@ import { $, plural, toast, when } from "./format.js";
 import { setUpFinding, showFinding } from "./finding.js";
 import { badge, setBar, timeLeft } from "./lists.js";
 import { randomKey, remove } from "./submit.js";
-import { modelOf, withEffects } from "./words.js";
+import { forceSetup, isForces, modelOf, withEffects } from "./words.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};
@@ -74,7 +74,7 @@ function update() {
   const done = diagnosis.state === "SUCCEEDED";
   document.title = `${diagnosis.name} · wingfit`;
   $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
-  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec),
+  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";

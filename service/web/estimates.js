@@ -1,6 +1,6 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
-import { $, correlation, el, fixed, kept, plural, significant } from "./format.js";
+import { $, correlation, el, fixed, kept, plain, plural, significant } from "./format.js";
 import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
 
 const STRONG = 0.9;
@@ -84,7 +84,7 @@ async function drawOver(node, result, rows, { over, other, title }) {
           line: { color: look.series[1], width: 1.5, dash: "dot" }, hoverinfo: "skip", showlegend: false },
         { ...common, x, y: rows.map((row) => at(row.recording[over], row.recording[other])), mode: "markers", name: "global model",
           marker: { color: look.series[1], symbol: "x-thin", size: 9, line: { color: look.series[1], width: 2 } },
-          text: rows.map((row) => row.estimate.name), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>global</extra>` },
+          text: rows.map((row) => plain(row.estimate.name)), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>global</extra>` },
       );
     }
     const found = rows.map((row) => row.estimate.coefficients[k]);
@@ -93,7 +93,7 @@ async function drawOver(node, result, rows, { over, other, title }) {
       error_y: { type: "data", symmetric: false, color: look.accent, thickness: 1.5, width: 4,
         array: found.map((one) => (one.high_90 === null ? 0 : one.high_90 - one.value)),
         arrayminus: found.map((one) => (one.low_90 === null ? 0 : one.value - one.low_90)) },
-      text: rows.map((row) => row.estimate.name), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>estimate</extra>` });
+      text: rows.map((row) => plain(row.estimate.name)), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>estimate</extra>` });
     const height = 1 / genes.length;
     axes[`yaxis${suffix}`] = axis(look, { domain: [1 - (k + 1) * height + 0.03, 1 - k * height - 0.02], title: { text: gene, standoff: 4 }, nticks: 4 });
   });

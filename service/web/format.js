@@ -63,6 +63,9 @@ export const when = (text) =>
 
 export const size = (bytes) => (bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${(bytes / 1e3).toFixed(0)} kB`);
 
+// As text of a figure: Plotly takes what looks like markup for markup.
+export const plain = (text) => String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
+
 export const plural = (n, word) => `${n} ${word}${n === 1 ? "" : "s"}`;
 
 // A new element with properties and children; text children are text, never markup.

@@ -1,6 +1,6 @@
 // Fitness by generation: best and mean on a log axis, with the boundaries of the stages.
 
-import { mm, significant, withForceUnit } from "./format.js";
+import { mm, plain, significant, withForceUnit } from "./format.js";
 import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
 import { newtons } from "./words.js";
 
@@ -27,7 +27,7 @@ const MARKERS = {
   about: "Sum of squared distances between simulated and recorded markers; lower is better.",
 };
 const FORCES = {
-  unit: "N²", hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${item.stage}: genes moved by ${significant(item.diversity, 2)} of their range`,
+  unit: "N²", hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${plain(item.stage)}: genes moved by ${significant(item.diversity, 2)} of their range`,
   about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weighs recordings and axes by their noise, so that the sum need not fall every time.",
 };
 
@@ -66,7 +66,7 @@ export async function drawHistory(node, items, forces = false) {
     })),
     annotations: [
       ...boundaries.map((item, i) => ({
-        text: stageLabel(item.stage, stages, upright), x: i || upright ? item.sequence - 0.5 : item.sequence, yref: "paper", y: 1, xanchor: "left",
+        text: plain(stageLabel(item.stage, stages, upright)), x: i || upright ? item.sequence - 0.5 : item.sequence, yref: "paper", y: 1, xanchor: "left",
         yanchor: upright ? "top" : "bottom", textangle: upright ? 90 : 0, showarrow: false, font: { color: look.quiet, size: 12 },
       })),
       ...endLabels(traces),

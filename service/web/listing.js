@@ -54,7 +54,7 @@ export async function showListing(next, asked) {
   if (!kind) return;
   const { title, heads, states } = KINDS[kind];
   document.title = `${title} · wingfit`;
-  filters = Object.fromEntries(["state", "dataset_id"].filter((name) => states && asked.get(name)).map((name) => [name, asked.get(name)]));
+  filters = Object.fromEntries(["state", "dataset_id"].filter((name) => states && asked.get(name) && (name !== "state" || states.includes(asked.get(name)))).map((name) => [name, asked.get(name)]));
   [items, cursor, chosen] = [[], null, new Set()];
   $("listing-title").textContent = title;
   $("listing-filters").hidden = !states;

@@ -4,6 +4,7 @@ import { part, postJson } from "./api.js";
 import { $, el, forceUnit, significant } from "./format.js";
 import { lines } from "./plots.js";
 import { showErrors, showRemarks } from "./said.js";
+import { NO_NUMBER } from "./submit.js";
 
 let run = null;
 let prediction = null;
@@ -58,7 +59,10 @@ async function predict() {
   const form = $("prediction-form");
   const mine = ++request;
   const body = {};
-  for (const input of form.querySelectorAll("input")) if (input.value !== "") body[input.name] = Number(input.value);
+  for (const input of form.querySelectorAll("input")) {
+    if (input.validity.badInput) body[input.name] = NO_NUMBER;
+    else if (input.value !== "") body[input.name] = Number(input.value);
+  }
   try {
     const answer = await postJson(`runs/${part(run.id)}/predictions`, body);
     if (mine !== request) return;

@@ -1,5 +1,6 @@
 // Maps of a finding: misfit on the wing, misfit over span and phase, the load that is missing.
 
+import { plain } from "./format.js";
 import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "./plots.js";
 
 const MARGIN = { l: 10, r: 8, t: 8, b: 10 };
@@ -15,7 +16,7 @@ export async function drawMarkers(node, finding, stage, unit) {
   const outline = { type: "scatter", mode: "lines", x: [...ys, ys[0]], y: [...xs, xs[0]], hoverinfo: "skip", line: { color: look.faint, width: 1.5 }, fill: "toself", fillcolor: look.surface };
   const markers = {
     type: "scatter", mode: "markers", x: finding.markers.map((one) => 1e3 * one.y), y: finding.markers.map((one) => 1e3 * one.x),
-    text: finding.markers.map((one) => one.name), customdata: finding.markers.map((one) => [one.span, one.chord, one.worst]),
+    text: finding.markers.map((one) => plain(one.name)), customdata: finding.markers.map((one) => [one.span, one.chord, one.worst]),
     marker: { size: 13, color: finding.markers.map((one) => 1e3 * one[stage]), cmin: 0, cmax: most, colorscale: shades(look), line: { color: look.quiet, width: 1 }, colorbar: bar(look, unit) },
     hovertemplate: `%{text}: %{marker.color:.3g} ${unit}<br>span %{customdata[0]:.2f}, chord %{customdata[1]:.2f}, largest at phase %{customdata[2]:.2f}<extra></extra>`,
   };

@@ -7,6 +7,8 @@ import { showErrors } from "./said.js";
 import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "./words.js";
 
 const TYPED_MS = 350;
+// A field that holds no number says that it is empty, which would mean the default.
+export const NO_NUMBER = "not a number";
 
 let datasets = [];
 let models = null;
@@ -66,6 +68,7 @@ export function openSubmit(known, dataset = known[0]) {
   const form = $("submit-form");
   form.dataset_id.replaceChildren(...datasets.map((one) => new Option(one.name, one.id)));
   form.dataset_id.value = dataset.id;
+  form.elements.namedItem("name").value = "";
   showErrors(form, $("submit-errors"), null);
   suit(form).then(() => check(form));
   $("submit-dialog").showModal();
@@ -101,7 +104,10 @@ function values(form) {
   if (ticked("effect-choices").length) body.effects = ticked("effect-choices");
   if (searches(form)) body.finish = form.finish.checked;
   // What is not a number goes to the server as it was typed: it knows what to say about it.
-  for (const name of numbers(form, forces)) if (form[name].value !== "") body[name] = Number(form[name].value);
+  for (const name of numbers(form, forces)) {
+    if (form[name].validity.badInput) body[name] = NO_NUMBER;
+    else if (form[name].value !== "") body[name] = Number(form[name].value);
+  }
   const name = form.elements.namedItem("name").value.trim();
   return name ? { ...body, name } : body;
 }

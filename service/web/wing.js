@@ -1,6 +1,6 @@
 // Recorded over simulated markers: in 3-D at one phase, and their height over the beat.
 
-import { significant } from "./format.js";
+import { plain, significant } from "./format.js";
 import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
 
 const SHOWN = 4;
@@ -63,7 +63,7 @@ export async function drawWing(node, tracks, frame) {
   const recorded = tracks.recorded_mm[frame];
   const simulated = tracks.simulated_mm[frame];
   const points = (name, list, marker) => ({
-    type: "scatter3d", mode: "markers", name, ...coordinates(list), marker, text: tracks.markers,
+    type: "scatter3d", mode: "markers", name, ...coordinates(list), marker, text: tracks.markers.map(plain),
     hovertemplate: `%{text}<br>x %{x:.1f}, y %{y:.1f}, z %{z:.1f} mm<extra>${name}</extra>`,
   });
   const traces = [
@@ -126,7 +126,7 @@ export async function drawBeat(node, tracks, frame) {
     );
     axes[`yaxis${suffix}`] = axis(look, { domain, title: { text: "z, mm", standoff: 4 }, nticks: 4 });
     annotations.push({
-      text: `marker ${tracks.markers[m]}, ${significant(tracks.simulated_mm[0][m][1], 3)} mm along the span`,
+      text: `marker ${plain(tracks.markers[m])}, ${significant(tracks.simulated_mm[0][m][1], 3)} mm along the span`,
       xref: "paper", yref: "paper", x: 0, y: top - 0.045, xanchor: "left", yanchor: "bottom", showarrow: false,
       font: { size: 11, color: look.quiet },
     });

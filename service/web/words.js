@@ -57,7 +57,7 @@ export function setup(run) {
 // Runs stored before there were effects name none.
 export const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
 
-function forceSetup(spec) {
+export function forceSetup(spec) {
   const cut = spec.low_pass_hz;
   return [
     spec.without.length ? `without ${spec.without.map(spoken).join(", ")}` : null,

@@ -20,7 +20,7 @@ import typer
 
 from records import Dataset, save_dataset
 from service import cli
-from service.commands import runs
+from service.commands import output, runs
 from service.commands.output import duration, mm, number
 from service.commands.simulate import marker_distances
 from sim.effects.registry import EFFECTS
@@ -326,3 +326,11 @@ def test_marker_distances_count_only_what_was_recorded() -> None:
         "simulated_mm": [[[3.0, 4.0, 0.0], [1.0] * 3], [[0.0, 0.0, 1.0], [1.0] * 3]],
     }
     assert marker_distances(tracks) == {"a": 3.0, "b": None}
+
+
+def test_a_name_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    output.table(["name", ">n"], [["\x1b[31mred\x1b]0;title\x07\nnext", "1"]])
+    output.say("one\ntwo\x1b[0m")
+    out = capsys.readouterr().out
+    assert not {"\x1b", "\x07", "\x00"} & set(out)
+    assert len(out.splitlines()) == 4

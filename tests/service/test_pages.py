@@ -189,6 +189,45 @@ def test_the_form_is_checked_while_one_types(seen: Seen, server: ServerProcess, 
     assert len(server.api.get("/v1/runs?limit=200")["items"]) == before, "nothing is submitted"
 
 
+def test_what_is_no_number_is_not_left_out(seen: Seen, dataset: dict[str, Any]) -> None:
+    seen.show(f"dataset={dataset['id']}")
+    seen.page.click("#dataset-run")
+    seen.wait(TEXT.format("submit-said") + ".includes('population 50')")
+    seen.page.click("[name=population]", click_count=3)
+    seen.page.keyboard.type("1e999")
+    seen.wait("document.querySelector('[name=population]').getAttribute('aria-invalid') === 'true'")
+    assert seen.page.inner_text("#submit-said") == ""
+    assert "not a number" in seen.page.inner_text("#submit-errors")
+
+
+def test_names_are_text_in_figures_too(seen: Seen, server: ServerProcess, dataset: dict[str, Any]) -> None:
+    name = '<a href="https://evil.example/">click</a><b>x'
+    runs = [server.api.submit(dataset["id"], name=name, seed=seed, max_generations=2)["id"] for seed in (1, 2)]
+    for run in runs:
+        server.api.finish(run)
+    seen.show(f"compare={','.join(runs)}")
+    seen.wait(DRAWN.format("compare-plot", 1))
+    seen.wait("document.querySelector('#compare-plot .legendtext')")
+    assert seen.page.locator("#compare-plot a").count() == 0
+    assert name in str(seen.page.text_content("#compare-plot .legend"))
+
+
+def test_what_was_deleted_elsewhere_is_not_shown_any_longer(
+    seen: Seen, server: ServerProcess, dataset: dict[str, Any]
+) -> None:
+    run = server.api.submit(dataset["id"], name="short-lived", max_generations=1)["id"]
+    server.api.finish(run)
+    seen.open(run)
+    seen.wait("!document.getElementById('run').hidden")
+    assert server.client.delete(f"/v1/runs/{run}").status_code == 204
+    seen.wait("document.getElementById('run').hidden && !document.getElementById('empty').hidden")
+    assert run in seen.page.inner_text("#empty-title")
+    assert seen.page.title() == "wingfit"
+    for address in ("run=", "compare=", "nothing=1"):
+        seen.show(address)
+        seen.wait("document.getElementById('empty-title').textContent === 'Nothing selected'")
+
+
 def test_what_is_copied_as_python_runs(seen: Seen, server: ServerProcess, runs: list[str]) -> None:
     seen.open(runs[0])
     seen.page.wait_for_selector("#copy-python")
