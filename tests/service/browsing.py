@@ -82,9 +82,19 @@ class Seen:
         )
         return list(self.page.evaluate(script))
 
+    def _holds(self, condition: str) -> bool:
+        from playwright.sync_api import Error
+
+        try:
+            return bool(self.page.evaluate(condition))
+        except Error as error:
+            if "Execution context was destroyed" in str(error):  # the page is being loaded anew
+                return False
+            raise
+
     def wait(self, condition: str, seconds: float = 15.0) -> None:
         # Polled from here: Playwright's own polling needs eval in the page, which the content policy rightly forbids.
         deadline = time.monotonic() + seconds
-        while not self.page.evaluate(condition):
+        while not self._holds(condition):
             assert time.monotonic() < deadline, f"not within {seconds:g} s: {condition}; errors: {self.errors}"
             self.page.wait_for_timeout(50)

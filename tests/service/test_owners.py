@@ -154,7 +154,7 @@ def test_no_owner_fills_the_disk(as_: As) -> None:
 def test_a_key_is_in_no_log(
     as_: As, client: httpx.Client, secrets: dict[str, str], caplog: pytest.LogCaptureFixture
 ) -> None:
-    with caplog.at_level(logging.DEBUG):
+    with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "wingfit.access"):
         as_("ann").get("/v1/runs")
         client.post("/v1/session", json={"key": secrets["ann"]})
         new = as_("admin").client.post("/v1/keys", json={"name": "x"}).json()["secret"]
