@@ -20,11 +20,11 @@ test: export OMP_NUM_THREADS = 1
 test: $(INSTALLED)  ## every check and every test, two at a time
 	@$(MAKE) --no-print-directory -k -j2 test-rest test-service check
 
-test-service:  # servers, browsers, clusters: they wait more than they compute
-	$(BIN)/python -m pytest tests/service tests/workers
+test-service:  # servers and browsers: they wait more than they compute
+	$(BIN)/python -m pytest tests/service
 
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service --ignore tests/workers
+	$(BIN)/python -m pytest --ignore tests/service
 
 check: $(INSTALLED)  ## every check, no test
 	$(BIN)/ruff check .
