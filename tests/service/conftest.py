@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import httpx
 import pytest
@@ -20,6 +20,10 @@ from service.database import Database
 from service.protocol import Protocol
 from service.settings import Settings
 from tests.service import toy, toy_diagnosis
+from tests.service.browsing import chromium
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
 
@@ -127,6 +131,13 @@ def serving(app: FastAPI) -> Iterator[httpx.Client]:
         server.should_exit = True
         thread.join(15.0)
         assert not thread.is_alive(), "the server does not stop"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """One for the tests of a module; they are skipped where there is none."""
+    with chromium() as started:
+        yield started
 
 
 @pytest.fixture

@@ -8,19 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from tests.service.browsing import DRAWN, Seen, chromium
+from tests.service.browsing import DRAWN, Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 TEXT = "document.getElementById('{}').textContent"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

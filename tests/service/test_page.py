@@ -13,17 +13,11 @@ import pytest
 
 from sim.effects.registry import EFFECTS
 from tests.service import toy
-from tests.service.browsing import DRAWN, Seen, chromium
+from tests.service.browsing import DRAWN, Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from service.commands.rounding import correlation, kept, with_unit
 from service.settings import Settings
 from tests.records.samples import falcon_dataset
 from tests.service import force_data
-from tests.service.browsing import DRAWN, Seen, chromium
+from tests.service.browsing import DRAWN, Seen
 from tests.service.conftest import Api, serving
 from workers import make_evaluator
 
@@ -22,12 +22,6 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Route
 
 PATIENCE = 120.0
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

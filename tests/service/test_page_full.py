@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from benchmarks.load.filling import Filled, fill
-from tests.service.browsing import DRAWN, Seen, chromium
+from tests.service.browsing import DRAWN, Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
@@ -19,12 +18,6 @@ if TYPE_CHECKING:
 RUNS, EACH, LONGEST = 10_000, 2, 1_000
 ENOUGH_S = 1.0
 TRIES = 3  # other work on the machine comes and goes: the best of them is the page's own time
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import pytest
-
-from tests.service.browsing import Seen, chromium
+from tests.service.browsing import Seen
 from tests.service.conftest import made
 from tests.service.processes import ServerProcess
 from tests.service.test_keys import bearer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 def test_a_key_is_asked_for_once_kept_from_scripts_and_forgotten(browser: Browser, tmp_path: Path) -> None:

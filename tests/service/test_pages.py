@@ -13,7 +13,7 @@ import pytest
 
 from sim.effects.registry import EFFECTS
 from tests.service import toy
-from tests.service.browsing import DRAWN, Seen, chromium
+from tests.service.browsing import DRAWN, Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
@@ -21,12 +21,6 @@ if TYPE_CHECKING:
 
 TEXT = "document.getElementById('{}').textContent"
 ROWS = "document.querySelectorAll('#{} tbody tr').length"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with chromium() as browser:
-        yield browser
 
 
 @pytest.fixture(scope="module")
