@@ -26,6 +26,7 @@ from service.observing import Observer
 from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
+from service.shortcut import SHORTCUT, Shortcut
 from service.state import MakeEvaluator, Service, wingfit_version
 from service.unforeseen import Unforeseen
 
@@ -62,12 +63,12 @@ def create_app(
     """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
 
     @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut]]:
         opened = Database(settings.data) if database is None else database
         service = Service(settings, opened, engine, make_evaluator, diagnoser)
         app.state.service = service
         await run_in_threadpool(service.start)
-        yield
+        yield {SHORTCUT: service.shortcut}  # for the protocol
         app.state.stopped = await run_in_threadpool(service.stop)
 
     app = FastAPI(

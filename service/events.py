@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
+from service import store, views
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError
 from service.diagnosis_schemas import DiagnosisOut, StepEvent
@@ -123,6 +124,16 @@ class Events:
             # Shared while it is under way, not kept: nobody reads the same again, and a failure must not stay.
             look.add_done_callback(lambda _: self._looks.pop(key, None))
         return await asyncio.shield(look)
+
+
+def of_run(run_id: str) -> Watched:
+    """Of a run: its generations."""
+
+    def look(session: Session, after: int, limit: int) -> Told:
+        generations = store.history(session, run_id, after, limit)
+        return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
+
+    return Watched(run_id, "generation", look)
 
 
 def described(step: str, example: str) -> dict[str, Any]:

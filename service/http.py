@@ -113,11 +113,15 @@ def json_of(body: bytes) -> Response:
 
 def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:
     """``body`` with an ETag and further ``headers``, or 304 when the caller has it."""
-    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
-    if matches(known, tag):
-        return Response(status_code=304, headers={"ETag": tag})
-    whole = {"ETag": tag, "Cache-Control": "no-cache", **(headers or {})}
-    return Response(body, media_type=media_type, headers=whole)
+    mark = mark_of(body)
+    if matches(known, mark["ETag"]):
+        return Response(status_code=304, headers={"ETag": mark["ETag"]})
+    return Response(body, media_type=media_type, headers={**mark, **(headers or {})})
+
+
+def mark_of(body: bytes) -> dict[str, str]:
+    """The headers by which who has ``body`` asks whether it is outdated."""
+    return {"ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"', "Cache-Control": "no-cache"}
 
 
 def attachment(filename: str) -> dict[str, str]:

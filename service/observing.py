@@ -53,6 +53,20 @@ class Metrics:
             registry=self._registry,
         )
 
+        # Finding the series of a request by its labels takes longer than counting it.
+        self._series: dict[tuple[str, str, int], tuple[Counter, Histogram | None]] = {}
+
+    def count(self, method: str, path: str, status: int, seconds: float) -> None:
+        """One request more. ``method`` and ``path`` are nothing that a caller can make up."""
+        series = self._series.get((method, path, status))
+        if series is None:
+            timed = None if path.endswith("/events") else self.seconds.labels(method, path)
+            series = self.requests.labels(method, path, str(status)), timed
+            self._series[method, path, status] = series
+        series[0].inc()
+        if series[1] is not None:
+            series[1].observe(seconds)
+
     def text(self) -> bytes:
         """In the text format of Prometheus."""
         return generate_latest(self._registry)
@@ -89,7 +103,7 @@ class Observer:
             return
         began, status = time.perf_counter(), 500
         given = Headers(scope=scope).get(REQUEST_ID, "")
-        request = given if GIVEN_ID.fullmatch(given) else secrets.token_hex(8)
+        request = given if GIVEN_ID.fullmatch(given) else new_request()
 
         async def noted(message: Message) -> None:
             nonlocal status
@@ -107,20 +121,28 @@ class Observer:
             REQUEST.reset(token)
 
 
+def new_request() -> str:
+    """The id of a request whose sender gave it none."""
+    return secrets.token_hex(8)
+
+
+def told(scope: Scope, status: int, seconds: float) -> None:
+    """Log a request that was answered, of which ``scope`` has method, path and client."""
+    if LOG.isEnabledFor(logging.INFO):
+        client = (scope.get("client") or ("",))[0]
+        LOG.info(
+            "%s %s %d", scope["method"], scope["path"], status, extra={"ms": round(1e3 * seconds, 2), "client": client}
+        )
+
+
 def _count(scope: Scope, status: int, seconds: float) -> None:
     # The template of the path, and nothing that a caller can make up: every label is a series of its own.
     path = getattr(scope.get("route"), "path", "") or "other"
     known = scope["method"] if scope["method"] in ("GET", "HEAD", "POST", "DELETE") else "other"
     service = getattr(scope["app"].state, "service", None)
     if service is not None:
-        service.metrics.requests.labels(known, path, str(status)).inc()
-        if not path.endswith("/events"):
-            service.metrics.seconds.labels(known, path).observe(seconds)
-    if LOG.isEnabledFor(logging.INFO):
-        client = (scope.get("client") or ("",))[0]
-        LOG.info(
-            "%s %s %d", scope["method"], scope["path"], status, extra={"ms": round(1e3 * seconds, 2), "client": client}
-        )
+        service.metrics.count(known, path, status, seconds)
+    told(scope, status, seconds)
 
 
 class JsonFormatter(logging.Formatter):
@@ -131,18 +153,18 @@ class JsonFormatter(logging.Formatter):
 
     def format(self, record: logging.LogRecord) -> str:
         """``record`` as JSON."""
-        told: dict[str, Any] = {
+        line: dict[str, Any] = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname,
             "logger": record.name,
             "message": record.getMessage(),
         }
         if REQUEST.get():
-            told["request"] = REQUEST.get()
-        told |= {key: value for key, value in vars(record).items() if key not in self.OWN}
+            line["request"] = REQUEST.get()
+        line |= {key: value for key, value in vars(record).items() if key not in self.OWN}
         if record.exc_info:
-            told["exception"] = self.formatException(record.exc_info)
-        return json.dumps(told, default=str)
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line, default=str)
 
 
 def set_up_log(form: LogFormat) -> None:

@@ -6,6 +6,7 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.guard import RAW_HEADERS
 from service.problems import ProblemError, response
+from service.shortcut import BLOCK, SHORTCUT, Block, Shortcut
 
 HEAD_LIMIT = 64 * 2**10
 
@@ -14,13 +15,52 @@ class Protocol(HttpToolsProtocol):
     """One connection; what is neither body nor ends within ``HEAD_LIMIT`` bytes is refused: a head, or trailers."""
 
     _unended = 0
+    _between = True  # the end of a request and the beginning of the next
+    _block: Block | None = None
+    _answered = 0.0
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes of the connection."""
+        shortcut: Shortcut | None = self.app_state.get(SHORTCUT)
+        if shortcut is not None and self._is_at_rest():
+            if self._answer_by(shortcut, data):
+                return
+            self._block = shortcut.block(data)
         self._unended += len(data)
         super().data_received(data)
         if self._unended > HEAD_LIMIT and not self.transport.is_closing():
             self._refuse(f"the line and headers of the request are longer than {HEAD_LIMIT >> 10} KiB; send less")
+
+    def _is_at_rest(self) -> bool:
+        """Whether what comes next is the beginning of a request, and nothing else is to be answered."""
+        # An answer may be complete before its request is: what then comes is no request, whatever it looks like.
+        busy = self._unended or not self._between or self.flow.write_paused or self.transport.is_closing()
+        return not busy and (self.cycle is None or self.cycle.response_complete)
+
+    def _answer_by(self, shortcut: Shortcut, data: bytes) -> bool:
+        answer = shortcut.answer(data, self.server_state.default_headers, self.client)
+        if answer is None:
+            return False
+        self.transport.write(answer)
+        self.server_state.total_requests += 1
+        self._answered = self.loop.time()
+        if self.timeout_keep_alive_task is None:
+            self.timeout_keep_alive_handler()
+        return True
+
+    def timeout_keep_alive_handler(self) -> None:
+        """Hang up, if nothing was asked meanwhile; the timer is not set anew at every short answer."""
+        left = self._answered + self.timeout_keep_alive - self.loop.time()
+        if left > 0:
+            self.timeout_keep_alive_task = self.loop.call_later(left, self.timeout_keep_alive_handler)
+        else:
+            super().timeout_keep_alive_handler()
+
+    def on_message_begin(self) -> None:
+        """Begin what is sent first."""
+        super().on_message_begin()
+        self._between = False
+        self.scope["state"][BLOCK], self._block = self._block, None
 
     def on_headers_complete(self) -> None:
         """Begin the request."""
@@ -34,7 +74,7 @@ class Protocol(HttpToolsProtocol):
 
     def on_message_complete(self) -> None:
         """End it; the next one may follow."""
-        self._unended = 0
+        self._unended, self._between = 0, True
         super().on_message_complete()
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002  uvicorn's signature

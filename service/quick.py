@@ -16,6 +16,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service import http
 from service.database import DatabaseClosedError
+from service.events import Events, of_run
 from service.problems import ProblemError
 from service.reading import Reading
 
@@ -30,12 +31,20 @@ class Template(NamedTuple):
     path: str
 
 
-class _UnusualError(Exception):
+RUNS, RUN, HISTORY = Template("/v1/runs"), Template("/v1/runs/{run_id}"), Template("/v1/runs/{run_id}/history")
+EVENTS = Template("/v1/runs/{run_id}/events")
+
+
+class UnusualError(Exception):
     """The routes shall answer."""
 
 
+# For which the routes have words.
+LEFT = (UnusualError, ProblemError, DatabaseClosedError, sqlite3.Error)
+
+
 class Quick:
-    """Answers ``GET`` of a run, of a page of runs, and of a page of a history."""
+    """Answers ``GET`` of a run, of a page of runs, of a page of a history, and of the events of a run."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -44,54 +53,74 @@ class Quick:
         """Handle one connection."""
         try:
             answer = _answer(scope)
-        except (_UnusualError, ProblemError, DatabaseClosedError, sqlite3.Error):
+        except LEFT:
             await self.app(scope, receive, send)
             return
         await answer(scope, receive, send)
 
 
-def _answer(scope: Scope) -> Response:
-    if scope["type"] != "http" or scope["method"] != "GET":
-        raise _UnusualError
-    place = scope["path"].split("/")
+def read(path: str, query: bytes, reading: Reading) -> tuple[Template, bytes]:
+    """What a ``GET`` of the path is answered with; one of ``LEFT`` where the routes shall answer."""
+    place = path.split("/")
     if place[:3] != START:
-        raise _UnusualError
-    asked, reading = _asked(scope["query_string"]), scope["app"].state.service.reading
+        raise UnusualError
+    asked = _asked(query)
     match place[3:]:
         case []:
-            path, answer = "/v1/runs", _runs(reading, asked)
+            found = RUNS, _runs(reading, asked)
         case [run_id]:
-            known = Headers(scope=scope).get("If-None-Match")
-            path, answer = "/v1/runs/{run_id}", http.marked(reading.run(run_id), http.JSON, known)
+            found = RUN, reading.run(run_id)
         case [run_id, "history"]:
-            path, answer = "/v1/runs/{run_id}/history", _history(reading, run_id, asked)
+            found = HISTORY, _history(reading, run_id, asked)
         case _:
-            raise _UnusualError
+            raise UnusualError
     if asked:
-        raise _UnusualError
-    scope["route"] = Template(path)
-    return answer
+        raise UnusualError
+    return found
 
 
-def _runs(reading: Reading, asked: dict[str, str]) -> Response:
+def _answer(scope: Scope) -> Response:
+    if scope["type"] != "http" or scope["method"] != "GET":
+        raise UnusualError
+    service, headers = scope["app"].state.service, Headers(scope=scope)
+    if scope["path"].endswith("/events"):
+        return _events(scope, service.reading, service.events, headers.get("Last-Event-ID"))
+    scope["route"], body = read(scope["path"], scope["query_string"], service.reading)
+    service.shortcut.remember(scope)
+    if scope["route"] is RUN:
+        return http.marked(body, http.JSON, headers.get("If-None-Match"))
+    return http.json_of(body)
+
+
+def _events(scope: Scope, reading: Reading, events: Events, last: str | None) -> Response:
+    # After a restart of the server all who watch come at once.
+    *start, run_id, _ = scope["path"].split("/")
+    if start != START or scope["query_string"]:
+        raise UnusualError
+    reading.run(run_id)  # or there is none that the caller may see
+    scope["route"] = EVENTS
+    return events.answer(of_run(run_id), last)
+
+
+def _runs(reading: Reading, asked: dict[str, str]) -> bytes:
     # Filters may look at many rows before they find one, and large pages at much: a thread takes these.
     limit = _whole(asked.pop("limit", str(http.PAGE)), 1, http.PAGE)
-    return http.json_of(reading.runs(limit, asked.pop("cursor", None), None, None))
+    return reading.runs(limit, asked.pop("cursor", None), None, None)
 
 
-def _history(reading: Reading, run_id: str, asked: dict[str, str]) -> Response:
+def _history(reading: Reading, run_id: str, asked: dict[str, str]) -> bytes:
     after = _whole(asked.pop("after", "0"), 0, http.LARGEST_INTEGER)
     limit = _whole(asked.pop("limit", str(http.HISTORY_PAGE)), 1, http.HISTORY_PAGE)
-    return http.json_of(reading.history(run_id, after, limit))
+    return reading.history(run_id, after, limit)
 
 
 def _asked(query: bytes) -> dict[str, str]:
     if not QUERY.fullmatch(query):
-        raise _UnusualError
+        raise UnusualError
     return dict(pair.split("=") for pair in query.decode().split("&")) if query else {}
 
 
 def _whole(text: str, least: int, most: int) -> int:
     if not text.isdecimal() or not least <= int(text) <= most:
-        raise _UnusualError
+        raise UnusualError
     return int(text)

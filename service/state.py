@@ -29,6 +29,7 @@ from service.reading import Reading
 from service.runner import Runner
 from service.schemas import HealthOut
 from service.settings import Settings
+from service.shortcut import Shortcut
 from service.tables import DiagnosisRow, RunRow
 from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
 from service.work import Work
@@ -57,6 +58,7 @@ class Service:
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
         self.reading = Reading(database)
+        self.shortcut = Shortcut(self.reading, self.keys, self.metrics)
         self.events = Events(database, self.changes)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.exports = Turns("exports", EXPORTS_AT_ONCE)

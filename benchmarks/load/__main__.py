@@ -59,12 +59,12 @@ class Size:
             Load(NONE, 0.0, 1),
             Load(WATCHED, 0.0, self.watchers),
             Load(CALM, self.rate / 10, self.watchers),
-            Load(BRISK, 0.3 * self.rate, self.watchers),
+            Load(BRISK, self.rate / 2, self.watchers),
             Load(FULL, self.rate, self.watchers),
         )
 
 
-WHOLE = Size(10_000, 100, 20_000, 1000.0, 100, 3, LONG)
+WHOLE = Size(10_000, 100, 20_000, 1000.0, 100, 5, LONG)
 QUICK = Size(200, 20, 3000, 200.0, 20, 1, SHORT)
 
 

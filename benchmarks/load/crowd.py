@@ -24,6 +24,7 @@ FINAL = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 LONGEST_SECONDS = 900.0
 LAST_SECONDS = 5.0  # in which the last answers may come
 HEAD_END = b"\r\n\r\n"
+LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)\r", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -105,25 +106,32 @@ class Reads:
         self._idle: list[_Reader] = []
         self._waiting: deque[tuple[int, float]] = deque()
         self._open, self._opening = 0, set[asyncio.Task[object]]()
+        self._number = 0
 
     async def go(self, over: asyncio.Event) -> None:
         """Read until it is over, then wait a little for the last answers."""
-        began = due = time.monotonic()
-        number = 0
-        while not over.is_set():
-            due = began + number / self._crowd.rate
-            if due > (now := time.monotonic()):
-                await asyncio.sleep(due - now)
-            self._told.late = max(self._told.late, time.monotonic() - due)
-            self._waiting.append((number, due))
-            self._send()
-            number += 1
-        self._told.reading_seconds = time.monotonic() - began
-        while len(self._told.latencies) < number and time.monotonic() < due + LAST_SECONDS:
+        self._loop, self._began = asyncio.get_running_loop(), time.monotonic()
+        self._tick()
+        await over.wait()
+        self._next.cancel()
+        ended = time.monotonic()
+        self._told.reading_seconds = ended - self._began
+        while len(self._told.latencies) < self._number and time.monotonic() < ended + LAST_SECONDS:
             await asyncio.sleep(0.01)
-        self._told.unanswered = number - len(self._told.latencies)
+        self._told.unanswered = self._number - len(self._told.latencies)
         for reader in list(self._idle):
             reader.close()
+
+    def _tick(self) -> None:
+        """Ask what is due by now, and be back when the next is."""
+        now, rate = time.monotonic(), self._crowd.rate
+        while (due := self._began + self._number / rate) <= now:
+            self._told.late = max(self._told.late, now - due)
+            self._waiting.append((self._number, due))
+            self._number += 1
+        self._send()
+        # The loop rounds to whole milliseconds, and down to none at all.
+        self._next = self._loop.call_later(max(due - now, 0.001), self._tick)
 
     def free(self, reader: _Reader) -> None:
         """``reader`` can ask."""
@@ -195,11 +203,9 @@ class _Reader(asyncio.Protocol):
 
 def answered(data: bytes) -> int:
     """Status of the answer that is in ``data``, 0 while it is not all there."""
-    head, end, body = data.partition(HEAD_END)
-    if not end:
-        return 0
-    _, _, length = head.lower().partition(b"\r\ncontent-length:")
-    return int(head[9:12]) if len(body) >= int(length.split(b"\r", 1)[0]) else 0
+    end = data.find(HEAD_END)
+    length = LENGTH.search(data, 0, end + 2) if end > 0 else None
+    return int(data[9:12]) if length and len(data) - end - len(HEAD_END) >= int(length[1]) else 0
 
 
 def _request(port: int, path: str) -> bytes:

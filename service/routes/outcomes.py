@@ -6,14 +6,13 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
-from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from calibration.search import CalibrationSpec
 from records import Dataset, Recording
 from service import force_views, genomes, http, load_views, spec_views, store, views
 from service.checks import gene_names
-from service.events import LastEventId, Told, Watched, described
+from service.events import LastEventId, described, of_run
 from service.force_schemas import AnyResult, ForceSimulationOut
 from service.load_schemas import LoadsOut, OutputName
 from service.problems import ProblemError, conflict, error_item, invalid
@@ -131,12 +130,7 @@ def loads(
 def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
     """Send generations and states as they happen; ends after the final state."""
     run_row(service, run_id)
-
-    def look(session: Session, after: int, limit: int) -> Told:
-        generations = store.history(session, run_id, after, limit)
-        return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
-
-    return service.events.answer(Watched(run_id, "generation", look), last_event_id)
+    return service.events.answer(of_run(run_id), last_event_id)
 
 
 @router.post(

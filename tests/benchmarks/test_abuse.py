@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +14,7 @@ from benchmarks.abuse import fuzz, requests, uploads
 from benchmarks.abuse.__main__ import _wrong
 from benchmarks.abuse.cases import Case
 from benchmarks.abuse.filling import Filling
-from calibration.result import Comparison
-from calibration.search import CalibrationSpec
-from records import Dataset, load_archive
+from records import load_archive
 from service.app import create_app
 from service.settings import Settings
 from tests.service import toy
@@ -112,21 +109,8 @@ def test_what_is_valid_is_filled_alike_for_the_same_request_and_what_others_need
     assert filling.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
 
 
-class FaultyEngine(toy.ToyEngine):
-    """Fails where only a request arrives that names a dataset, a recording and genes that exist."""
-
-    def compare(
-        self,
-        spec: CalibrationSpec,  # noqa: ARG002
-        dataset: Dataset,  # noqa: ARG002
-        genome: Mapping[str, float],  # noqa: ARG002
-        recording: str,
-    ) -> Comparison:
-        raise RuntimeError(f"a mistake with {recording}")
-
-
 @pytest.mark.skipif(fuzz.program() is None, reason="schemathesis is not installed")
-@pytest.mark.parametrize("engine", [toy.ToyEngine(), FaultyEngine()], ids=["sound", "faulty"])
+@pytest.mark.parametrize("engine", [toy.ToyEngine(), toy.FaultyEngine()], ids=["sound", "faulty"])
 def test_the_fuzzer_finds_a_fault_deep_inside(tmp_path: Path, engine: toy.ToyEngine) -> None:
     st = fuzz.program()
     assert st is not None
@@ -139,4 +123,4 @@ def test_the_fuzzer_finds_a_fault_deep_inside(tmp_path: Path, engine: toy.ToyEng
         report = fuzz._round(st, f"{client.base_url}{fuzz.SPECIFICATION}", "fuzzing", 8, 1, folder)
     assert fuzz.counted(report) > 200
     found = fuzz.judged(report)
-    assert any("POST /v1/simulations" in one for one in found) == isinstance(engine, FaultyEngine), found
+    assert any("POST /v1/simulations" in one for one in found) == isinstance(engine, toy.FaultyEngine), found

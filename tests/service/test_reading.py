@@ -80,6 +80,13 @@ UNUSUAL = (
 )  # fmt: skip
 
 
+@pytest.fixture
+def framed(used: Used, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that is asked goes to the framework."""
+    monkeypatch.setattr(used.service.shortcut, "answer", lambda *_: None)
+
+
+@pytest.mark.usefixtures("framed")
 @pytest.mark.parametrize("form", [*USUAL, *UNUSUAL])
 def test_the_routes_answer_alike(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     path = used.path(form)
@@ -88,13 +95,14 @@ def test_the_routes_answer_alike(used: Used, form: str, monkeypatch: pytest.Monk
 
     def leave(scope: Json) -> None:
         routed.append(scope["path"])
-        raise quick._UnusualError
+        raise quick.UnusualError
 
     monkeypatch.setattr(quick, "_answer", leave)
     assert seen(used.api.client.get(path)) == first
     assert routed
 
 
+@pytest.mark.usefixtures("framed")
 @pytest.mark.parametrize("form", USUAL)
 def test_what_is_usual_is_not_left_to_the_routes(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
     path = used.path(form)
@@ -108,6 +116,35 @@ def test_what_is_usual_is_not_left_to_the_routes(used: Used, form: str, monkeypa
     monkeypatch.setattr(quick, "_answer", noted)
     assert used.api.client.get(path).status_code == 200
     assert len(answered) == 1
+
+
+@pytest.mark.parametrize(
+    ("run", "last", "status"), [("RUN", "", 200), ("RUN", "7", 200), ("RUN", "none", 422), ("none", "", 404)]
+)
+def test_events_are_the_same_the_quick_way(
+    used: Used, run: str, last: str, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, headers = used.path(f"runs/{run}/events"), {"Last-Event-ID": last} if last else {}
+    quickly = []
+    events = quick._events
+
+    def noted(*asked: Any) -> Any:
+        quickly.append(events(*asked))
+        return quickly[-1]
+
+    monkeypatch.setattr(quick, "_events", noted)
+    first = used.api.client.get(path, headers=headers)
+    monkeypatch.undo()
+    monkeypatch.setattr(quick, "_events", leave)
+    second = used.api.client.get(path, headers=headers)
+    assert (first.status_code, first.text, len(quickly)) == (status, second.text, int(status == 200))
+    assert second.status_code == status
+    assert dict(first.headers).keys() == dict(second.headers).keys()
+    assert status != 200 or first.text.count("event: generation") == (3 if last else 10)
+
+
+def leave(*_: object) -> None:
+    raise quick.UnusualError
 
 
 def seen(answer: httpx.Response) -> tuple[object, ...]:

@@ -7,7 +7,7 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,8 @@ import httpx
 import pytest
 
 from benchmarks.abuse import uploads
-from calibration.result import Comparison
-from calibration.search import CalibrationSpec
 from diagnosis import DiagnosisSpec
-from records import Dataset, limits
+from records import limits
 from records.schema import dataset_schema
 from service import diagnosis_schemas, events, guard, http, protocol, schemas, settings, spec_schemas, turns
 from service.app import create_app
@@ -33,24 +31,11 @@ CODE = ("records", "tracking", "sim", "calibration", "diagnosis", "report", "wor
 Schema = dict[str, Any]
 
 
-class FaultyEngine(toy.ToyEngine):
-    """Its simulations fail by a mistake."""
-
-    def compare(
-        self,
-        spec: CalibrationSpec,  # noqa: ARG002
-        dataset: Dataset,  # noqa: ARG002
-        genome: Mapping[str, float],  # noqa: ARG002
-        recording: str,
-    ) -> Comparison:
-        raise RuntimeError(f"a word about {recording} that is nobody's business")
-
-
 # -- answers -----------------------------------------------------------------------------------------------
 
 
 def test_a_mistake_is_answered_without_a_word_about_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    app = create_app(Settings(data=tmp_path), engine=FaultyEngine(), make_evaluator=toy.NoEvaluator)
+    app = create_app(Settings(data=tmp_path), engine=toy.FaultyEngine(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client:
         body = {"dataset_id": Api(client).upload()["id"], "recording": "slow"}
         for _ in range(2):  # the connection goes on

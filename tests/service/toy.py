@@ -272,3 +272,12 @@ def _recording(name: str) -> Recording:
         markers=("a", "b"),
         values=values,
     )
+
+
+class FaultyEngine(ToyEngine):
+    """Its simulations fail by a mistake, where only a request arrives that names what exists."""
+
+    def compare(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> Comparison:
+        raise RuntimeError(f"a word about {recording} that is nobody's business")

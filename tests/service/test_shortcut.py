@@ -1,0 +1,282 @@
+"""Below the framework: the same answers as within it, to the same callers, and nothing that must be parsed."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import select
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service import shortcut
+from service.app import create_app
+from service.protocol import Protocol
+from service.settings import Settings
+from service.state import Service
+from tests.service import toy
+from tests.service.conftest import Api, made, serving
+from tests.service.test_reading import USUAL
+
+Answer = tuple[str, dict[str, str], bytes]
+
+
+class Line:
+    """A connection on which every byte is the test's own."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.create_connection(("127.0.0.1", port), timeout=10.0)
+        self._file = self._socket.makefile("rb")
+        self.host = f"127.0.0.1:{port}"
+
+    def send(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def answer(self) -> Answer:
+        status = self._file.readline().decode().strip()
+        fields = {}
+        while line := self._file.readline().strip():
+            name, _, value = line.decode().partition(": ")
+            assert name not in fields
+            fields[name] = value
+        return status, fields, self._file.read(int(fields["content-length"]))
+
+    def silent(self, seconds: float) -> bool:
+        """Whether nothing comes, nor a hanging up."""
+        return not select.select([self._socket], [], [], seconds)[0]
+
+    def hung_up(self, seconds: float) -> bool:
+        return bool(select.select([self._socket], [], [], seconds)[0]) and not self._socket.recv(1)
+
+    @property
+    def name(self) -> Any:
+        return self._socket.getsockname()
+
+    def get(self, path: str, *headers: str) -> Answer:
+        self.send(self.head(path, *headers))
+        return self.answer()
+
+    def head(self, path: str, *headers: str, version: str = "1.1") -> bytes:
+        lines = [f"GET {path} HTTP/{version}", f"Host: {self.host}", *headers, "", ""]
+        return "\r\n".join(lines).encode()
+
+    def close(self) -> None:
+        self._file.close()
+        self._socket.close()
+
+
+class Used:
+    """A server with a run that has ended."""
+
+    def __init__(self, service: Service, api: Api) -> None:
+        self.service, self.api = service, api
+        self.dataset = self.api.upload()["id"]
+        self.run = self.api.submit(self.dataset)["id"]
+        self.api.finish(self.run)
+        self.api.finish(self.api.submit(self.dataset, seed=2)["id"])
+        self.port = int(api.client.base_url.port or 0)
+        self.short: list[bool] = []
+        answer = service.shortcut.answer
+
+        def noted(*asked: Any) -> bytes | None:
+            found = answer(*asked)
+            self.short.append(found is not None)
+            return found
+
+        service.shortcut.answer = noted  # type: ignore[method-assign, assignment]
+
+    def connection(self, line: Line) -> Protocol:
+        """The server's end of it."""
+        while True:
+            found = [one for one in gc.get_objects() if isinstance(one, Protocol) and one.client == line.name]
+            if found:
+                return found[0]
+
+    @contextmanager
+    def line(self) -> Iterator[Line]:
+        line = Line(self.port)
+        self.short.clear()
+        try:
+            yield line
+        finally:
+            line.close()
+
+    def path(self, form: str) -> str:
+        cursor = self.api.get("/v1/runs?limit=1")["next_cursor"]
+        return "/v1/" + form.replace("RUN", self.run).replace("CURSOR", cursor)
+
+
+@pytest.fixture(scope="module")
+def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
+    settings = Settings(data=tmp_path_factory.mktemp("used"))
+    app = create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        yield Used(app.state.service, Api(client))
+
+
+@pytest.mark.parametrize("form", USUAL)
+def test_the_framework_answers_alike(used: Used, form: str) -> None:
+    path = used.path(form)
+    with used.line() as line:
+        first, second = (line.get(path, f"User-Agent: {form}") for _ in range(2))
+    assert used.short == [False, True]
+    assert first[0] == second[0] == "HTTP/1.1 200 OK"
+    assert first[2] == second[2]
+    own = {"date", "x-request-id", "server"}
+    assert {name: text for name, text in first[1].items() if name not in own} == {
+        name: text for name, text in second[1].items() if name not in own
+    }
+    assert first[1].keys() == second[1].keys()
+    assert first[1]["x-request-id"] != second[1]["x-request-id"]
+
+
+def test_headers_that_were_let_in_are_good_for_all_quick_reads_and_nothing_else(used: Used) -> None:
+    with used.line() as line:
+        line.get("/v1/runs", "User-Agent: all")
+        for path in (f"/v1/runs/{used.run}", f"/v1/runs/{used.run}/history?limit=3"):
+            assert line.get(path, "User-Agent: all")[0] == "HTTP/1.1 200 OK"
+        assert used.short == [False, True, True]
+        for path, status in (
+            ("/v1/runs/none", 404), ("/v1/runs?limit=0", 422), ("/v1/health", 200),
+            (f"/v1/runs/{used.run}/genome", 200),
+            ("/v1/runs/../datasets", 404), ("/v1/runs/%2e%2e", 404), ("/v1/runsx", 404),
+        ):  # fmt: skip
+            assert line.get(path, "User-Agent: all")[0].split()[1] == str(status), path
+        assert not any(used.short[3:])
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        ["X-Request-ID: mine"], ["If-None-Match: none"], ["Content-Length: 0"], ["Connection: upgrade"], ["Expect: x"],
+        ["X-Forwarded-For: 1.2.3.4"], ["User-Agent: " + 5000 * "x"],
+    ],
+    ids=lambda headers: headers[-1][:20],
+)  # fmt: skip
+def test_what_an_answer_may_depend_on_is_parsed(used: Used, headers: list[str]) -> None:
+    with used.line() as line:
+        for _ in range(2):
+            line.send(line.head("/v1/runs?limit=1", *headers))
+            line.answer()
+    assert used.short == [False, False]
+
+
+def test_what_comes_in_pieces_or_together_is_parsed(used: Used) -> None:
+    with used.line() as line:
+        head = line.head("/v1/runs?limit=1", "User-Agent: pieces")
+        for pieces, answers in (((head,), 1), ((head + head,), 2), ((head[:20], head[20:]), 1), ((head, head), 2)):
+            for piece in pieces:
+                line.send(piece)
+            assert [line.answer()[0] for _ in range(answers)] == answers * ["HTTP/1.1 200 OK"]
+        line.send(line.head("/v1/runs?limit=1", "User-Agent: pieces", version="1.0"))
+        assert line.answer()[0] == "HTTP/1.1 200 OK"
+
+
+def test_a_body_is_no_request_whatever_it_looks_like(used: Used) -> None:
+    with used.line() as line:
+        head = line.head("/v1/runs?limit=1", "User-Agent: body")
+        line.send(head)
+        line.answer()
+        line.send(head)
+        line.answer()
+        assert used.short == [False, True]
+        # Answered before its body has come.
+        refused = f"POST /v1/runs HTTP/1.1\r\nHost: {line.host}\r\nContent-Length: {2**21}\r\n\r\n".encode()
+        line.send(refused)
+        assert line.answer()[0].split()[1] == "413"
+        line.send(head)
+        assert line.silent(0.3)
+    assert used.short == [False, True, False]
+
+
+def test_requests_by_the_short_way_are_counted_and_logged(used: Used, caplog: pytest.LogCaptureFixture) -> None:
+    count = 'wingfit_http_requests_total{method="GET",path="/v1/runs/{run_id}/history",status="200"}'
+
+    def counted() -> float:
+        lines = used.api.client.get("/v1/metrics").text.splitlines()
+        return next((float(one.rsplit(" ", 1)[1]) for one in lines if one.startswith(count)), 0.0)
+
+    before = counted()
+    with used.line() as line, caplog.at_level(logging.INFO, "wingfit.access"):
+        for _ in range(2):
+            line.get(f"/v1/runs/{used.run}/history", "User-Agent: counted")
+    assert used.short[:2] == [False, True]
+    assert counted() == before + 2
+    told = [one for one in caplog.records if one.getMessage() == f"GET /v1/runs/{used.run}/history 200"]
+    assert [hasattr(one, "ms") and hasattr(one, "client") for one in told] == [True, True]
+
+
+def test_what_is_remembered_is_bounded(used: Used) -> None:
+    with used.line() as line:
+        for number in range(2 * shortcut.MOST):
+            line.get("/v1/runs?limit=1", f"User-Agent: {number}")
+    assert 0 < len(used.service.shortcut._known) <= shortcut.MOST
+
+
+@pytest.mark.parametrize("first", ["/v1/runs?limit=1", "/v1/health"])
+def test_who_asks_nothing_is_hung_up_on_and_who_asks_is_not(used: Used, first: str) -> None:
+    """By the answers that are short as by the others."""
+    with used.line() as line:
+        line.get("/v1/runs?limit=1", "User-Agent: patient")
+    with used.line() as line:
+        used.connection(line).timeout_keep_alive = 0.4  # type: ignore[assignment]
+        line.get(first, "User-Agent: patient")
+        for _ in range(10):
+            time.sleep(0.1)
+            line.get("/v1/runs?limit=1", "User-Agent: patient")
+        assert used.short[-10:] == [True] * 10
+        assert line.silent(0.2)
+        assert line.hung_up(5.0)
+
+
+# -- keys ---------------------------------------------------------------------------------------------------
+
+
+def test_whose_headers_came_in_is_who_asks(tmp_path: Path) -> None:
+    secrets = {name: made(tmp_path, name, *scopes) for name, scopes in KEYS.items()}
+    app = create_app(Settings(data=tmp_path, require_keys=True), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        apis = {name: Api(as_key(client, secret)) for name, secret in secrets.items()}
+        used = Used(app.state.service, apis["ann"])
+        for _ in range(3):
+            assert [len(apis[name].get("/v1/runs")["items"]) for name in KEYS] == [2, 2, 0]
+            assert apis["bob"].client.get(f"/v1/runs/{used.run}").status_code == 404
+            assert client.get("/v1/runs").status_code == 401
+        assert used.short.count(True) >= 6
+        # A key that is not good any more is let in no more, not even in words that were.
+        ann = next(key for key in apis["admin"].get("/v1/keys")["items"] if key["name"] == "ann")
+        assert apis["admin"].client.delete(f"/v1/keys/{ann['id']}").status_code == 200
+        assert apis["ann"].client.get("/v1/runs").status_code == 401
+        assert apis["ann"].client.get(f"/v1/runs/{used.run}").status_code == 401
+        assert len(apis["admin"].get("/v1/runs")["items"]) == 2
+
+
+def test_keys_that_change_while_a_request_is_let_in_count(tmp_path: Path) -> None:
+    """The request was let in by keys that are good no more, and its headers must not be."""
+    app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        used = Used(app.state.service, Api(client))
+        remember = used.service.shortcut.remember
+
+        def late(scope: Any) -> None:
+            used.service.load_keys()
+            remember(scope)
+
+        used.service.shortcut.remember = late  # type: ignore[method-assign]
+        with used.line() as line:
+            for _ in range(3):
+                line.get("/v1/runs?limit=1", "User-Agent: late")
+    assert used.short == [False] * 3
+
+
+KEYS = {"admin": ["admin"], "ann": ["read", "write"], "bob": ["read", "write"]}
+
+
+def as_key(client: httpx.Client, secret: str) -> httpx.Client:
+    return httpx.Client(base_url=client.base_url, headers={"Authorization": f"Bearer {secret}"}, timeout=20.0)
