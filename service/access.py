@@ -95,11 +95,10 @@ class KeyRing:
         self._good: dict[str, Caller] = {}
 
     def load(self, session: Session) -> None:
-        """Read the keys that are good now."""
-        rows = session.scalars(select(KeyRow).where(KeyRow.revoked_at.is_(None)))
-        good = {row.sha256: Caller(row.id, row.owner, frozenset(row.scopes)) for row in rows}
-        with self._lock:
-            self._good = good
+        """Read the keys that are good now; ``session`` has read nothing yet."""
+        with self._lock:  # around the reading: what was read before a change must not be kept after it
+            rows = session.scalars(select(KeyRow).where(KeyRow.revoked_at.is_(None)))
+            self._good = {row.sha256: Caller(row.id, row.owner, frozenset(row.scopes)) for row in rows}
 
     def caller(self, secret: str) -> Caller | None:
         """Whose key it is; None where it is no key, or one that was revoked."""

@@ -21,11 +21,10 @@ class Protocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes of the connection."""
-        shortcut: Shortcut | None = self.app_state.get(SHORTCUT)
-        if shortcut is not None and self._is_at_rest():
-            if self._answer_by(shortcut, data):
-                return
-            self._block = shortcut.block(data)
+        shortcut: Shortcut | None = self.app_state.get(SHORTCUT) if self._is_at_rest() else None
+        if shortcut is not None and self._answer_by(shortcut, data):
+            return
+        self._block = shortcut.block(data) if shortcut else None
         self._unended += len(data)
         super().data_received(data)
         if self._unended > HEAD_LIMIT and not self.transport.is_closing():
@@ -34,7 +33,7 @@ class Protocol(HttpToolsProtocol):
     def _is_at_rest(self) -> bool:
         """Whether what comes next is the beginning of a request, and nothing else is to be answered."""
         # An answer may be complete before its request is: what then comes is no request, whatever it looks like.
-        busy = self._unended or not self._between or self.flow.write_paused or self.transport.is_closing()
+        busy = not self._between or self.flow.write_paused or self.transport.is_closing()
         return not busy and (self.cycle is None or self.cycle.response_complete)
 
     def _answer_by(self, shortcut: Shortcut, data: bytes) -> bool:
@@ -42,7 +41,6 @@ class Protocol(HttpToolsProtocol):
         if answer is None:
             return False
         self.transport.write(answer)
-        self.server_state.total_requests += 1
         self._answered = self.loop.time()
         if self.timeout_keep_alive_task is None:
             self.timeout_keep_alive_handler()
@@ -66,6 +64,9 @@ class Protocol(HttpToolsProtocol):
         """Begin the request."""
         self._unended = 0
         super().on_headers_complete()
+        if self.parser.should_upgrade():
+            # To what was not agreed on: the parser would take the body for the next request.
+            self.cycle.keep_alive = False
 
     def on_body(self, body: bytes) -> None:
         """Take a part of the body, whose size is watched elsewhere."""

@@ -81,21 +81,23 @@ class Shortcut:
         try:
             with calling(caller):
                 template, body = quick.read(path, match[2] or b"", self._reading)
-        except quick.LEFT:
+        except Exception:
             return None
         request = new_request()
         fail_points.passing("answer")
         seconds = time.perf_counter() - began
         self._metrics.count("GET", template.path, 200, seconds)
         token = REQUEST.set(request)
-        told({"method": "GET", "path": path, "client": client}, 200, seconds)
-        REQUEST.reset(token)
+        try:
+            told({"method": "GET", "path": path, "client": client}, 200, seconds)
+        finally:
+            REQUEST.reset(token)
         mark = http.mark_of(body) if template is quick.RUN else {}
         return _raw(body, own, mark | {"Content-Type": http.JSON, REQUEST_ID: request})
 
 
 def _harmless(fields: Fields, headers: bytes) -> bool:
-    # As many fields as lines: what was parsed is the whole block, and no line of it was taken in another way.
+    # As many fields as lines: what was parsed is the whole block, line by line, should the parser ever become lenient.
     return (
         headers.count(b"\n") == len(fields) + 1
         and all(name in HARMLESS for name, _ in fields)

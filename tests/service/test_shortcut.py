@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import httpx
@@ -17,6 +18,7 @@ import pytest
 
 from service import shortcut
 from service.app import create_app
+from service.observing import REQUEST
 from service.protocol import Protocol
 from service.settings import Settings
 from service.state import Service
@@ -46,6 +48,14 @@ class Line:
             assert name not in fields
             fields[name] = value
         return status, fields, self._file.read(int(fields["content-length"]))
+
+    def until(self, part: bytes) -> None:
+        """Take what comes until it has ``part``."""
+        taken = b""
+        while part not in taken:
+            more = self._socket.recv(65536)
+            assert more, taken
+            taken += more
 
     def silent(self, seconds: float) -> bool:
         """Whether nothing comes, nor a hanging up."""
@@ -93,10 +103,12 @@ class Used:
 
     def connection(self, line: Line) -> Protocol:
         """The server's end of it."""
-        while True:
+        deadline = time.monotonic() + 5.0
+        while time.monotonic() < deadline:
             found = [one for one in gc.get_objects() if isinstance(one, Protocol) and one.client == line.name]
             if found:
                 return found[0]
+        raise AssertionError("the server does not have the connection")
 
     @contextmanager
     def line(self) -> Iterator[Line]:
@@ -170,12 +182,98 @@ def test_what_an_answer_may_depend_on_is_parsed(used: Used, headers: list[str]) 
 def test_what_comes_in_pieces_or_together_is_parsed(used: Used) -> None:
     with used.line() as line:
         head = line.head("/v1/runs?limit=1", "User-Agent: pieces")
-        for pieces, answers in (((head,), 1), ((head + head,), 2), ((head[:20], head[20:]), 1), ((head, head), 2)):
+        cases = (
+            ((head,), [False]),
+            ((head + head,), [False]),
+            ((head[:20], head[20:]), [False]),
+            ((head, head), [True, True]),
+        )
+        for pieces, short in cases:
+            used.short.clear()
             for piece in pieces:
                 line.send(piece)
-            assert [line.answer()[0] for _ in range(answers)] == answers * ["HTTP/1.1 200 OK"]
+                time.sleep(0.05)
+            for _ in range(sum(map(len, pieces)) // len(head)):
+                assert line.answer()[0] == "HTTP/1.1 200 OK"
+            assert used.short == short
+        used.short.clear()
         line.send(line.head("/v1/runs?limit=1", "User-Agent: pieces", version="1.0"))
         assert line.answer()[0] == "HTTP/1.1 200 OK"
+        assert line.hung_up(5.0)
+        assert used.short == [False]
+
+
+def test_what_is_asked_while_another_answer_is_under_way_waits(used: Used) -> None:
+    with used.line() as line:
+        head = line.head("/v1/runs?limit=1", "User-Agent: waits")
+        line.send(head)
+        line.answer()
+        held = Event()
+        used.service.engine.gate = lambda _: held.wait()  # type: ignore[attr-defined]
+        run = used.api.submit(used.dataset, seed=3)["id"]
+        line.send(line.head(f"/v1/runs/{run}/events", "User-Agent: waits"))
+        line.until(b"event: state")
+        used.short.clear()
+        line.send(head)
+        try:
+            assert line.silent(0.3)
+            assert used.short == [], "not even tried"
+        finally:
+            held.set()
+    used.api.finish(run)
+
+
+def test_headers_are_remembered_of_none_but_their_own_request(used: Used) -> None:
+    """What comes while an answer is under way is not what is then let in."""
+    with used.line() as line:
+        line.get("/v1/runs?limit=1", "User-Agent: own")
+        for _ in range(2):
+            # The first is answered by a thread; the second waits behind it, in a piece of its own.
+            line.send(line.head("/v1/runs?limit=2&state=SUCCEEDED", "User-Agent: own"))
+            line.send(line.head("/v1/runs?limit=1", "User-Agent: other", "Accept: x"))
+            assert [line.answer()[0] for _ in range(2)] == 2 * ["HTTP/1.1 200 OK"]
+        assert used.connection(line)._block is None
+
+
+def test_who_does_not_read_is_sent_no_more(used: Used) -> None:
+    with used.line() as line:
+        protocol = used.connection(line)
+        for _ in range(2):
+            line.get("/v1/runs?limit=1", "User-Agent: slow")
+        assert used.short == [False, True]
+        protocol.loop.call_soon_threadsafe(protocol.pause_writing)
+        time.sleep(0.1)
+        line.send(line.head("/v1/runs?limit=1", "User-Agent: slow"))
+        assert line.silent(0.3)
+        protocol.loop.call_soon_threadsafe(protocol.resume_writing)
+        assert line.answer()[0] == "HTTP/1.1 200 OK"
+        assert used.short == [False, True]
+
+
+def test_an_upgrade_that_nobody_agreed_to_hides_no_request(used: Used) -> None:
+    with used.line() as line:
+        hidden = line.head("/v1/runs?limit=1", "User-Agent: hidden")
+        line.get("/v1/runs?limit=1", "User-Agent: hidden")
+        upgrade = f"POST /v1/runs HTTP/1.1\r\nHost: {line.host}\r\nConnection: Upgrade\r\nUpgrade: x\r\n"
+        line.send(f"{upgrade}Content-Length: {len(hidden)}\r\n\r\n".encode() + hidden)
+        assert line.answer()[0] != "HTTP/1.1 200 OK"
+        assert line.hung_up(5.0)
+
+
+def test_what_goes_wrong_is_left_to_the_framework(used: Used, monkeypatch: pytest.MonkeyPatch) -> None:
+    with used.line() as line:
+        path = f"/v1/runs/{used.run}"
+        line.get(path, "User-Agent: wrong")
+
+        def fail(*_: object) -> bytes:
+            raise ValueError("what is stored cannot be read")
+
+        monkeypatch.setattr(used.service.reading, "run", fail)
+        status, _, body = line.get(path, "User-Agent: wrong")
+        assert (status.split()[1], b"cannot be read" in body) == ("500", False)
+        monkeypatch.undo()
+        assert line.get(path, "User-Agent: wrong")[0] == "HTTP/1.1 200 OK"
+        assert used.short == [False, False, True]
 
 
 def test_a_body_is_no_request_whatever_it_looks_like(used: Used) -> None:
@@ -203,13 +301,14 @@ def test_requests_by_the_short_way_are_counted_and_logged(used: Used, caplog: py
         return next((float(one.rsplit(" ", 1)[1]) for one in lines if one.startswith(count)), 0.0)
 
     before = counted()
+    caplog.handler.addFilter(lambda record: setattr(record, "of_request", REQUEST.get()) or True)  # type: ignore[func-returns-value]
     with used.line() as line, caplog.at_level(logging.INFO, "wingfit.access"):
-        for _ in range(2):
-            line.get(f"/v1/runs/{used.run}/history", "User-Agent: counted")
+        ids = [line.get(f"/v1/runs/{used.run}/history", "User-Agent: counted")[1]["x-request-id"] for _ in range(2)]
     assert used.short[:2] == [False, True]
     assert counted() == before + 2
     told = [one for one in caplog.records if one.getMessage() == f"GET /v1/runs/{used.run}/history 200"]
     assert [hasattr(one, "ms") and hasattr(one, "client") for one in told] == [True, True]
+    assert [vars(one)["of_request"] for one in told] == ids
 
 
 def test_what_is_remembered_is_bounded(used: Used) -> None:
