@@ -2,6 +2,7 @@
 
 Arrays that come out of Ray's shared memory are read-only, and compiled kernels take those for another type:
 a problem travels as bytes. One call costs milliseconds: units travel in batches, a few per processor.
+Ray's default strategy leaves whole generations to the node that had the last one: batches are spread.
 Nothing is ever cancelled: in Ray 2.60 a cancellation that meets the end of its task aborts this process.
 """
 
@@ -41,7 +42,7 @@ class RayEvaluator:
         self._closed = False
         self._calls = 0
         self._references: OrderedDict[str, Any] = OrderedDict()
-        self._run_tasks = ray.remote(num_cpus=1, max_retries=RETRIES)(_run_tasks)
+        self._run_tasks = ray.remote(num_cpus=1, max_retries=RETRIES, scheduling_strategy="SPREAD")(_run_tasks)
         self._workers = self._count_workers()
 
     @property
