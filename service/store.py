@@ -280,6 +280,14 @@ def spec_json(given: CalibrationSpec) -> dict[str, Any]:
 # -- answers to repeated requests ------------------------------------------------------------------------
 
 
+# By the part of a location that says what is there.
+_MADE: dict[str, type[DatasetRow | RunRow | DiagnosisRow]] = {
+    "datasets": DatasetRow,
+    "runs": RunRow,
+    "diagnoses": DiagnosisRow,
+}
+
+
 @dataclass(frozen=True)
 class Repeat:
     """The key of a request that may be repeated, and what must be equal for it to be the same request."""
@@ -299,7 +307,10 @@ class Answer:
 
 
 def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
-    """What the same request was answered before; a 422 when the key was used for another one."""
+    """What the same request was answered before; a 422 when the key was used for another one.
+
+    A 409 when what it made was deleted since: to tell of it would be wrong, and to make it again unasked.
+    """
     row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
     if row is None or repeat is None:
         return None
@@ -308,6 +319,9 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
             "this Idempotency-Key was used for another request",
             [error_item("header.Idempotency-Key", repeat.key, "use a new key for a new request")],
         )
+    *_, kind, made = row.location.split("/")
+    if session.scalar(select(_MADE[kind].id).where(_MADE[kind].id == made)) is None:
+        raise conflict(f"{made}, which this Idempotency-Key made, was deleted; use a new key to make it again")
     return Answer(row.status, row.location, row.body)
 
 

@@ -29,7 +29,7 @@ ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
     "",
     status_code=201,
     response_model=DatasetOut,
-    responses={201: {"headers": http.LOCATION}, **http.errors(400, 413, 429)},
+    responses={201: {"headers": http.LOCATION}, **http.errors(400, 409, 413, 429)},
     summary="Upload a dataset",
     dependencies=[IN_TURN_OF_UPLOADS],
 )

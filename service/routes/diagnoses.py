@@ -44,7 +44,7 @@ data: {"id": "dx_7d20c14be5a9f386", "state": "SUCCEEDED", "verdict": "named"}
     "",
     status_code=202,
     response_model=DiagnosisOut,
-    responses={202: {"headers": http.LOCATION}, **http.errors(429)},
+    responses={202: {"headers": http.LOCATION}, **http.errors(409, 429)},
     summary="Submit a diagnosis",
 )
 def submit(

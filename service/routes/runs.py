@@ -29,7 +29,7 @@ router = APIRouter(prefix="/v1/runs", tags=["runs"])
     responses={
         200: {"model": CheckedOut, "description": "Nothing is wrong with it (validate_only)"},
         202: {"headers": http.LOCATION},
-        **http.errors(429),
+        **http.errors(409, 429),
     },
     summary="Submit a calibration",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -145,6 +146,27 @@ def test_repeated_with_the_same_key_nothing_is_created_twice(api: Api) -> None:
     assert len({run.json()["id"] for run in runs}) == 1, "the key of an upload does not clash with that of a run"
     assert len(api.get("/v1/runs")["items"]) == 1
     assert api.client.post("/v1/runs", json=body | {"seed": 2}, headers=headers).status_code == 422
+
+
+def test_what_was_deleted_is_neither_told_of_nor_made_again(api: Api) -> None:
+    dataset = _upload(api, {"Idempotency-Key": "d"}, "one").json()["id"]
+    body, key = {"dataset_id": dataset, "max_generations": 1}, {"Idempotency-Key": "r"}
+    run = api.client.post("/v1/runs", json=body, headers=key).json()["id"]
+    diagnosis = api.client.post("/v1/diagnoses", json={"dataset_id": dataset}, headers=key).json()["id"]
+    api.finish(run)
+    api.diagnosed(diagnosis)
+    cases: list[tuple[str, str, Callable[[], httpx.Response]]] = [
+        ("runs", run, lambda: api.client.post("/v1/runs", json=body, headers=key)),
+        ("diagnoses", diagnosis, lambda: api.client.post("/v1/diagnoses", json={"dataset_id": dataset}, headers=key)),
+        ("datasets", dataset, lambda: _upload(api, {"Idempotency-Key": "d"}, "one")),
+    ]
+    for kind, made, again in cases:
+        assert again().json()["id"] == made
+        assert api.client.delete(f"/v1/{kind}/{made}").status_code == 204
+        gone = again()
+        assert (gone.status_code, "use a new key" in gone.json()["detail"]) == (409, True)
+        assert not api.get(f"/v1/{kind}")["items"]
+    assert _upload(api, {"Idempotency-Key": "e"}, "one").status_code == 201
 
 
 def test_repeated_at_the_same_time_nothing_is_created_twice(api: Api) -> None:

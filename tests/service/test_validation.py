@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -57,6 +58,15 @@ def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, 
     told = api.client.post("/v1/runs?validate_only=true", json={"dataset_id": dataset} | body)
     assert (told.status_code, told.json()) == (422, answer.json())
     assert api.get("/v1/runs")["items"] == []
+
+
+@pytest.mark.parametrize("path", ["runs", "runs?validate_only=true", "diagnoses"])
+def test_half_a_character_is_no_name(api: Api, path: str) -> None:
+    text = json.dumps({"dataset_id": api.upload()["id"], "name": "half \ud83e"})
+    answer = api.client.post(f"/v1/{path}", content=text, headers={"Content-Type": "application/json"})
+    assert (answer.status_code, answer.json()["errors"][0]["where"]) == (422, "body.name")
+    whole = api.client.post(f"/v1/{path}", json=json.loads(text) | {"name": "whole \U0001f99a"})
+    assert (whole.status_code in (200, 202), whole.json()["name"]) == (True, "whole \U0001f99a")
 
 
 def test_a_specification_is_checked_without_a_run(api: Api) -> None:
