@@ -19,6 +19,7 @@ from service.app import create_app
 from service.database import Database
 from service.protocol import Protocol
 from service.settings import Settings
+from service.state import Service
 from tests.service import toy, toy_diagnosis
 from tests.service.browsing import chromium
 
@@ -131,6 +132,14 @@ def serving(app: FastAPI) -> Iterator[httpx.Client]:
         server.should_exit = True
         thread.join(15.0)
         assert not thread.is_alive(), "the server does not stop"
+
+
+@contextmanager
+def toy_service(folder: Path, **settings: Any) -> Iterator[tuple[Service, Api]]:
+    """A service that computes toys, and its API."""
+    app = create_app(Settings(data=folder, **settings), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        yield app.state.service, Api(client)
 
 
 @pytest.fixture(scope="module")

@@ -14,16 +14,14 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service import quick, reading, store, views
-from service.app import create_app
 from service.changes import Changes
 from service.database import Database
 from service.events import Events, Told, Watched
 from service.schemas import HistoryItem, Page, RunOut
-from service.settings import Settings
 from service.state import Service
 from service.tables import RunRow
 from tests.service import toy
-from tests.service.conftest import Api, serving
+from tests.service.conftest import Api, toy_service
 
 Json = dict[str, Any]
 
@@ -46,10 +44,8 @@ class Used:
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
-    settings = Settings(data=tmp_path_factory.mktemp("used"))
-    app = create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
-    with serving(app) as client:
-        yield Used(app.state.service, Api(client))
+    with toy_service(tmp_path_factory.mktemp("used")) as (service, api):
+        yield Used(service, api)
 
 
 def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:

@@ -17,13 +17,10 @@ import httpx
 import pytest
 
 from service import shortcut
-from service.app import create_app
 from service.observing import REQUEST
 from service.protocol import Protocol
-from service.settings import Settings
 from service.state import Service
-from tests.service import toy
-from tests.service.conftest import Api, made, serving
+from tests.service.conftest import Api, made, toy_service
 from tests.service.test_reading import USUAL
 
 Answer = tuple[str, dict[str, str], bytes]
@@ -126,10 +123,8 @@ class Used:
 
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
-    settings = Settings(data=tmp_path_factory.mktemp("used"))
-    app = create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
-    with serving(app) as client:
-        yield Used(app.state.service, Api(client))
+    with toy_service(tmp_path_factory.mktemp("used")) as (service, api):
+        yield Used(service, api)
 
 
 @pytest.mark.parametrize("form", USUAL)
@@ -339,10 +334,10 @@ def test_who_asks_nothing_is_hung_up_on_and_who_asks_is_not(used: Used, first: s
 
 def test_whose_headers_came_in_is_who_asks(tmp_path: Path) -> None:
     secrets = {name: made(tmp_path, name, *scopes) for name, scopes in KEYS.items()}
-    app = create_app(Settings(data=tmp_path, require_keys=True), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
-    with serving(app) as client:
+    with toy_service(tmp_path, require_keys=True) as (service, api):
+        client = api.client
         apis = {name: Api(as_key(client, secret)) for name, secret in secrets.items()}
-        used = Used(app.state.service, apis["ann"])
+        used = Used(service, apis["ann"])
         for _ in range(3):
             assert [len(apis[name].get("/v1/runs")["items"]) for name in KEYS] == [2, 2, 0]
             assert apis["bob"].client.get(f"/v1/runs/{used.run}").status_code == 404
@@ -358,9 +353,8 @@ def test_whose_headers_came_in_is_who_asks(tmp_path: Path) -> None:
 
 def test_keys_that_change_while_a_request_is_let_in_count(tmp_path: Path) -> None:
     """The request was let in by keys that are good no more, and its headers must not be."""
-    app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
-    with serving(app) as client:
-        used = Used(app.state.service, Api(client))
+    with toy_service(tmp_path) as (service, api):
+        used = Used(service, api)
         remember = used.service.shortcut.remember
 
         def late(scope: Any) -> None:
