@@ -7,7 +7,7 @@ import logging
 import select
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
@@ -121,6 +121,13 @@ class Used:
         return "/v1/" + form.replace("RUN", self.run).replace("CURSOR", cursor)
 
 
+def waited(what: Callable[[], object]) -> None:
+    deadline = time.monotonic() + 5.0
+    while not what():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
 @pytest.fixture(scope="module")
 def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
     with toy_service(tmp_path_factory.mktemp("used")) as (service, api):
@@ -187,7 +194,7 @@ def test_what_comes_in_pieces_or_together_is_parsed(used: Used) -> None:
             used.short.clear()
             for piece in pieces:
                 line.send(piece)
-                time.sleep(0.05)
+                waited(lambda: used.short)  # the first has come by itself
             for _ in range(sum(map(len, pieces)) // len(head)):
                 assert line.answer()[0] == "HTTP/1.1 200 OK"
             assert used.short == short
@@ -207,7 +214,7 @@ def test_what_is_asked_while_another_answer_is_under_way_waits(used: Used) -> No
         used.service.engine.gate = lambda _: held.wait()  # type: ignore[attr-defined]
         run = used.api.submit(used.dataset, seed=3)["id"]
         line.send(line.head(f"/v1/runs/{run}/events", "User-Agent: waits"))
-        line.until(b"event: state")
+        line.until(b'"state":"RUNNING"')
         used.short.clear()
         line.send(head)
         try:
@@ -237,7 +244,7 @@ def test_who_does_not_read_is_sent_no_more(used: Used) -> None:
             line.get("/v1/runs?limit=1", "User-Agent: slow")
         assert used.short == [False, True]
         protocol.loop.call_soon_threadsafe(protocol.pause_writing)
-        time.sleep(0.1)
+        waited(lambda: protocol.flow.write_paused)
         line.send(line.head("/v1/runs?limit=1", "User-Agent: slow"))
         assert line.silent(0.3)
         protocol.loop.call_soon_threadsafe(protocol.resume_writing)
@@ -319,13 +326,13 @@ def test_who_asks_nothing_is_hung_up_on_and_who_asks_is_not(used: Used, first: s
     with used.line() as line:
         line.get("/v1/runs?limit=1", "User-Agent: patient")
     with used.line() as line:
-        used.connection(line).timeout_keep_alive = 0.4  # type: ignore[assignment]
+        used.connection(line).timeout_keep_alive = 1.0  # type: ignore[assignment]
         line.get(first, "User-Agent: patient")
-        for _ in range(10):
+        for _ in range(15):
             time.sleep(0.1)
             line.get("/v1/runs?limit=1", "User-Agent: patient")
-        assert used.short[-10:] == [True] * 10
-        assert line.silent(0.2)
+        assert used.short[-15:] == [True] * 15
+        assert line.silent(0.3)
         assert line.hung_up(5.0)
 
 
