@@ -82,7 +82,7 @@ class Shortcut:
             with calling(caller):
                 template, body = quick.read(path, match[2] or b"", self._reading)
         except Exception:
-            return None
+            return None  # whatever it is, the framework meets with it as well, and has words for it
         request = new_request()
         fail_points.passing("answer")
         seconds = time.perf_counter() - began
