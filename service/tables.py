@@ -75,8 +75,30 @@ class ArchiveRow(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class ParsedRow(Table):
+    """A dataset in the project's own form (:mod:`records.parsed`), where its archive must not be opened again."""
+
+    __tablename__ = "parsed"
+
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ClockRow(Table):
+    """The service's own clock, one row: seconds that the service has run, and the wall time when they were stored."""
+
+    __tablename__ = "clock"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    service_seconds: Mapped[float]
+    wall_time: Mapped[str]
+
+
 class JobRow(OwnedRow):
-    """What every job has; state, wish, generations, progress and error are the job of :mod:`workers.jobs`."""
+    """What every job has; state, wish, generations, progress, error and starts are the job of :mod:`workers.jobs`.
+
+    ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
+    """
 
     number: Mapped[int] = mapped_column(primary_key=True)
     id: Mapped[str] = mapped_column(unique=True)
@@ -96,6 +118,8 @@ class JobRow(OwnedRow):
     evaluations: Mapped[int] = mapped_column(default=0)
     elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
     error: Mapped[str | None]
+    starts: Mapped[int] = mapped_column(default=0)
+    ended_at_service_seconds: Mapped[float | None]
 
 
 class RunRow(JobRow, Table):

@@ -1,0 +1,38 @@
+"""Starts of jobs, datasets in the project's own form, and the service's own clock."""
+
+from __future__ import annotations
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0005"
+down_revision = "0004"
+
+JOBS = ("run", "diagnosis")
+
+
+def upgrade() -> None:
+    """Add them; what is there has not started since, and is as old as the service's clock will say."""
+    for table in JOBS:
+        op.add_column(table, sa.Column("starts", sa.Integer, nullable=False, server_default="0"))
+        op.add_column(table, sa.Column("ended_at_service_seconds", sa.Float))
+    op.create_table(
+        "parsed",
+        sa.Column("dataset_id", sa.String, sa.ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True),
+        sa.Column("body", sa.LargeBinary, nullable=False),
+    )
+    op.create_table(
+        "clock",
+        sa.Column("id", sa.Integer, primary_key=True),
+        sa.Column("service_seconds", sa.Float, nullable=False),
+        sa.Column("wall_time", sa.String, nullable=False),
+    )
+
+
+def downgrade() -> None:
+    """Drop them."""
+    op.drop_table("clock")
+    op.drop_table("parsed")
+    for table in JOBS:
+        op.drop_column(table, "ended_at_service_seconds")
+        op.drop_column(table, "starts")
