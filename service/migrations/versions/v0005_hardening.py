@@ -15,7 +15,7 @@ def upgrade() -> None:
     """Add them; what is there has not started since, and is as old as the service's clock will say."""
     for table in JOBS:
         op.add_column(table, sa.Column("starts", sa.Integer, nullable=False, server_default="0"))
-        op.add_column(table, sa.Column("ended_at_service_seconds", sa.Float))
+        op.add_column(table, sa.Column("ended_at_service_seconds", sa.Double))
     op.create_table(
         "parsed",
         sa.Column("dataset_id", sa.String, sa.ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True),
@@ -24,7 +24,7 @@ def upgrade() -> None:
     op.create_table(
         "clock",
         sa.Column("id", sa.Integer, primary_key=True),
-        sa.Column("service_seconds", sa.Float, nullable=False),
+        sa.Column("service_seconds", sa.Double, nullable=False),
         sa.Column("wall_time", sa.String, nullable=False),
     )
 
