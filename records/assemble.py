@@ -25,8 +25,10 @@ ReadSamples = Callable[[str, int], Samples]
 At = Callable[[str, Samples, int], str]
 
 
-def assemble(document: Document, read: ReadSamples, where: Callable[[str], str], at: At) -> Dataset:
-    """Build the dataset described by ``document``.
+def assemble(
+    document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
+) -> Dataset:
+    """Build the dataset described by ``document``, of at most ``room`` numbers.
 
     ``read(name, room)`` gives the samples of a recording of at most ``room`` numbers, ``where(name)``
     says where they are stored, ``at(name, samples, row)`` where one instant is. Faults of all recordings are
@@ -38,7 +40,7 @@ def assemble(document: Document, read: ReadSamples, where: Callable[[str], str],
         rig = convert_vehicle.to_vehicle(checked.vehicle)
     else:
         rig = convert_wing.to_wing(checked.wing)
-    faults, recordings, room = Faults(), list[Recording](), MAX_VALUES
+    faults, recordings = Faults(), list[Recording]()
     entries: Sequence[WingRecordingFile | VehicleRecordingFile] = checked.recordings
     for index, entry in enumerate(entries):
         try:

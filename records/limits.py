@@ -42,6 +42,15 @@ MAX_ROWS = 200_000
 MAX_VALUES = 64_000_000
 """Numbers in one dataset, 8 bytes each in memory."""
 
+MAX_UPLOADED_NETCDF_VALUES = 16_000_000
+"""Numbers in a NetCDF file from a stranger, which is read within limits of memory (:mod:`records.confined`)."""
+
+MAX_NAME_BYTES = 1024
+"""Length of a text of fixed length in NetCDF: each one takes it in memory, however short the text is."""
+
+MAX_CHUNK_BYTES = 64 * MIB
+"""Size of one chunk of a NetCDF variable, unpacked."""
+
 MAX_ERRORS = 20
 """Errors reported at once."""
 

@@ -4,18 +4,24 @@ Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<nam
 where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
 ``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can point to other files of the
 server and every such pointer must be refused.
+
+Sizes of items and chunks, and filters, are checked before anything is read. That bounds what an honest file takes. A
+damaged or hostile one can still make the HDF5 library loop, crash or take memory without end: a stranger's file is
+read by :mod:`records.confined` only.
 """
 
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, BinaryIO, NamedTuple
 
 import h5netcdf
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from records.assemble import assemble, checked_description
 from records.dataset import Dataset, Recording
@@ -23,12 +29,32 @@ from records.description import VehicleDatasetFile, model_of
 from records.errors import DatasetError, fail, nearest, shown
 from records.folder import RECORDINGS
 from records.forces import AXES
-from records.limits import MAX_MARKERS, MAX_ROWS
+from records.limits import (
+    MAX_CHUNK_BYTES,
+    MAX_DESCRIPTION_BYTES,
+    MAX_MARKERS,
+    MAX_NAME_BYTES,
+    MAX_ROWS,
+    MAX_VALUES,
+    MIB,
+)
+from records.parsed import Parsed
 from records.table import Samples, too_much
 from records.yaml_text import read_yaml, write_yaml
 
 FORMAT = "wingfit dataset"
+Array = npt.NDArray[np.float64]
+BLOCK = 2**20  # numbers
+# Filters that come with h5py, each of which may be in a variable's pipeline once.
+FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF}
 _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+
+
+class Limit(NamedTuple):
+    """Numbers that may be read: ``left`` of ``most``."""
+
+    left: int
+    most: int
 
 
 def write_netcdf(dataset: Dataset) -> bytes:
@@ -62,9 +88,15 @@ def _write_recording(group: Any, recording: Recording) -> None:
 
 
 def read_netcdf(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a NetCDF-4 file."""
-    with _damage(label), h5py.File(io.BytesIO(data), "r") as file:
-        document = read_yaml(_attribute(file, "dataset_yaml", label), f"{label}: dataset_yaml")
+    """Read a dataset from the bytes of a NetCDF-4 file that is trusted."""
+    return parse_netcdf(io.BytesIO(data), label)[0]
+
+
+def parse_netcdf(opened: BinaryIO, label: str, most: int = MAX_VALUES) -> tuple[Dataset, Parsed]:
+    """Read a NetCDF-4 file of at most ``most`` numbers: the dataset, and what it was built from."""
+    with _damage(label), h5py.File(opened, "r") as file:
+        text, samples = _attribute(file, "dataset_yaml", label), dict[str, Samples]()
+        document = read_yaml(text, f"{label}: dataset_yaml")
         listed = _group(file, RECORDINGS, label)
         markers = document.names("wing", "markers")
         unlisted = sorted(set(listed) - set(document.names("recordings")))
@@ -77,14 +109,18 @@ def read_netcdf(data: bytes, label: str) -> Dataset:
             with _damage(where):
                 group = _group(listed, name, where)
                 forces = model_of(document.data) is VehicleDatasetFile
-                return _forces(group, where, room) if forces else _tracks(group, where, markers, room)
+                limit = Limit(room, most)
+                samples[name] = _forces(group, where, limit) if forces else _tracks(group, where, markers, limit)
+                return samples[name]
 
-        return assemble(
+        dataset = assemble(
             document,
             read,
             lambda name: f"{label}: {RECORDINGS}/{name}",
             lambda name, _, row: _at(label, name, row),
+            most,
         )
+    return dataset, Parsed(text, samples)
 
 
 def _at(label: str, name: str, row: int) -> str:
@@ -107,6 +143,10 @@ def _attribute(file: Any, name: str, label: str) -> bytes:
     if name not in file.attrs:
         message = f"attribute {name!r} is missing; it must hold the text of dataset.yaml (docs/formats.md)"
         raise fail(label, None, message)
+    size = file.attrs.get_id(name).dtype.itemsize
+    if size > MAX_DESCRIPTION_BYTES:
+        message = f"attribute {name!r} takes {size / MIB:.0f} MiB; at most {MAX_DESCRIPTION_BYTES // MIB} MiB are read"
+        raise fail(label, size, message)
     value = file.attrs[name]
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
@@ -139,7 +179,7 @@ def _variable(group: Any, name: str, where: str) -> Any:
     return variable
 
 
-def _tracks(group: Any, where: str, known: list[str], room: int) -> Samples:
+def _tracks(group: Any, where: str, known: list[str], limit: Limit) -> Samples:
     times, positions = _variable(group, "time_s", where), _variable(group, "position_m", where)
     names = _variable(group, "marker", where)
     frames, count = times.shape[0] if len(times.shape) == 1 else -1, names.size
@@ -151,14 +191,14 @@ def _tracks(group: Any, where: str, known: list[str], room: int) -> Samples:
         raise fail(where, list(positions.shape), message)
     if count > MAX_MARKERS:
         raise fail(where, count, f"{count} markers; at most {MAX_MARKERS} are read: remove some")
-    _check_size(times, positions, where, room)
+    _check_size(times, positions, where, limit)
     markers = _names(names, "marker", where)
     _check_names(markers, known, where)
-    values = np.ascontiguousarray(positions[:], dtype=np.float64).reshape(frames, 3 * count)
-    return Samples(np.asarray(times[:], dtype=np.float64), values, np.arange(frames), markers=markers)
+    values = _numbers(positions).reshape(frames, 3 * count)
+    return Samples(_numbers(times), values, np.arange(frames), markers=markers)
 
 
-def _forces(group: Any, where: str, room: int) -> Samples:
+def _forces(group: Any, where: str, limit: Limit) -> Samples:
     times, forces, names = (_variable(group, name, where) for name in ("time_s", "force_n", "axis"))
     frames = times.shape[0] if len(times.shape) == 1 else -1
     if names.shape not in {(1,), (2,)} or forces.shape != (frames, *names.shape):
@@ -167,30 +207,64 @@ def _forces(group: Any, where: str, room: int) -> Samples:
             "they must be [T], [C] and [T, C], with 1 or 2 axes"
         )
         raise fail(where, list(forces.shape), message)
-    _check_size(times, forces, where, room)
+    _check_size(times, forces, where, limit)
     found = _names(names, "axis", where)
     axes = tuple(axis for axis in AXES if axis in found)
     if len(axes) != len(found):
         raise fail(where, ", ".join(found), f"axis is {', '.join(found)}; it must hold x, z, or both")
-    values = np.ascontiguousarray(forces[:][:, [found.index(axis) for axis in axes]], dtype=np.float64)
-    return Samples(np.asarray(times[:], dtype=np.float64), values, np.arange(frames), forces=axes)
+    values = np.ascontiguousarray(_numbers(forces)[:, [found.index(axis) for axis in axes]])
+    return Samples(_numbers(times), values, np.arange(frames), forces=axes)
 
 
-def _check_size(times: Any, values: Any, where: str, room: int) -> None:
+def _numbers(variable: Any) -> Array:
+    """All of a variable, some whole chunks at a time: in one go the library would hold it twice."""
+    made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
+    rows = max(1, BLOCK // math.prod((chunk, *variable.shape[1:]))) * chunk
+    for start in range(0, len(made), rows):
+        block = np.s_[start : start + rows]
+        variable.read_direct(made, block, block)
+    return made
+
+
+def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
     """Declared shapes cost nothing to write: check them before memory is spent."""
     if times.size > MAX_ROWS:
         raise fail(where, times.size, f"{times.size} times; at most {MAX_ROWS} are read: cut it")
-    if times.size + values.size > room:
-        raise too_much(where)
+    if times.size + values.size > limit.left:
+        raise too_much(where, limit.most)
     for variable in (times, values):
         if variable.dtype.kind != "f" or variable.dtype.itemsize > 8:
             message = f"{variable.name} is of type {variable.dtype}; write 32- or 64-bit floating-point numbers"
             raise fail(where, str(variable.dtype), message)
+        _check_storage(variable, where)
+
+
+def _check_storage(variable: Any, where: str) -> None:
+    """Refuse chunks and filters by which a small file takes much memory."""
+    chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize
+    if chunk > MAX_CHUNK_BYTES:
+        message = (
+            f"a chunk of {variable.name} takes {chunk / MIB:.0f} MiB; at most {MAX_CHUNK_BYTES // MIB} MiB are read"
+        )
+        raise fail(where, chunk, f"{message}: write smaller chunks")
+    pipeline = variable.id.get_create_plist()
+    filters = [pipeline.get_filter(index)[0] for index in range(pipeline.get_nfilters())]
+    if set(filters) - FILTERS or len(set(filters)) < len(filters):
+        message = (
+            f"{variable.name} is packed by the HDF5 filters {filters}; pack it by deflate alone, once, or not at all"
+        )
+        raise fail(where, str(filters), message)
 
 
 def _names(variable: Any, name: str, where: str) -> tuple[str, ...]:
     if h5py.check_string_dtype(variable.dtype) is None:
         raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
+    if variable.dtype.itemsize > MAX_NAME_BYTES:
+        message = (
+            f"each {name} takes {variable.dtype.itemsize} bytes; at most {MAX_NAME_BYTES} are read: shorten the type"
+        )
+        raise fail(where, str(variable.dtype), message)
+    _check_storage(variable, where)
     return tuple(str(text) for text in variable.asstr()[:])
 
 

@@ -75,8 +75,8 @@ def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
 
 def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where: str, faults: Faults) -> None:
     """Markers stay within about a span of the hinge; those further out are in another unit or frame."""
-    from_hinge = values.reshape(len(values), -1, 3) - np.array([0.0, wing.hinge.y, wing.hinge.z])
-    distance = _typical(from_hinge.reshape(-1, 3))
+    hinge = (0.0, wing.hinge.y, wing.hinge.z)
+    distance = _typical(values, hinge)
     limit = IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
         far = distance / wing.span
@@ -90,7 +90,7 @@ def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where:
         )
         faults.add(where, f"{distance:.4g}", message)
         return
-    each = np.array([_typical(marker) for marker in np.moveaxis(from_hinge, 1, 0)])
+    each = np.array([_typical(values[:, 3 * k : 3 * k + 3], hinge) for k in range(len(markers))])
     for k in np.flatnonzero(each > limit)[:_SHOWN]:
         message = (
             f"marker {markers[k]} is typically {each[k]:.4g} m from the hinge, the others {distance:.4g} m (limit "
@@ -99,10 +99,18 @@ def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where:
         faults.add(where, f"{each[k]:.4g}", message)
 
 
-def _typical(places: Array) -> float:
-    """Largest median distance along an axis [T, 3]; 0 where none is known."""
-    along_axes = [np.abs(axis[np.isfinite(axis)]) for axis in places.T]
-    return max((float(np.median(axis)) for axis in along_axes if axis.size), default=0.0)
+def _typical(values: Array, hinge: tuple[float, float, float]) -> float:
+    """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 where none is known.
+
+    One axis after the other: a large recording is not copied whole.
+    """
+    return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
+
+
+def _median_distance(places: Array, origin: float) -> float:
+    distances = np.abs(places - origin)
+    known = distances[np.isfinite(distances)]
+    return float(np.median(known, overwrite_input=True)) if known.size else 0.0
 
 
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:

@@ -40,13 +40,26 @@ def load_dataset(path: str | Path) -> Dataset:
         raise fail(str(path), None, f"cannot be read: {error.strerror}; check the path") from None
 
 
+def label_of(filename: str) -> str:
+    """What messages call an upload that its sender calls ``filename``."""
+    return shown(filename.replace("\\", "/").rpartition("/")[2]) or "upload"
+
+
+def is_netcdf(data: bytes) -> bool:
+    """Whether ``data`` is of the kind that only the HDF5 library reads."""
+    return data.startswith(_HDF5)
+
+
 def load_archive(data: bytes, filename: str) -> Dataset:
-    """Read a zip or NetCDF file from its bytes; ``filename`` is only what messages call it."""
-    label = shown(filename.replace("\\", "/").rpartition("/")[2]) or "upload"
+    """Read a zip or NetCDF file from its bytes; ``filename`` is only what messages call it.
+
+    NetCDF from a stranger is for :func:`records.confined.convert_netcdf`.
+    """
+    label = label_of(filename)
     _check_size(len(data), label)
     if data.startswith(_ZIP):
         return read_zip(data, label)
-    if data.startswith(_HDF5):
+    if is_netcdf(data):
         return read_netcdf(data, label)
     if not data:
         raise fail(label, None, "the file is empty; upload a zip of the dataset's folder, or NetCDF-4")

@@ -211,7 +211,7 @@ def _check_size(rows: int, numbers: int, file: str, room: int) -> None:
         raise too_much(file)
 
 
-def too_much(where: str) -> DatasetError:
-    """Make the error of a dataset with more numbers than fit."""
-    message = f"the dataset holds more than {MAX_VALUES} numbers, the most that are read; split it or thin it out"
+def too_much(where: str, most: int = MAX_VALUES) -> DatasetError:
+    """Make the error of a dataset with more than ``most`` numbers."""
+    message = f"the dataset holds more than {most} numbers, the most that are read; split it or thin it out"
     return fail(where, None, message)

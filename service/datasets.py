@@ -1,18 +1,33 @@
-"""Parsed datasets, by id: parsing takes longer than most requests may."""
+"""Parsed datasets, by id: parsing takes longer than most requests may.
+
+NetCDF files come from strangers, and a damaged one can hang whoever opens it. So each is opened once, in a process of
+its own, and stored in the project's own form beside the archive; later only this form is read.
+"""
 
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict
+from typing import NamedTuple
 
 from sqlalchemy.orm import Session
 
 from records import Dataset
+from records.confined import STORED, Limits, convert_netcdf
+from records.parsed import load_parsed
+from records.storage import is_netcdf, label_of
 from service import store
 from service.database import Database
 from service.engine import Engine
 
 KEPT, KEPT_BYTES = 8, 2**28
+
+
+class Opened(NamedTuple):
+    """A dataset, and its own form where its archive must not be opened again."""
+
+    dataset: Dataset
+    parsed: bytes | None
 
 
 class Datasets:
@@ -33,11 +48,30 @@ class Datasets:
         with self._loading:
             if (known := self._known(dataset_id)) is not None:
                 return known
-            with self._database.read() as session:
-                body = store.archive(session, dataset_id)
-            loaded = self._engine.load(body, row.filename)
+            loaded = self._load(dataset_id, row.filename)
             self.keep(dataset_id, loaded)
         return loaded
+
+    def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
+        """Read an archive; ValueError says what is wrong with it. ``limits`` are those of an upload, or others."""
+        if not is_netcdf(archive):
+            return Opened(self._engine.load(archive, filename), None)
+        label = label_of(filename)
+        parsed = convert_netcdf(archive, label, limits)
+        return Opened(load_parsed(parsed, label), parsed)
+
+    def _load(self, dataset_id: str, filename: str) -> Dataset:
+        with self._database.read() as session:
+            parsed, archive = store.parsed(session, dataset_id), b""
+            if parsed is None:
+                archive = store.archive(session, dataset_id)
+        if parsed is not None:
+            return load_parsed(parsed, filename)
+        opened = self.open(archive, filename, STORED)
+        if opened.parsed is not None:  # stored by an earlier version
+            with self._database.write() as session:
+                store.keep_parsed(session, dataset_id, opened.parsed)
+        return opened.dataset
 
     def _known(self, dataset_id: str) -> Dataset | None:
         with self._lock:

@@ -24,7 +24,7 @@ class Engine(Protocol):
     """Reads datasets, checks specifications, calibrates, judges; ValueError says what is wrong."""
 
     def load(self, data: bytes, filename: str) -> Dataset:
-        """Parse an uploaded archive."""
+        """Parse an uploaded zip."""
         ...
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
@@ -92,7 +92,7 @@ class ModelEngine:
     """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
 
     def load(self, data: bytes, filename: str) -> Dataset:
-        """Parse an uploaded archive; DatasetError says where it is malformed."""
+        """Parse an uploaded zip; DatasetError says where it is malformed."""
         return load_archive(data, filename)
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:

@@ -26,6 +26,7 @@ from service.tables import (
     GenerationRow,
     JobRow,
     OwnedRow,
+    ParsedRow,
     RunRow,
     StepRow,
 )
@@ -111,9 +112,22 @@ def archive(session: Session, dataset_id: str) -> bytes:
     return body
 
 
+def parsed(session: Session, dataset_id: str) -> bytes | None:
+    """The dataset in the project's own form, where it is stored so."""
+    return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
+
+
+def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
+    """Store a dataset in the project's own form, unless it was deleted meanwhile."""
+    if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):
+        session.merge(ParsedRow(dataset_id=dataset_id, body=body))
+
+
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
-    """A 429 where the archives of an owner would take more than ``most_mb``."""
+    """A 429 where the archives of an owner, with what is stored beside them, would take more than ``most_mb``."""
     held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
+    beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
+    held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
     if held + size > most_mb * MB:
         raise ProblemError(
             429,

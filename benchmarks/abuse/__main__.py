@@ -20,7 +20,7 @@ from typing import Any
 import httpx
 
 from benchmarks import machine
-from benchmarks.abuse import fuzz, good, requests, uploads
+from benchmarks.abuse import fuzz, good, hdf5, requests, uploads
 from benchmarks.abuse.cases import Case
 from benchmarks.server_process import Server
 
@@ -54,6 +54,9 @@ def _asked() -> argparse.Namespace:
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--fuzz-cases", type=int, default=10_000, help="at least so many cases of the fuzzer")
+    parser.add_argument(
+        "--hdf5-files", type=int, default=hdf5.MUTATED, help="damaged NetCDF files, besides crafted ones"
+    )
     parser.add_argument("--no-fuzz", action="store_true", help="leave the fuzzer out")
     return parser.parse_args()
 
@@ -62,6 +65,8 @@ def _told(server: Server, st: str | None, asked: argparse.Namespace, scratch: Pa
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
         names = good.names(http)
         told = abused(http, server.port, names, [*uploads.cases(asked.seed), *requests.cases()])
+        files = hdf5.abused(http, server, names, asked.seed, asked.hdf5_files)
+        told |= files | {"failures": told["failures"] + files["failures"]}
         if st is not None:
             found = fuzz.fuzzed(st, http, names, asked.fuzz_cases, asked.seed, scratch)
             told |= found | {"failures": told["failures"] + found["failures"]}

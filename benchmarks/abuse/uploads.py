@@ -75,6 +75,11 @@ def small_archive() -> bytes:
     return _zipped(_files())
 
 
+def netcdf_example() -> bytes:
+    """The same dataset as NetCDF."""
+    return _netcdf(_files())
+
+
 def _files() -> dict[str, bytes]:
     """The example, with its first recording only."""
     import yaml

@@ -13,6 +13,7 @@ from starlette.responses import Response
 from records import Dataset
 from service import http, store, views
 from service.access import owner_of_new
+from service.datasets import Opened
 from service.guard import UPLOAD_LIMIT
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import DatasetOut, Page
@@ -51,14 +52,16 @@ def upload(
         earlier = store.earlier_answer(session, again)
     if earlier:
         return http.sent(earlier)
-    loaded = _load(service, data, filename)
+    loaded, parsed = _open(service, data, filename)
 
     def create(session: Session) -> store.Answer:
         row = _row(loaded, name, filename, digest, len(data))
-        store.make_room(session, row.owner, len(data), service.settings.max_stored_mb)
+        store.make_room(session, row.owner, len(data) + len(parsed or b""), service.settings.max_stored_mb)
         session.add(row)
         session.flush()
         session.add(ArchiveRow(dataset_id=row.id, body=data))
+        if parsed is not None:
+            store.keep_parsed(session, row.id, parsed)
         body = views.dataset(row).model_dump(mode="json")
         return store.Answer(201, f"/v1/datasets/{row.id}", body)
 
@@ -114,9 +117,9 @@ def delete(service: ServiceDep, dataset_id: str) -> None:
         service.datasets.delete(session, dataset_id)
 
 
-def _load(service: Service, data: bytes, filename: str) -> Dataset:
+def _open(service: Service, data: bytes, filename: str) -> Opened:
     try:
-        return service.engine.load(data, filename)
+        return service.datasets.open(data, filename)
     except ValueError as error:
         faults = getattr(error, "errors", None) or []
         listed = [error_item(fault.where, fault.value, fault.message) for fault in faults]

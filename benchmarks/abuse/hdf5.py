@@ -1,0 +1,362 @@
+"""NetCDF files that were damaged by a bit or a byte, and files that were crafted to take memory or time.
+
+Each is answered, soon; the server and what it starts hold little memory meanwhile; and whoever else uses the server
+does not notice.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import sys
+import threading
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import h5py
+import httpx
+import numpy as np
+
+from benchmarks.abuse import uploads
+from benchmarks.server_process import Server, descendants
+
+Json = dict[str, Any]
+Make = Callable[[h5py.File], None]
+
+MUTATED = 3000
+AT_ONCE = 2
+HEAP = b"GCOL"
+HEAP_BYTES = 512
+MIB = 2**20
+ANSWER_SECONDS = 120.0  # beyond it there is no answer
+SLOWEST_SECONDS, PEAK_MB = 20.0, 1024.0
+READ_SECONDS, UPLOAD_SECONDS = 2.0, 20.0  # longer than that is "blocked"
+LOOK_SECONDS, OTHERS_SECONDS = 0.02, 0.2
+UPLOAD_EVERY = 25
+
+
+def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int, mutated: int = MUTATED) -> Json:
+    """Upload all of them; how long the slowest took, what was held in memory, and who else had to wait."""
+    files = [*crafted(), *_mutated(seed, mutated)]
+    answers = _Answers(len(files))
+    with _Others(str(http.base_url), names) as others, _Memory(server) as memory, ThreadPoolExecutor(AT_ONCE) as pool:
+        for name, data in files:
+            pool.submit(_upload, str(http.base_url), name, data, answers)
+    print(file=sys.stderr)
+    failures = answers.failures + others.failures
+    if answers.slowest > SLOWEST_SECONDS:
+        failures.append(f"{answers.slowest_name}: answered after {answers.slowest:.1f} s")
+    if memory.peak_mb > PEAK_MB:
+        failures.append(f"HDF5: server and children held {memory.peak_mb:.0f} MB")
+    return {
+        "hdf5_files": len(files),
+        "hdf5_accepted": answers.accepted,
+        "hdf5_slowest_s": round(answers.slowest, 2),
+        "hdf5_peak_mb": round(memory.peak_mb, 1),
+        "hdf5_blocked_others": bool(others.failures),
+        "hdf5_others_slowest_read_s": round(others.slowest_read, 3),
+        "hdf5_others_slowest_upload_s": round(others.slowest_upload, 2),
+        "failures": failures,
+    }
+
+
+# -- the files ---------------------------------------------------------------------------------------------
+
+
+def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
+    """Good files with one byte changed: half of them anywhere, half in the heaps that hold their texts."""
+    rng, good = np.random.default_rng([seed, 5]), uploads.netcdf_example()
+    heaps = [at for at in range(len(good)) if good.startswith(HEAP, at)]
+    for number in range(count):
+        data = bytearray(good)
+        if number % 2:
+            at = min(heaps[rng.integers(len(heaps))] + int(rng.integers(HEAP_BYTES)), len(good) - 1)
+            data[at] = int(rng.choice([0, 1, 2, 4, 8, 16, 64, 255]))
+        else:
+            at = int(rng.integers(8, len(good)))
+            data[at] ^= 1 << int(rng.integers(8))
+        yield f"byte {at} of NetCDF {good[at]} -> {data[at]}", bytes(data)
+
+
+def crafted() -> Iterator[tuple[str, bytes]]:
+    """Files that are valid HDF5, and mean no good."""
+    for name, make in CRAFTED.items():
+        yield f"crafted NetCDF, {name}", _changed(make)
+    looping = bytearray(uploads.netcdf_example())
+    looping[looping.rfind(HEAP) + 25] ^= 4
+    yield "crafted NetCDF, an object of a heap that never ends", bytes(looping)
+    yield "crafted NetCDF, only a signature", bytes(looping[:8])
+    yield "crafted NetCDF, a signature and zeros", bytes(looping[:8]) + bytes(4 * MIB)
+
+
+def _changed(make: Make) -> bytes:
+    buffer = io.BytesIO(uploads.netcdf_example())
+    with h5py.File(buffer, "r+") as file:
+        make(file)
+    return buffer.getvalue()
+
+
+def _group(file: h5py.File) -> Any:
+    return next(iter(file["recordings"].values()))
+
+
+def _with(name: str, **options: Any) -> Make:
+    """A variable of the same shape, stored otherwise."""
+
+    def make(file: h5py.File) -> None:
+        group = _group(file)
+        shape = group[name].shape
+        del group[name]
+        group.create_dataset(name, shape=shape, **options)
+
+    return make
+
+
+def _huge_attribute(file: h5py.File) -> None:
+    del file.attrs["dataset_yaml"]
+    space, kind = h5py.h5s.create(h5py.h5s.SCALAR), h5py.h5t.C_S1.copy()
+    kind.set_size(40 * MIB)
+    h5py.h5a.create(file.id, b"dataset_yaml", kind, space)
+
+
+def _bomb(times: int) -> Make:
+    """A chunk that unpacks to 500 MB and more, whatever the variable declares; ``times`` it was packed."""
+
+    def make(file: h5py.File) -> None:
+        group = _group(file)
+        shape = group["position_m"].shape
+        del group["position_m"]
+        plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plan.set_chunk(shape)
+        packed = _zeros(500)
+        for _ in range(times):
+            plan.set_filter(h5py.h5z.FILTER_DEFLATE, 0, (6,))
+        for _ in range(times - 1):
+            packed = zlib.compress(packed, 9)
+        space = h5py.h5s.create_simple(shape)
+        made = h5py.h5d.create(group.id, b"position_m", h5py.h5t.NATIVE_DOUBLE, space, dcpl=plan)
+        made.write_direct_chunk((0,) * len(shape), packed)
+
+    return make
+
+
+def _zeros(mib: int) -> bytes:
+    packer = zlib.compressobj(9)
+    return b"".join([*(packer.compress(bytes(MIB)) for _ in range(mib)), packer.flush()])
+
+
+def _large(instants: int, **options: Any) -> Make:
+    """As many numbers as may be read, in a file of some kilobytes."""
+
+    def make(file: h5py.File) -> None:
+        group = _group(file)
+        count = group["marker"].shape[0]
+        for name, shape in (("time_s", (instants,)), ("position_m", (instants, count, 3))):
+            del group[name]
+            chunks = options.get("chunks") if name == "position_m" else None
+            group.create_dataset(name, shape=shape, dtype=options.get("dtype", "f8"), chunks=chunks, fillvalue=0.0)
+
+    return make
+
+
+def _link(kind: Any) -> Make:
+    def make(file: h5py.File) -> None:
+        group = _group(file)
+        del group["position_m"]
+        group["position_m"] = kind
+
+    return make
+
+
+def _virtual(file: h5py.File) -> None:
+    group = _group(file)
+    shape = group["position_m"].shape
+    layout = h5py.VirtualLayout(shape=shape, dtype="f8")
+    layout[:] = h5py.VirtualSource("/etc/passwd", "x", shape=shape)
+    del group["position_m"]
+    group.create_virtual_dataset("position_m", layout)
+
+
+def _external(file: h5py.File) -> None:
+    group = _group(file)
+    shape = group["position_m"].shape
+    del group["position_m"]
+    size = 8 * math.prod(shape)
+    group.create_dataset("position_m", shape=shape, dtype="f8", external=[("/etc/passwd", 0, size)])
+
+
+def _own_parent(file: h5py.File) -> None:
+    group = _group(file)
+    group["recordings"] = file["recordings"]
+
+
+def _nested(file: h5py.File) -> None:
+    group = file
+    for _ in range(2000):
+        group = group.create_group("g")
+
+
+def _many_groups(file: h5py.File) -> None:
+    for number in range(20_000):
+        file["recordings"].create_group(f"g{number}")
+
+
+def _many_attributes(file: h5py.File) -> None:
+    for number in range(5000):
+        file.attrs[f"a{number}"] = "x" * 100
+
+
+CRAFTED: dict[str, Make] = {
+    "names of 100 MB each": _with("marker", dtype="S100000000", chunks=(1,), compression="gzip"),
+    "names of 2 GB each, never written": _with("marker", dtype="S2000000000", chunks=None),
+    "names that are numbers": _with("marker", dtype="i8"),
+    "names that are references": _with("marker", dtype=h5py.ref_dtype),
+    "a description of 40 MB that is declared only": _huge_attribute,
+    "a chunk that unpacks to 500 MB": _bomb(1),
+    "a chunk packed twice": _bomb(2),
+    "a chunk packed four times": _bomb(4),
+    "a chunk of 3 GB": _with(
+        "position_m", dtype="f8", maxshape=(None, None, None), chunks=(131072, 1024, 3), compression="gzip"
+    ),
+    "a filter that loses digits": _with("position_m", dtype="f8", scaleoffset=4),
+    "numbers of 16 bytes": _with("position_m", dtype="c16"),
+    "times that are compound": _with("time_s", dtype=np.dtype([("a", "f8"), ("b", "S1000000")])),
+    "15 million zeros": _large(100_000),
+    "15 million zeros in chunks of one": _large(100_000, chunks=(1, 1, 1)),
+    "15 million zeros of 4 bytes": _large(100_000, dtype="f4"),
+    "3 billion zeros": _large(20_000_000),
+    "a link to itself": _link(h5py.SoftLink("/recordings")),
+    "a link to another file": _link(h5py.ExternalLink("/etc/passwd", "/")),
+    "data in another file": _external,
+    "a virtual variable": _virtual,
+    "a group that holds its parent": _own_parent,
+    "2,000 groups in one another": _nested,
+    "20,000 groups beside each other": _many_groups,
+    "5,000 attributes": _many_attributes,
+}
+
+
+# -- what is measured --------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Answers:
+    """What the uploads were answered."""
+
+    total: int
+    done: int = 0
+    accepted: int = 0
+    slowest: float = 0.0
+    slowest_name: str = ""
+    failures: list[str] = field(default_factory=list)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def add(self, name: str, status: int, seconds: float, text: str) -> None:
+        """One more."""
+        with self.lock:
+            self.done += 1
+            self.accepted += status == 201
+            if seconds > self.slowest:
+                self.slowest, self.slowest_name = seconds, name
+            if status not in (201, 422):
+                self.failures.append(f"{name}: {status} {text[:200]}")
+            if self.done % 20 == 0 or self.done == self.total:
+                print(f"\rHDF5 files {self.done} of {self.total}  ", end="", file=sys.stderr, flush=True)
+
+
+def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:
+    began, status, text = time.monotonic(), 0, ""
+    try:
+        with httpx.Client(base_url=url, timeout=ANSWER_SECONDS) as http:
+            answer = http.post("/v1/datasets", files={"file": ("hostile.nc", data)})
+            status, text = answer.status_code, answer.text
+            if status == 201:
+                http.delete(f"/v1/datasets/{answer.json()['id']}")
+    except httpx.TransportError as error:
+        text = repr(error)
+    answers.add(name, status, time.monotonic() - began, text)
+
+
+class _Thread:
+    """Does something again and again within a ``with`` block."""
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds, self._over = seconds, threading.Event()
+        self._thread = threading.Thread(target=self._go, daemon=True)
+
+    def look(self) -> None:
+        """Once."""
+        raise NotImplementedError
+
+    def _go(self) -> None:
+        while not self._over.wait(self._seconds):
+            self.look()
+
+    def __enter__(self) -> Any:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+
+
+class _Memory(_Thread):
+    """The most that the server and all that it started held at the same time."""
+
+    def __init__(self, server: Server) -> None:
+        super().__init__(LOOK_SECONDS)
+        self._server, self.peak_mb = server, 0.0
+
+    def look(self) -> None:
+        """Now."""
+        held = sum(_resident_mb(pid) for pid in (self._server.pid, *descendants(self._server.pid)))
+        self.peak_mb = max(self.peak_mb, held)
+
+
+def _resident_mb(pid: int) -> float:
+    with suppress(OSError, StopIteration):
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        return float(next(line.split()[1] for line in lines if line.startswith("VmRSS:"))) / 1024
+    return 0.0
+
+
+class _Others(_Thread):
+    """Those who use the server meanwhile."""
+
+    def __init__(self, url: str, names: dict[str, str]) -> None:
+        super().__init__(OTHERS_SECONDS)
+        self._url, self._paths = url, ("/v1/health", "/v1/ready", f"/v1/runs/{names['{run}']}", "/v1/datasets")
+        self._good, self._count = uploads.small_archive(), 0
+        self.slowest_read = self.slowest_upload = 0.0
+        self.failures: list[str] = []
+
+    def look(self) -> None:
+        """Read, and now and then upload."""
+        with httpx.Client(base_url=self._url, timeout=ANSWER_SECONDS) as http:
+            for path in self._paths:
+                seconds = self._timed(path, lambda path=path: http.get(path), 200, READ_SECONDS)  # type: ignore[misc]
+                self.slowest_read = max(self.slowest_read, seconds)
+            self._count += 1
+            if self._count % UPLOAD_EVERY == 0:
+                files = {"file": ("good.zip", self._good)}
+                send = lambda: http.post("/v1/datasets", files=files)  # noqa: E731
+                self.slowest_upload = max(self.slowest_upload, self._timed("a good upload", send, 201, UPLOAD_SECONDS))
+
+    def _timed(self, what: str, send: Callable[[], httpx.Response], status: int, most: float) -> float:
+        began = time.monotonic()
+        try:
+            answered = send().status_code
+        except httpx.TransportError as error:
+            self.failures.append(f"beside hostile files, {what}: {error!r}")
+            return time.monotonic() - began
+        seconds = time.monotonic() - began
+        if answered != status or seconds > most:
+            self.failures.append(f"beside hostile files, {what}: {answered} after {seconds:.1f} s")
+        return seconds
