@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, Protocol, get_args
 
 from calibration.evaluator import Evaluator
+from workers.watch import Standing
 
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 
@@ -20,6 +21,11 @@ class RunningEvaluator(Evaluator, Protocol):
     @property
     def workers(self) -> int:
         """Number of units that can run at the same time."""
+        ...
+
+    @property
+    def standing(self) -> Standing:
+        """The workers that live, and what became of others."""
         ...
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from calibration.evaluator import as_batch, gather, run_unit, units
 from calibration.problem import Evaluation, Misfit, Problem
 from workers.errors import EvaluatorClosedError
+from workers.watch import Standing
 
 
 class InProcessEvaluator:
@@ -19,6 +20,11 @@ class InProcessEvaluator:
 
     def __init__(self) -> None:
         self._closed = False
+
+    @property
+    def standing(self) -> Standing:
+        """One, that cannot be lost without this process."""
+        return Standing(self.workers)
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem."""

@@ -1,20 +1,24 @@
 """Evaluation in worker processes of this machine.
 
 One thread looks after one process over one pipe. When a process dies, its thread alone notices, starts
-another and repeats the one unit that was lost; everything else goes on.
+another and repeats the one unit that was lost; everything else goes on. One more thread watches the time: a process
+that is stopped, or takes longer for a unit than :class:`workers.watch.Expectation` allows, is killed, and so replaced.
 """
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import pickle
 import queue
 import signal
 import threading
+import time
 import traceback
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
+from multiprocessing.connection import wait as wait_for
 from multiprocessing.context import SpawnProcess
 from typing import Any, Literal
 
@@ -24,7 +28,10 @@ from calibration.evaluator import as_batch, gather, units
 from calibration.problem import Evaluation, Misfit, Problem
 from workers.errors import EvaluatorClosedError, WorkerLostError
 from workers.share import ProblemMemory, Task, child_environment, lower_priority
+from workers.watch import Expectation, Standing, Tally
 
+LOG = logging.getLogger("wingfit.workers")
+LOOK_SECONDS = 0.5
 # Deaths in a row after which a unit is given up: of processes that had begun it, as with Ray, and of any.
 ATTEMPTS, STARTS = 6, 60
 Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
@@ -38,17 +45,25 @@ class ProcessPoolEvaluator:
     def __init__(self, workers: int | None = None) -> None:
         self._lock = threading.Lock()
         self._closed = False
+        self._expectation, self._tally = Expectation(), Tally()
         self._pool = [_Worker() for _ in range(workers or os.cpu_count() or 1)]
         self._idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
         for worker in self._pool:
             worker.start()
             self._idle.put(worker)
         self._threads = ThreadPoolExecutor(len(self._pool), thread_name_prefix="evaluator")
+        self._over = threading.Event()
+        threading.Thread(target=self._watch, name="evaluator-watch", daemon=True).start()
 
     @property
     def workers(self) -> int:
         """Number of processes."""
         return len(self._pool)
+
+    @property
+    def standing(self) -> Standing:
+        """The processes that live, and what became of others."""
+        return self._tally.standing(sum(worker.alive for worker in self._pool))
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem; several threads may call."""
@@ -72,6 +87,7 @@ class ProcessPoolEvaluator:
             if self._closed:
                 return
             self._closed = True
+            self._over.set()
             for worker in self._pool:
                 worker.kill()
         self._threads.shutdown(cancel_futures=True)
@@ -82,45 +98,67 @@ class ProcessPoolEvaluator:
         if self._closed:
             raise EvaluatorClosedError(self.kind)
 
+    def _watch(self) -> None:
+        while not self._over.wait(LOOK_SECONDS):
+            for worker in self._pool:
+                worker.kill_if_overdue()
+
     def _run(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
         worker, blamed, died = self._idle.get(), 0, 0
+        what = f"{len(task.values)} individuals against recording {problem.recordings[task.unit.recording].name!r}"
         try:
             while blamed < ATTEMPTS and died < STARTS:
+                limit, began = self._expectation.limit(problem.key, blamed), time.monotonic()
                 try:
-                    return worker.run(problem, task, residuals)
+                    misfit = worker.run(problem, task, residuals, limit)
                 except _Died as death:
                     # One that dies while it starts has not seen the unit yet.
-                    blamed, died = blamed + death.begun, died + 1
-                    self._restart(worker)
+                    blamed, died = blamed + (death.begun or death.hung), died + 1
+                    self._restart(worker, death, what, limit)
+                else:
+                    self._expectation.done(problem.key, time.monotonic() - began)
+                    return misfit
         finally:
             self._idle.put(worker)
-        name = problem.recordings[task.unit.recording].name
-        where = f"on the same {len(task.values)} individuals" if blamed == ATTEMPTS else "before any of them had begun"
+        where = "on the same unit" if blamed == ATTEMPTS else "before it had begun the unit"
         raise WorkerLostError(
-            f"{died} worker processes died one after the other {where} against recording {name!r} "
-            f"(the last with {worker.last_exit}); if memory ran out, use fewer workers than {self.workers}"
+            f"{died} worker processes died or hung one after the other {where}, {what} (the last with "
+            f"{worker.last_exit}); if memory ran out, use fewer workers than {self.workers}"
         )
 
-    def _restart(self, worker: _Worker) -> None:
+    def _restart(self, worker: _Worker, death: _Died, what: str, limit: float) -> None:
         with self._lock:
             self._check_open()
+            pid = worker.pid
             worker.release()
             worker.start()
+        self._tally.count(died=not death.hung, hung=death.hung, restarts=1)
+        if death.hung:
+            LOG.warning("worker process %s hung: %s took more than %.0f s; it was replaced", pid, what, limit)
+        else:
+            LOG.warning("worker process %s died (%s) with %s; it was replaced", pid, worker.last_exit, what)
 
 
 class _Died(Exception):  # noqa: N818  internal
-    """The process at the other end of the pipe is gone; ``begun``: with a unit that it had begun."""
+    """The process at the other end of the pipe is gone.
 
-    def __init__(self, *, begun: bool) -> None:
+    ``begun``: with a unit that it had begun; ``hung``: it was killed because it took too long.
+    """
+
+    def __init__(self, *, begun: bool, hung: bool = False) -> None:
         super().__init__()
-        self.begun = begun
+        self.begun, self.hung = begun, hung
 
 
 class _Worker:
-    """Our end of one process. Used by one thread at a time."""
+    """Our end of one process. Used by one thread at a time; the watch looks on."""
 
     def __init__(self) -> None:
         self.last_exit = "exit code unknown"
+        # When the unit under way is overdue; under the lock, so that no process is killed for a unit that is done.
+        self._deadline: float | None = None
+        self._hung = False
+        self._watching = threading.Lock()
         self._process: SpawnProcess | None = None
         self._connection: Connection | None = None
 
@@ -135,8 +173,41 @@ class _Worker:
         theirs.close()
         self._process, self._connection = process, ours
 
-    def run(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
-        """Have ``task`` done; _Died when the process is dead, or what the model raised."""
+    @property
+    def pid(self) -> int | None:
+        """Of the process."""
+        return self._process.pid if self._process else None
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process has not ended."""
+        process = self._process
+        try:
+            return process is not None and not wait_for([process.sentinel], 0)
+        except ValueError:  # closed meanwhile
+            return False
+
+    def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> Misfit:
+        """Have ``task`` done within ``limit`` s; _Died when the process is dead, or what the model raised."""
+        self._expect(time.monotonic() + limit)
+        try:
+            return self._done(problem, task, residuals)
+        finally:
+            self._expect(None)
+
+    def kill_if_overdue(self) -> None:
+        """End the process if it takes too long; the thread that waits for it gets _Died."""
+        with self._watching:
+            if self._deadline is not None and time.monotonic() > self._deadline:
+                self._deadline, self._hung = None, True
+                self.kill()
+
+    def _expect(self, deadline: float | None) -> None:
+        with self._watching:
+            self._deadline = deadline
+            self._hung = self._hung and deadline is None
+
+    def _done(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
         if self._connection is None:
             raise _Died(begun=False)
         kind: str = "not yet"
@@ -148,7 +219,8 @@ class _Worker:
                 if kind == "need problem":
                     self._connection.send(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
         except (EOFError, OSError) as error:
-            raise _Died(begun=kind == "begun") from error
+            hung, self._hung = self._hung, False
+            raise _Died(begun=kind == "begun", hung=hung) from error
         if kind == "raised":
             raise content
         assert isinstance(content, Misfit)  # noqa: S101

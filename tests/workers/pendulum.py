@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -96,6 +97,30 @@ class DieOnce:
         except FileExistsError:
             return
         os.kill(os.getpid(), 9)
+
+
+@dataclass(frozen=True)
+class HangOnce:
+    """Hangs the first time it is called anywhere: ``how`` is stop (as by a signal), loop, or sleep."""
+
+    flag: Path
+    how: str
+
+    def __call__(self, _batch: Array, _recording: Recording) -> None:
+        try:
+            self.flag.touch(exist_ok=False)
+        except FileExistsError:
+            return
+        if self.how == "stop":
+            os.kill(os.getpid(), signal.SIGSTOP)
+        while self.how != "sleep":
+            pass
+        time.sleep(3600)
+
+
+def hang_always(_batch: Array, _recording: Recording) -> None:
+    """Hangs every time."""
+    time.sleep(3600)
 
 
 def die_always(_batch: Array, _recording: Recording) -> None:

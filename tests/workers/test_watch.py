@@ -1,0 +1,166 @@
+"""Workers that hang are noticed, counted and replaced, and what they were doing is done by others."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.workers import pendulum
+from tests.workers.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
+from workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
+from workers.watch import FACTOR, FIRST_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
+
+
+@pytest.fixture(params=DISTRIBUTED, scope="module")
+def distributed(request: pytest.FixtureRequest) -> Iterator[RunningEvaluator]:
+    kind: EvaluatorKind = request.param
+    evaluator = make_evaluator(kind, 2)
+    yield evaluator
+    evaluator.close()
+
+
+def warmed(evaluator: RunningEvaluator) -> None:
+    """Workers that have started."""
+    evaluator.evaluate(pendulum.problem(), pendulum.population(64))
+
+
+@pytest.mark.parametrize("how", ["stop", "loop", "sleep"])
+def test_a_worker_that_hangs_is_replaced(
+    distributed: RunningEvaluator,
+    how: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    warmed(distributed)
+    monkeypatch.setattr(watch, "FIRST_SECONDS", 1.0)
+    before, began = distributed.standing, time.monotonic()
+    problem, values = pendulum.problem(pendulum.HangOnce(tmp_path / "hung", how)), pendulum.population(50)
+    with caplog.at_level(logging.WARNING, logger="wingfit.workers"):
+        got = distributed.evaluate(problem, values, residuals=True)
+    assert time.monotonic() - began < 15
+    assert_same_bits(got, reference(pendulum.problem(), values))
+    after = distributed.standing
+    assert (after.hung - before.hung, after.restarts - before.restarts) == (1, 1)
+    (record,) = caplog.records
+    assert "took more than 1 s" in record.getMessage()
+    assert "against recording" in record.getMessage() or "recordings" in record.getMessage()
+    warmed(distributed)
+    assert distributed.standing.workers == 2
+
+
+def test_a_unit_that_always_hangs_is_given_up(distributed: RunningEvaluator, monkeypatch: pytest.MonkeyPatch) -> None:
+    warmed(distributed)
+    monkeypatch.setattr(watch, "FIRST_SECONDS", 0.05)
+    with pytest.raises(WorkerLostError, match="one after the other"):
+        distributed.evaluate(pendulum.problem(pendulum.hang_always, (9.81,)), pendulum.population(3))
+    warmed(distributed)
+
+
+def test_a_slow_unit_is_done_in_the_end(
+    distributed: RunningEvaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    warmed(distributed)
+    monkeypatch.setattr(watch, "FIRST_SECONDS", 0.5)
+    problem = pendulum.problem(pendulum.Note(tmp_path, 1.5), (9.81,))
+    values = pendulum.population(3)
+    got = distributed.evaluate(problem, values, residuals=True)
+    assert_same_bits(got, reference(pendulum.problem(None, (9.81,)), values))
+
+
+def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    evaluator = make_evaluator("processes", 1)
+    try:
+        evaluator.evaluate(pendulum.problem(pendulum.Note(tmp_path)), pendulum.population(3))
+        (pid,) = [int(note.name) for note in tmp_path.iterdir()]
+        os.kill(pid, signal.SIGSTOP)
+        monkeypatch.setattr(watch, "FIRST_SECONDS", 1.0)
+        values = pendulum.population(9)
+        got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
+        assert_same_bits(got, reference(pendulum.problem(), values))
+        assert evaluator.standing == Standing(1, 0, 1, 1)
+    finally:
+        evaluator.close()
+
+
+def test_a_worker_that_died_is_no_live_one(tmp_path: Path) -> None:
+    evaluator = make_evaluator("processes", 2)
+    try:
+        evaluator.evaluate(pendulum.problem(pendulum.Note(tmp_path, 0.05)), pendulum.population(64))
+        pids = [int(note.name) for note in tmp_path.iterdir()]
+        assert evaluator.standing == Standing(2)
+        os.kill(pids[0], signal.SIGKILL)
+        deadline = time.monotonic() + 5
+        while evaluator.standing.workers == 2 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        assert evaluator.standing == Standing(1)
+        warmed(evaluator)
+        assert evaluator.standing == Standing(2, 1, 0, 1)
+    finally:
+        evaluator.close()
+
+
+def test_how_long_a_unit_may_take_follows_from_those_done() -> None:
+    expected = Expectation()
+    assert expected.limit("a") == FIRST_SECONDS
+    expected.done("a", 0.5)
+    expected.done("a", 2.0)
+    expected.done("a", 1.0)
+    assert expected.limit("a") == SLACK_SECONDS + FACTOR * 2.0
+    assert expected.limit("a", 3) == 8 * expected.limit("a")
+    assert expected.limit("b") == FIRST_SECONDS
+
+
+def test_of_many_problems_the_last_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "PROBLEMS_REMEMBERED", 3)
+    expected = Expectation()
+    for key in "abcad":
+        expected.done(key, 1.0)
+    assert [key for key in "abcd" if expected.limit(key) != FIRST_SECONDS] == ["a", "c", "d"]
+
+
+def test_counts_add_up() -> None:
+    tally = Tally()
+    tally.count(died=1, restarts=1)
+    tally.count(hung=2, restarts=2)
+    assert tally.standing(4) == Standing(4, 1, 2, 3)
+
+
+GUARDED = """
+import os, signal, sys, time
+from workers.guardian import Guardian
+guardian = Guardian(silence_s=float(sys.argv[2]), beat_s=0.2)
+with guardian.watching(float(sys.argv[3])):
+    time.sleep(0.1)
+    if sys.argv[1] == "stop":
+        os.kill(os.getpid(), signal.SIGSTOP)
+    if sys.argv[1] == "overdue":
+        time.sleep(60)
+time.sleep(1.5)
+print(guardian._process.pid)
+"""
+
+
+@pytest.mark.parametrize(
+    ("what", "silence", "limit", "ends"),
+    [("overdue", 60, 0.5, -9), ("stop", 60, 0.5, -9), ("stop", 1, 60, -9), ("quick", 1, 0.5, 0)],
+)
+def test_the_guardian_ends_its_parent_when_it_hangs_and_never_else(
+    what: str, silence: float, limit: float, ends: int
+) -> None:
+    command = [sys.executable, "-c", GUARDED, what, str(silence), str(limit)]
+    done = subprocess.run(command, timeout=20, check=False, env=environment(), capture_output=True, text=True)
+    assert done.returncode == ends, done.stderr
+    if not ends:  # and ends with it
+        deadline = time.monotonic() + 5
+        while Path(f"/proc/{done.stdout.strip()}").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not Path(f"/proc/{done.stdout.strip()}").exists()
