@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
-import numpy.typing as npt
 from sqlalchemy.orm import Session
 
 from calibration.evaluator import Evaluator
-from calibration.problem import Evaluation, Problem
 from diagnosis.finding import Finding
 from diagnosis.spec import Progress
 from service import diagnosis_specs, store
@@ -18,27 +16,11 @@ from service.database import Database
 from service.datasets import Datasets
 from service.diagnoser import Diagnoser
 from service.tables import DiagnosisRow, FindingRow, StepRow
-from service.work import InterruptedStepError, Points, Step
+from service.work import Points, Step
 from workers import jobs
 
 # Progress in between is not stored: nobody reads so fast, and each store waits for the disk.
 STORE_SECONDS = 0.5
-
-
-class Heeding:
-    """Gives up before the next batch once the diagnosis is to be cancelled: a step may take minutes."""
-
-    def __init__(self, evaluator: Evaluator, cancelled: Callable[[], bool]) -> None:
-        self._evaluator, self._cancelled = evaluator, cancelled
-
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """Misfits of ``values`` [B, F]; InterruptedStepError once cancelled."""
-        if self._cancelled():
-            raise InterruptedStepError
-        return self._evaluator.evaluate(problem, values, residuals=residuals)
-
-    def close(self) -> None:
-        """Leave the evaluator to whoever made it."""
 
 
 class Diagnosing:
@@ -63,8 +45,7 @@ class Diagnosing:
         """Diagnose; stages are told at once, progress within one from time to time."""
         spec, dataset = diagnosis_specs.stored(row.spec), self._datasets.get(row.dataset_id)
         stage, told = "", 0.0
-        heeding = Heeding(evaluator, lambda: self._cancelled(row.id))
-        for progress in self._diagnoser.diagnose(spec, dataset, heeding):
+        for progress in self._diagnoser.diagnose(spec, dataset, evaluator):
             if progress.finding is not None:
                 yield _found(progress, progress.finding, self._diagnoser.stored(progress.finding))
                 return
@@ -72,10 +53,6 @@ class Diagnosing:
                 stage, told = progress.stage, time.monotonic()
                 yield _step(progress)
         raise RuntimeError("the diagnosis ended without a finding")
-
-    def _cancelled(self, diagnosis_id: str) -> bool:
-        with self._database.read() as session:
-            return store.diagnosis(session, diagnosis_id).wish == jobs.Wish.CANCEL
 
 
 def _step(progress: Progress) -> Step:
@@ -86,7 +63,7 @@ def _step(progress: Progress) -> Step:
         step.evaluations, step.elapsed_seconds, step.eta_seconds = row.evaluations, row.elapsed_seconds, eta
         session.add(step)
 
-    return Step(min(max(progress.fraction, 0.0), 1.0), keep)
+    return Step(min(max(progress.fraction, 0.0), 1.0), keep, lasting=False)
 
 
 def _found(progress: Progress, finding: Finding, stored: dict[str, Any]) -> Step:

@@ -9,10 +9,15 @@ from typing import Literal
 
 from calibration.evaluator import Evaluator
 from service.runner import lower_priority, message
+from workers.watch import Standing
 
 LOG = logging.getLogger("wingfit.evaluator")
 RETRY_SECONDS = (2.0, 5.0, 15.0, 60.0)
 CLOSE_SECONDS = 5.0
+NO_WORKER = (
+    "there is no worker: of a Ray cluster all nodes that compute are gone, or its head does not answer; jobs are "
+    "accepted, and wait until a node joins (ray start --address=...)"
+)
 
 
 class Pool:
@@ -34,14 +39,24 @@ class Pool:
     def status(self) -> Literal["starting", "ok", "degraded"]:
         """Standing of the evaluator, in the words of the health call."""
         if self._evaluator:
-            return "ok"
+            return "degraded" if self.workers == 0 else "ok"
         return "degraded" if self.error else "starting"
 
     @property
+    def detail(self) -> str | None:
+        """Why jobs are not computed, where that is known."""
+        return NO_WORKER if self._evaluator and self.workers == 0 else self.error
+
+    @property
     def workers(self) -> int | None:
-        """Number of workers, where the evaluator knows it."""
-        count = getattr(self._evaluator, "workers", None)
-        return count if isinstance(count, int) else None
+        """Number of workers that live, where the evaluator knows it."""
+        return self.standing.workers if self.standing else None
+
+    @property
+    def standing(self) -> Standing | None:
+        """The workers that live, and what became of others; None before there are any."""
+        standing = getattr(self._evaluator, "standing", None)
+        return standing if isinstance(standing, Standing) else None
 
     def close(self) -> bool:
         """Close the evaluator, or abandon it after a few seconds; whether it closed."""

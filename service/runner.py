@@ -22,6 +22,7 @@ from calibration.evaluator import Evaluator
 from service import store
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError, is_full
+from service.interruptible import InterruptibleEvaluator
 from service.problems import conflict
 from service.remedies import with_remedy
 from service.tables import JobRow
@@ -50,17 +51,38 @@ class Known(NamedTuple):
         return f"{self.work.what} {self.id}"
 
 
+class Pace(NamedTuple):
+    """How jobs get on: seconds since the last progress of the slowest that runs, and that the oldest has waited."""
+
+    stalled_s: float
+    waited_s: float
+
+
 class Runner:
     """Owns the threads that compute jobs."""
 
     def __init__(
-        self, database: Database, changes: Changes, kinds: Sequence[Work], at_once: int, of_one: int | None = None
+        self,
+        database: Database,
+        changes: Changes,
+        kinds: Sequence[Work],
+        at_once: int,
+        of_one: int | None = None,
+        most_starts: int = jobs.MOST_STARTS,
     ) -> None:
-        """``at_once`` jobs are computed at a time, of them ``of_one`` of one owner."""
+        """``at_once`` jobs are computed at a time, of them ``of_one`` of one owner.
+
+        A job during which the server ended ``most_starts`` times without progress is given up.
+        """
         self._database, self._changes, self._kinds = database, changes, kinds
-        self._at_once, self._of_one = at_once, of_one or at_once
+        self._at_once, self._of_one, self._most_starts = at_once, of_one or at_once, most_starts
         self._lock = threading.RLock()
         self._waiting: deque[Known] = deque()
+        self._waits_since: dict[Known, float] = {}
+        self._progressed: dict[Known, float] = {}
+        self._cancelled: set[Known] = set()
+        # Jobs that had better be alone, lest others are given up for what one of them does.
+        self._suspects: set[Known] = set()
         self._threads: dict[Known, threading.Thread] = {}
         self._evaluator: Evaluator | None = None
         self._stopping = False
@@ -76,7 +98,8 @@ class Runner:
                     for state in (jobs.State.RUNNING, jobs.State.QUEUED)
                     for row, work in self._unfinished(session, state)
                 ]
-                todo = [(job, _step(row, jobs.Restart())) for row, job in left]
+                todo = [(job, _step(row, jobs.Restart(self._most_starts))) for row, job in left]
+                self._suspects = {job for row, job in left if row.starts >= max(1, self._most_starts - 1)}
             for job, instructions in todo:
                 self._obey(job, instructions)
 
@@ -100,6 +123,8 @@ class Runner:
                     instructions = _step(row, event)
                 except jobs.IllegalTransition as error:
                     raise conflict(f"{job}: {error}", state=row.state) from None
+            if row.wish == jobs.Wish.CANCEL:
+                self._cancelled.add(job)
             self._obey(job, (*instructions, Instruction.PUBLISH))
         return row
 
@@ -115,7 +140,26 @@ class Runner:
             threads = list(self._threads.values())
         for thread in threads:
             thread.join(max(0.0, deadline - time.monotonic()))
+        self._leave()
         return not any(thread.is_alive() for thread in threads)
+
+    def pace(self) -> Pace:
+        """How jobs get on now."""
+        with self._lock:
+            now = time.monotonic()
+            return Pace(
+                max((now - since for since in self._progressed.values()), default=0.0),
+                max((now - since for since in self._waits_since.values()), default=0.0),
+            )
+
+    def _leave(self) -> None:
+        """A stop in good order says nothing against the jobs that ran."""
+        try:
+            with self._database.write() as session:
+                for row, _ in self._unfinished(session, jobs.State.RUNNING):
+                    _step(row, jobs.Leave())
+        except (DatabaseClosedError, OperationalError) as error:
+            LOG.warning("the stop is not stored (%s); it counts as an end of the server", error)
 
     # -- the waiting line ------------------------------------------------------------------------------------
 
@@ -127,8 +171,9 @@ class Runner:
         with self._lock:
             if Instruction.ENQUEUE in instructions and job not in self._waiting:
                 self._waiting.append(job)
+                self._waits_since[job] = time.monotonic()
             if Instruction.DEQUEUE in instructions and job in self._waiting:
-                self._waiting.remove(job)
+                self._take(job)
         if Instruction.PUBLISH in instructions:
             self._changes.publish(job.id)
         self._dispatch()
@@ -136,13 +181,29 @@ class Runner:
     def _dispatch(self) -> None:
         with self._lock:
             while self._evaluator and not self._stopping and len(self._threads) < self._at_once:
-                job = next((waiting for waiting in self._waiting if self._may_start(waiting)), None)
+                job = self._next()
                 if job is None:
                     return
-                self._waiting.remove(job)
+                self._take(job)
+                self._progressed[job] = time.monotonic()
                 thread = threading.Thread(target=self._work, args=(job, self._evaluator), name=job.id, daemon=True)
                 self._threads[job] = thread
                 thread.start()
+
+    def _take(self, job: Known) -> None:
+        self._waiting.remove(job)
+        del self._waits_since[job]
+
+    def _next(self) -> Known | None:
+        """The first that may start now. One that had better be alone waits until it is, and those behind it as well."""
+        if self._suspects & self._threads.keys():
+            return None
+        for job in self._waiting:
+            if job in self._suspects and self._threads:
+                return None
+            if self._may_start(job):
+                return job
+        return None
 
     def _may_start(self, job: Known) -> bool:
         """Whether no more than his share of its owner's jobs are computed, and none of this one's earlier threads.
@@ -161,19 +222,24 @@ class Runner:
         except (DatabaseClosedError, jobs.IllegalTransition) as error:
             LOG.info("%s: left as stored (%s)", job, error)
         except InterruptedStepError:
-            self._end(job, jobs.Fail("interrupted"))  # the wish to cancel decides
+            if not self._stopping:
+                self._end(job, jobs.Fail("interrupted"))  # the wish to cancel decides
         except Exception as error:
             self._fail(job, error)
         finally:
             with self._lock:
                 self._threads.pop(job, None)
+                self._progressed.pop(job, None)
+                self._cancelled.discard(job)
+                self._suspects.discard(job)
             self._dispatch()
 
     def _compute(self, job: Known, evaluator: Evaluator) -> None:
         row, points = self._start(job)
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("%s: starts after step %d", job, row.generations)
-        for step in job.work.steps(row, evaluator):
+        interruptible = InterruptibleEvaluator(evaluator, lambda: self._stopping or job in self._cancelled)
+        for step in job.work.steps(row, interruptible):
             points.append((earlier + time.monotonic() - began, step.progress))
             goes_on = self._store(job, step, points)
             if self._stopping or not goes_on:
@@ -211,13 +277,17 @@ class Runner:
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
                 row = job.work.row(session, job.id)
-                instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress))
+                instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress, step.lasting))
                 row.elapsed_seconds = points[-1][0]
                 if not step.last or row.state == jobs.State.SUCCEEDED:
                     step.keep(session, row, eta)
             return instructions
 
         instructions = self._patiently(job, write)
+        with self._lock:
+            self._progressed[job] = time.monotonic()
+            if step.lasting:
+                self._suspects.discard(job)
         self._obey(job, (*instructions, Instruction.PUBLISH))
         return Instruction.STOP not in instructions
 

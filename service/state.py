@@ -132,7 +132,7 @@ class Service:
             workers=self._pool.workers,
             runs_active=active,
             diagnoses_active=diagnoses,
-            detail=self._pool.error,
+            detail=self._pool.detail,
         )
 
 

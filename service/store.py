@@ -257,13 +257,13 @@ def _delete_ended(session: Session, row: JobRow, what: str) -> None:
 
 def job(row: JobRow) -> Job:
     """The row's job."""
-    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error)
+    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error, row.starts or 0)
 
 
 def put_job(row: JobRow, after: Job) -> None:
     """Store a job in its row; the times follow from the states."""
     row.state, row.wish = after.state.value, after.wish.value
-    row.generations, row.progress, row.error = after.generations, after.progress, after.error
+    row.generations, row.progress, row.error, row.starts = after.generations, after.progress, after.error, after.starts
     if after.state is State.RUNNING and row.started_at is None:
         row.started_at = now()
     if after.state.final:

@@ -15,7 +15,7 @@ Points = list[tuple[float, float]]
 
 
 class InterruptedStepError(Exception):
-    """A step was given up because the job is to be cancelled."""
+    """A step was given up because the job is to be cancelled, or the service stops."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,13 @@ class Step:
         progress: of the whole job, in [0, 1].
         keep: writes what the step found: ``keep(session, row, eta_seconds)``, in one transaction with the job's state.
         last: whether the job has ended; what it ``keep`` s is then kept only if the job was not cancelled meanwhile.
+        lasting: whether a job that is started again goes on after it.
     """
 
     progress: float
     keep: Callable[[Session, Any, float | None], None]
     last: bool = False
+    lasting: bool = True
 
 
 class Work(Protocol):

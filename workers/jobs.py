@@ -6,7 +6,7 @@ running job is kept as a *wish* until the runner reports its next generation, so
 a wish survives a restart of the server because it is part of the stored job. Cancelling wins.
 
     None --submit--> QUEUED --start--> RUNNING --finish--> SUCCEEDED
-                      ^  |              |   |----fail----> FAILED
+                      ^  |              |   |----fail----> FAILED <--- restart, the third without progress
                       |  +---pause---+  |   |
                       |              v  |   +--wish CANCEL, then generation, finish, fail or restart
                       +--resume--- PAUSED                          |
@@ -19,6 +19,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+
+MOST_STARTS = 3
 
 
 class State(StrEnum):
@@ -74,9 +76,13 @@ class Start:
 
 @dataclass(frozen=True)
 class Generation:
-    """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1]."""
+    """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1].
+
+    ``lasting`` says that a restart goes on after it.
+    """
 
     progress: float
+    lasting: bool = True
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.progress <= 1.0:
@@ -111,22 +117,37 @@ class Fail:
 
 
 @dataclass(frozen=True)
+class Leave:
+    """The server stops in good order while the job runs; it goes on after the next start."""
+
+
+@dataclass(frozen=True)
 class Restart:
-    """The server came up and found the job unfinished; whoever ran it is gone."""
+    """The server came up and found the job unfinished; whoever ran it is gone.
+
+    A job that was started ``most_starts`` times without lasting progress is given up: it may be what ends the server.
+    """
+
+    most_starts: int = MOST_STARTS
 
 
-Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | Restart
+Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | Leave | Restart
 
 
 @dataclass(frozen=True)
 class Job:
-    """A job as it is stored. ``progress`` never decreases; ``error`` is set only in state FAILED."""
+    """A job as it is stored.
+
+    ``progress`` never decreases; ``error`` is set only in state FAILED; ``starts`` counts those since the last lasting
+    generation whose end was no stop in good order, the present one included.
+    """
 
     state: State = State.QUEUED
     wish: Wish = Wish.NONE
     generations: int = 0
     progress: float = 0.0
     error: str | None = None
+    starts: int = 0
 
 
 Outcome = tuple[Job, tuple[Instruction, ...]]
@@ -175,13 +196,14 @@ def _submit(job: Job | None, _: Event) -> Outcome | None:
 def _start(job: Job | None, _: Event) -> Outcome | None:
     if job is None or job.state is not State.QUEUED:
         return None
-    return _move(job, State.RUNNING, Instruction.RUN)
+    return _move(replace(job, starts=job.starts + 1), State.RUNNING, Instruction.RUN)
 
 
 def _generation(job: Job | None, event: Event) -> Outcome | None:
     if job is None or job.state is not State.RUNNING or not isinstance(event, Generation):
         return None
-    job = replace(job, generations=job.generations + 1, progress=max(job.progress, event.progress))
+    starts = min(job.starts, 1) if event.lasting else job.starts
+    job = replace(job, generations=job.generations + 1, progress=max(job.progress, event.progress), starts=starts)
     if job.wish is Wish.NONE:
         return job, (Instruction.STORE,)
     state = State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED
@@ -228,16 +250,32 @@ def _fail(job: Job | None, event: Event) -> Outcome | None:
     return _move(job, State.FAILED, Instruction.STOP, error=event.error)
 
 
-def _restart(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.state.final:
+def _leave(job: Job | None, _: Event) -> Outcome | None:
+    if job is None or job.state is not State.RUNNING:
+        return None
+    return replace(job, starts=max(0, job.starts - 1)), ()
+
+
+def _restart(job: Job | None, event: Event) -> Outcome | None:
+    if job is None or job.state.final or not isinstance(event, Restart):
         return None
     if job.state is State.QUEUED:
         return job, (Instruction.ENQUEUE,)
     if job.state is State.PAUSED:
         return job, ()
-    if job.wish is Wish.NONE:
-        return _move(job, State.QUEUED, Instruction.ENQUEUE)
-    return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED)
+    if job.wish is not Wish.NONE:
+        return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED)
+    if job.starts >= event.most_starts:
+        return _move(job, State.FAILED, error=_given_up(job))
+    return _move(job, State.QUEUED, Instruction.ENQUEUE)
+
+
+def _given_up(job: Job) -> str:
+    return (
+        f"the server ended {job.starts} times in a row while this was computed, each time before anything new was "
+        f"stored (after step {job.generations}), so it is not started again; the computation may take more memory than "
+        "there is: the log of the server and of the system says why it ended. Submit it again to try once more"
+    )
 
 
 _HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
@@ -249,6 +287,7 @@ _HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
     Cancel: _cancel,
     Finish: _finish,
     Fail: _fail,
+    Leave: _leave,
     Restart: _restart,
 }
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
@@ -165,3 +166,38 @@ def test_a_port_in_use_is_refused(tmp_path: Path) -> None:
 def _watch(one: ServerProcess, run: str, lines: list[str]) -> None:
     with one.client.stream("GET", f"/v1/runs/{run}/events") as answer:
         lines.extend(answer.iter_lines())
+
+
+def test_a_run_that_takes_the_server_down_is_given_up_and_its_neighbour_is_not(tmp_path: Path) -> None:
+    data, deaths = tmp_path / "data", 0
+    with server(data, "0.3") as first:
+        dataset = first.api.upload()["id"]
+        guilty = first.api.submit(dataset, max_generations=30, seed=toy.DEADLY)["id"]
+        neighbour = first.api.diagnose(dataset)["id"]
+        assert first.process.wait(30) == -signal.SIGKILL
+    while deaths < 5:
+        with server(data, "0.3") as again:
+            deaths += 1
+            try:
+                run = again.api.until(guilty, lambda r: r["state"] == "FAILED", 5.0)
+            except (httpx.TransportError, AssertionError):
+                assert again.process.wait(30) == -signal.SIGKILL
+                continue
+            assert again.api.diagnosed(neighbour)["state"] == "SUCCEEDED"
+            break
+    assert deaths == 3
+    assert "the server ended 3 times in a row while this was computed" in run["error"]
+    assert "(after step 2)" in run["error"]
+    assert run["generations"] == 2
+
+
+def test_stops_in_good_order_say_nothing_against_a_run(tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    with server(data, "60") as first:
+        run = first.api.submit(first.api.upload()["id"])["id"]
+        first.api.until(run, lambda r: r["state"] == "RUNNING")
+    for _ in range(3):
+        with server(data, "60") as again:
+            again.api.until(run, lambda r: r["state"] == "RUNNING")
+    with server(data, "0") as last:
+        assert last.api.finish(run)["state"] == "SUCCEEDED"

@@ -8,6 +8,8 @@ relies on. ``gate`` lets a test hold it between generations.
 from __future__ import annotations
 
 import json
+import os
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -25,18 +27,19 @@ from calibration.search import CalibrationSpec, Generation, resolved
 from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
 from sim.model import Solution
 from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
+from workers.watch import Standing
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
 NOMINAL = {"stiffness": 1.0, "damping": 0.1}
 BOUNDS = {"stiffness": (0.1, 10.0), "damping": (0.01, 1.0)}
 STAGES = ("structural", "aerodynamic")
-UNLUCKY = 13
+UNLUCKY, DEADLY = 13, 666
 
 
 class NoEvaluator:
     """Evaluates nothing: the toy search does without."""
 
-    workers = 1
+    standing = Standing(1)
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         raise AssertionError("the toy search evaluates nothing")
@@ -134,6 +137,8 @@ class ToyEngine:
                 time.sleep(self.seconds)
                 if spec.seed == UNLUCKY and done == 2:
                     raise ArithmeticError("the thirteenth seed breaks")
+                if spec.seed == DEADLY and done == 2:
+                    os.kill(os.getpid(), signal.SIGKILL)
                 state = {"done": done + 1, "genome": _improve(state["genome"], spec.seed, done)}
                 yield _generation(spec, state, total)
         finally:

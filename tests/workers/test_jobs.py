@@ -12,6 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from workers.jobs import (
     ETA_LONGEST,
+    MOST_STARTS,
     Cancel,
     Event,
     Fail,
@@ -20,6 +21,7 @@ from workers.jobs import (
     IllegalTransition,
     Instruction,
     Job,
+    Leave,
     Pause,
     Restart,
     Resume,
@@ -41,6 +43,7 @@ EVENTS: dict[str, Event] = {
     "cancel": Cancel(),
     "finish": Finish(),
     "fail": Fail("it broke"),
+    "leave": Leave(),
     "restart": Restart(),
 }
 E, D, R, K, S, P = (Instruction(i) for i in ("ENQUEUE", "DEQUEUE", "RUN", "STORE", "STOP", "PUBLISH"))
@@ -60,6 +63,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("SUCCEEDED", (S, P)),
         "fail": ("FAILED", (S, P)),
+        "leave": ("RUNNING", ()),
         "restart": ("QUEUED", (E, P)),
     },
     "RUNNING/PAUSE": {
@@ -69,6 +73,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("SUCCEEDED", (S, P)),
         "fail": ("FAILED", (S, P)),
+        "leave": ("RUNNING/PAUSE", ()),
         "restart": ("PAUSED", (P,)),
     },
     "RUNNING/CANCEL": {
@@ -76,6 +81,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("CANCELLED", (S, P)),
         "fail": ("CANCELLED", (S, P)),
+        "leave": ("RUNNING/CANCEL", ()),
         "restart": ("CANCELLED", (P,)),
     },
     "PAUSED": {"resume": ("QUEUED", (E, P)), "cancel": ("CANCELLED", (P,)), "restart": ("PAUSED", ())},
@@ -112,6 +118,23 @@ def test_every_transition(standing: str, name: str) -> None:
     assert refusal.value.state == (job.state if job else None)
 
 
+def test_the_third_start_without_progress_is_the_last() -> None:
+    job, _ = step(None, Submit())
+    for _ in range(MOST_STARTS - 1):
+        job = step(step(job, Start())[0], Restart())[0]
+        assert job.state is State.QUEUED
+    running, _ = step(job, Start())
+    given_up, instructions = step(running, Restart())
+    assert (given_up.state, instructions) == (State.FAILED, (P,))
+    assert "the server ended 3 times in a row" in str(given_up.error)
+    assert "(after step 0)" in str(given_up.error)
+    assert step(running, Restart(MOST_STARTS + 1))[0].state is State.QUEUED
+    assert step(step(running, Leave())[0], Restart())[0].state is State.QUEUED
+    assert step(step(running, Generation(0.1))[0], Restart())[0].state is State.QUEUED
+    assert step(step(running, Generation(0.1, lasting=False))[0], Restart())[0].state is State.FAILED
+    assert step(step(running, Cancel())[0], Restart())[0].state is State.CANCELLED
+
+
 def test_a_refusal_says_what_could_be_done() -> None:
     with pytest.raises(
         IllegalTransition,
@@ -139,6 +162,7 @@ class Lives(RuleBasedStateMachine):
         self.queued = self.running = False
         self.stored = 0
         self.cancelled = False
+        self.deaths = 0  # since the last lasting generation
         self.best = 0.0
         self.obey(instructions)
 
@@ -177,11 +201,12 @@ class Lives(RuleBasedStateMachine):
         self.send(Start())
 
     @precondition(lambda self: self.running)
-    @rule(progress=st.floats(0.0, 1.0))
-    def generation_ends(self, progress: float) -> None:
+    @rule(progress=st.floats(0.0, 1.0), lasting=st.booleans())
+    def generation_ends(self, progress: float, lasting: bool) -> None:
         count = self.job.generations
         self.best = max(self.best, progress)
-        self.send(Generation(progress))
+        self.deaths = 0 if lasting else self.deaths
+        self.send(Generation(progress, lasting))
         assert self.job.generations == count + 1
 
     @precondition(lambda self: self.running)
@@ -199,9 +224,24 @@ class Lives(RuleBasedStateMachine):
         self.send(event)
 
     @rule()
-    def server_restarts(self) -> None:
+    def server_dies_and_restarts(self) -> None:
+        self.deaths += self.running
         self.queued = self.running = False
-        self.send(Restart())
+        self.send(Restart(MOST_STARTS))
+
+    @rule()
+    def server_stops_and_starts(self) -> None:
+        if self.running:
+            self.send(Leave())
+        self.queued = self.running = False
+        self.send(Restart(MOST_STARTS))
+
+    @invariant()
+    def what_ends_the_server_is_given_up_and_nothing_else(self) -> None:
+        if self.job.error is not None and self.job.error != "why":
+            assert self.deaths >= MOST_STARTS
+            assert f"ended {MOST_STARTS} times in a row" in self.job.error
+        assert self.job.starts <= MOST_STARTS
 
     @invariant()
     def runner_and_line_agree_with_the_state(self) -> None:

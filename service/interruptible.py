@@ -1,0 +1,49 @@
+"""An evaluator whose calls can be given up: a batch may take minutes, and a worker may hang."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+
+import numpy.typing as npt
+
+from calibration.evaluator import Evaluator
+from calibration.problem import Evaluation, Problem
+from service.work import InterruptedStepError
+
+LOOK_SECONDS = 0.2
+
+
+class InterruptibleEvaluator:
+    """Evaluates in a thread of its own, and leaves that alone once ``interrupted`` says so."""
+
+    def __init__(self, evaluator: Evaluator, interrupted: Callable[[], bool]) -> None:
+        self._evaluator, self._interrupted = evaluator, interrupted
+
+    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+        """Misfits of ``values`` [B, F]; InterruptedStepError once interrupted, whatever the evaluator does."""
+        answers: queue.SimpleQueue[Evaluation | BaseException] = queue.SimpleQueue()
+
+        def work() -> None:
+            try:
+                answers.put(self._evaluator.evaluate(problem, values, residuals=residuals))
+            except BaseException as error:
+                answers.put(error)
+
+        if self._interrupted():
+            raise InterruptedStepError
+        threading.Thread(target=work, name=f"{threading.current_thread().name}-batch", daemon=True).start()
+        while True:
+            try:
+                answer = answers.get(timeout=LOOK_SECONDS)
+            except queue.Empty:
+                if self._interrupted():
+                    raise InterruptedStepError from None
+                continue
+            if isinstance(answer, BaseException):
+                raise answer
+            return answer
+
+    def close(self) -> None:
+        """Leave the evaluator to whoever made it."""
