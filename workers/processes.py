@@ -108,15 +108,15 @@ class ProcessPoolEvaluator:
         what = f"{len(task.values)} individuals against recording {problem.recordings[task.unit.recording].name!r}"
         try:
             while blamed < ATTEMPTS and died < STARTS:
-                limit, began = self._expectation.limit(problem.key, blamed), time.monotonic()
+                limit = self._expectation.limit(problem.key, blamed)
                 try:
-                    misfit = worker.run(problem, task, residuals, limit)
+                    misfit, seconds = worker.run(problem, task, residuals, limit)
                 except _Died as death:
                     # One that dies while it starts has not seen the unit yet.
                     blamed, died = blamed + (death.begun or death.hung), died + 1
                     self._restart(worker, death, what, limit)
                 else:
-                    self._expectation.done(problem.key, time.monotonic() - began)
+                    self._expectation.done(problem.key, seconds)
                     return misfit
         finally:
             self._idle.put(worker)
@@ -187,8 +187,11 @@ class _Worker:
         except ValueError:  # closed meanwhile
             return False
 
-    def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> Misfit:
-        """Have ``task`` done within ``limit`` s; _Died when the process is dead, or what the model raised."""
+    def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
+        """Have ``task`` done within ``limit`` s, and how long it took; _Died when the process is dead.
+
+        Raises what the model raised.
+        """
         self._expect(time.monotonic() + limit)
         try:
             return self._done(problem, task, residuals)
@@ -207,7 +210,7 @@ class _Worker:
             self._deadline = deadline
             self._hung = self._hung and deadline is None
 
-    def _done(self, problem: Problem, task: Task, residuals: bool) -> Misfit:
+    def _done(self, problem: Problem, task: Task, residuals: bool) -> tuple[Misfit, float]:
         if self._connection is None:
             raise _Died(begun=False)
         kind: str = "not yet"
@@ -223,8 +226,9 @@ class _Worker:
             raise _Died(begun=kind == "begun", hung=hung) from error
         if kind == "raised":
             raise content
-        assert isinstance(content, Misfit)  # noqa: S101
-        return content
+        misfit, seconds = content
+        assert isinstance(misfit, Misfit)  # noqa: S101
+        return misfit, float(seconds)
 
     def kill(self) -> None:
         """End the process at once; a thread that waits for it gets _Died."""
@@ -266,7 +270,8 @@ def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Ta
     try:
         problem = problems.get(key, fetch)
         connection.send(("begun", None))
-        return "done", task.run(problem, residuals=residuals)
+        began = time.monotonic()
+        return "done", (task.run(problem, residuals=residuals), time.monotonic() - began)
     except Exception as error:
         error.add_note(f"raised in worker process {os.getpid()}:\n{traceback.format_exc()}")
         return "raised", _portable(error)

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 # A unit may take FACTOR times as long as the longest one of its problem that was done so far, and SLACK_SECONDS more:
 # individuals near divergence take more beats than others, and other programs take the processors.
 FACTOR, SLACK_SECONDS = 20.0, 10.0
-# Until one of its problem was done: kernels may have to be compiled first.
-FIRST_SECONDS = 120.0
+# The first of its problem may take as long as any other problem's, and NEW_SECONDS at least; the very first, for which
+# kernels may have to be compiled, FIRST_SECONDS.
+NEW_SECONDS, FIRST_SECONDS = 30.0, 120.0
 PROBLEMS_REMEMBERED = 256
 
 
@@ -27,9 +28,9 @@ class Expectation:
         So a unit that is slow, but honest, is done in the end, and one that never ends is given up.
         """
         with self._lock:
-            longest = self._longest.get(key)
-        base = FIRST_SECONDS if longest is None else SLACK_SECONDS + FACTOR * longest
-        return float(base * 2**attempt)
+            longest = self._longest.get(key, max(self._longest.values(), default=None))
+            least = FIRST_SECONDS if longest is None else 0.0 if key in self._longest else NEW_SECONDS
+        return float(max(least, SLACK_SECONDS + FACTOR * (longest or 0.0)) * 2**attempt)
 
     def done(self, key: str, seconds: float) -> None:
         """One unit took ``seconds``."""

@@ -16,7 +16,7 @@ import pytest
 from tests.workers import pendulum
 from tests.workers.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
 from workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
-from workers.watch import FACTOR, FIRST_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
+from workers.watch import FACTOR, FIRST_SECONDS, NEW_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
 
 
 @pytest.fixture(params=DISTRIBUTED, scope="module")
@@ -32,6 +32,13 @@ def warmed(evaluator: RunningEvaluator) -> None:
     evaluator.evaluate(pendulum.problem(), pendulum.population(64))
 
 
+def short(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    """Units of a new problem hang after ``seconds``."""
+    for name in ("FIRST_SECONDS", "NEW_SECONDS", "SLACK_SECONDS"):
+        monkeypatch.setattr(watch, name, seconds)
+    monkeypatch.setattr(watch, "FACTOR", 0.0)
+
+
 @pytest.mark.parametrize("how", ["stop", "loop", "sleep"])
 def test_a_worker_that_hangs_is_replaced(
     distributed: RunningEvaluator,
@@ -41,7 +48,7 @@ def test_a_worker_that_hangs_is_replaced(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     warmed(distributed)
-    monkeypatch.setattr(watch, "FIRST_SECONDS", 1.0)
+    short(monkeypatch, 1.0)
     before, began = distributed.standing, time.monotonic()
     problem, values = pendulum.problem(pendulum.HangOnce(tmp_path / "hung", how)), pendulum.population(50)
     with caplog.at_level(logging.WARNING, logger="wingfit.workers"):
@@ -59,9 +66,10 @@ def test_a_worker_that_hangs_is_replaced(
 
 def test_a_unit_that_always_hangs_is_given_up(distributed: RunningEvaluator, monkeypatch: pytest.MonkeyPatch) -> None:
     warmed(distributed)
-    monkeypatch.setattr(watch, "FIRST_SECONDS", 0.05)
+    short(monkeypatch, 0.05)
     with pytest.raises(WorkerLostError, match="one after the other"):
         distributed.evaluate(pendulum.problem(pendulum.hang_always, (9.81,)), pendulum.population(3))
+    monkeypatch.undo()
     warmed(distributed)
 
 
@@ -69,7 +77,7 @@ def test_a_slow_unit_is_done_in_the_end(
     distributed: RunningEvaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     warmed(distributed)
-    monkeypatch.setattr(watch, "FIRST_SECONDS", 0.5)
+    short(monkeypatch, 0.5)
     problem = pendulum.problem(pendulum.Note(tmp_path, 1.5), (9.81,))
     values = pendulum.population(3)
     got = distributed.evaluate(problem, values, residuals=True)
@@ -82,7 +90,7 @@ def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(monkeypatch: pytest
         evaluator.evaluate(pendulum.problem(pendulum.Note(tmp_path)), pendulum.population(3))
         (pid,) = [int(note.name) for note in tmp_path.iterdir()]
         os.kill(pid, signal.SIGSTOP)
-        monkeypatch.setattr(watch, "FIRST_SECONDS", 1.0)
+        short(monkeypatch, 1.0)
         values = pendulum.population(9)
         got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
         assert_same_bits(got, reference(pendulum.problem(), values))
@@ -116,7 +124,13 @@ def test_how_long_a_unit_may_take_follows_from_those_done() -> None:
     expected.done("a", 1.0)
     assert expected.limit("a") == SLACK_SECONDS + FACTOR * 2.0
     assert expected.limit("a", 3) == 8 * expected.limit("a")
-    assert expected.limit("b") == FIRST_SECONDS
+    assert expected.limit("b") == SLACK_SECONDS + FACTOR * 2.0, "another problem may take as long"
+
+
+def test_a_new_problem_gets_more_time_than_one_that_is_known() -> None:
+    expected = Expectation()
+    expected.done("a", 0.001)
+    assert expected.limit("a") < expected.limit("b") == NEW_SECONDS < FIRST_SECONDS
 
 
 def test_of_many_problems_the_last_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -124,7 +138,8 @@ def test_of_many_problems_the_last_are_remembered(monkeypatch: pytest.MonkeyPatc
     expected = Expectation()
     for key in "abcad":
         expected.done(key, 1.0)
-    assert [key for key in "abcd" if expected.limit(key) != FIRST_SECONDS] == ["a", "c", "d"]
+    expected.done("a", 5.0)
+    assert [key for key in "abcd" if expected.limit(key) == SLACK_SECONDS + FACTOR] == ["c", "d"]
 
 
 def test_counts_add_up() -> None:
