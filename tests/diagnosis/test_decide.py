@@ -19,12 +19,18 @@ from diagnosis.where import _variables, acting
 from records import Condition
 
 
-def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure") -> Refit:
-    """A refit that leaves ``left`` noises (root mean square)."""
+def refit(
+    left: float,
+    names: tuple[str, ...] = (),
+    genes: int = 1,
+    family: str = "structure",
+    predicted: float | None = None,
+) -> Refit:
+    """A refit that leaves ``left`` noises (root mean square); of recordings left out as much unless ``predicted``."""
     trials = tuple(
         SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
     )
-    return Refit(cast("Any", trials), cast("Any", None), left**2, left**2)
+    return Refit(cast("Any", trials), cast("Any", None), left**2, (left if predicted is None else predicted) ** 2)
 
 
 def stack(recordings: int = 6, uncertainty: float = 0.0) -> Stack:
@@ -170,6 +176,14 @@ def test_an_effect_that_something_unknown_rivals_is_not_named() -> None:
         shares.append(share)
     assert min(shares) < 0.5 < KNOWN < max(shares)
     assert any(0.5 < share < KNOWN for share in shares)
+
+
+def test_of_two_that_fit_alike_the_one_that_predicts_recordings_left_out_is_more_probable() -> None:
+    """But a prediction counts less than a fit: it is that of a linearised model."""
+    alike, better = refit(0.6, ("a",)), refit(0.6, ("b",), predicted=0.3)
+    fitted = refit(0.3, ("c",), predicted=0.6)
+    _, *shares = weighed(stack(), refit(2.0), [alike, better, fitted], 0.0, 40).probabilities
+    assert 2.0 * shares[0] < shares[1] < shares[2] / 2.0
 
 
 def test_more_genes_must_earn_theirs() -> None:

@@ -87,6 +87,16 @@ def test_one_that_would_not_come_to_what_is_wanted_is_given_up(race: Any) -> Non
     assert race({"slow": slow, "done": [5e3, 500.0, 5.0, 1.0, 1.0, 1.0]})[2]["slow"] == RACE
 
 
+def test_one_that_is_slow_at_first_but_may_get_faster_goes_on(race: Any) -> None:
+    """At its first rate it would end at four times the cost of the leader and be given up; but later it gets faster."""
+    slow = [1e4 * 0.9**k for k in range(5)]
+    later = [slow[-1] * 0.7**k for k in range(1, 11)]
+    leads = [600.0 - k for k in range(8)]
+    winner, _, asked = race({"leads": leads, "late": slow + later})
+    assert winner == "late"
+    assert asked["late"] == 15
+
+
 def test_of_two_that_have_come_to_the_same_one_goes_on(race: Any) -> None:
     one = [1e3 * 0.7**k for k in range(16)]
     other = [2 * cost for cost in one]
