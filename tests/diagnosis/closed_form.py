@@ -30,14 +30,14 @@ class ClosedForm:
         residuals: gives [B, D] for genes [B, F].
         size: F.
         reach: an individual fails where one of its genes is farther than this from the genome that it begins beside.
-        batches: number of individuals in each batch that was evaluated.
+        batches: genes [B, F] of each batch that was evaluated.
         near: the genome that each batch began beside.
     """
 
     residuals: Callable[[Array], Array]
     size: int
     reach: float = np.inf
-    batches: list[int] = field(default_factory=list)
+    batches: list[Array] = field(default_factory=list)
     near: list[Array] = field(default_factory=list)
 
     @cached_property
@@ -64,10 +64,16 @@ class ClosedForm:
         return 1.0
 
     def evaluate(self, problem: Problem, evaluator: Any, values: Array) -> tuple[Array, tuple[str | None, ...], Any]:  # noqa: ARG002
-        self.batches.append(len(values))
+        assert ((values >= 0.0) & (values <= 1.0)).all(), "genes leave their boxes"
+        self.batches.append(values)
         far = np.abs(values - self.near[-1]).max(axis=1) > self.reach
-        found = self.residuals(values)
+        found = np.where(far[:, None], np.nan, self.residuals(values))
         return found, tuple("it flutters" if one else None for one in far), [found[:, None]]
+
+    @property
+    def sizes(self) -> list[int]:
+        """Number of individuals in each batch."""
+        return [len(batch) for batch in self.batches]
 
     def fitted(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
         """See :func:`diagnosis.fit.fitted`."""
@@ -76,6 +82,10 @@ class ClosedForm:
     def thoroughly(self, start: Array, steps: int) -> list[Fit]:
         """See :func:`diagnosis.fit.thoroughly`."""
         return list(fit.thoroughly(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
+
+    def measured(self, fitted: Fit) -> Fit:
+        """See :func:`diagnosis.fit.measured`."""
+        return fit.measured(self.rig, self.rig, NO_EVALUATOR, fitted)
 
     @property
     def look(self) -> fit._Look:
