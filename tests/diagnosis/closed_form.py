@@ -30,6 +30,7 @@ class ClosedForm:
         residuals: gives [B, D] for genes [B, F].
         size: F.
         reach: an individual fails where one of its genes is farther than this from the genome that it begins beside.
+        noise: of each residual.
         batches: genes [B, F] of each batch that was evaluated.
         near: the genome that each batch began beside.
     """
@@ -37,6 +38,7 @@ class ClosedForm:
     residuals: Callable[[Array], Array]
     size: int
     reach: float = np.inf
+    noise: float = 1.0
     batches: list[Array] = field(default_factory=list)
     near: list[Array] = field(default_factory=list)
 
@@ -52,13 +54,13 @@ class ClosedForm:
 
     @cached_property
     def scale(self) -> Array:
-        return np.ones(self.residuals(np.full((1, self.size), 0.5)).shape[1])
+        return np.full(self.residuals(np.full((1, self.size), 0.5)).shape[1], self.noise)
 
     def chi_squared(self, coefficients: Array) -> float:
-        return float((coefficients**2).sum())
+        return float(self.surprise(coefficients))
 
     def surprise(self, coefficients: Array) -> Array:
-        return np.asarray((coefficients**2).sum(axis=-1))
+        return np.asarray(((coefficients / self.scale) ** 2).sum(axis=-1))
 
     def trust(self, coefficients: Array) -> float:  # noqa: ARG002
         return 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -122,6 +123,13 @@ def test_slopes_of_genes_that_are_new_are_measured_first_and_again_before_those_
     assert sizes.count(6) <= 1, "at most once all are measured, whatever steps gain"
 
 
+def test_all_slopes_are_measured_at_most_once_again() -> None:
+    """Steps towards a cusp never keep their promise."""
+    rig = ClosedForm(lambda genes: 10.0 + 20.0 * np.abs(genes - 0.4) ** 0.5, 2)
+    rig.fitted(np.array([0.9, 0.7]))
+    assert rig.sizes.count(4) == 2
+
+
 def test_a_fit_whose_slopes_steps_have_taught_is_measured_where_it_ended_and_no_other() -> None:
     rig, _ = linear()
     taught = rig.fitted(START, 0.8 * SLOPES, ALL)
@@ -188,6 +196,39 @@ def test_slopes_are_central_differences_where_a_thorough_fit_ends(steps: int) ->
     np.testing.assert_allclose(fit.jacobian, [[-1.8e5 * (fit.unit[0] - 0.1), 3e4], [-30.0, 0.0]], rtol=1e-6, atol=1e-3)
     assert not np.array_equal(rig.batches[-1], rig.batches[-2])
     assert rig.sizes[:2] == [1, 2], "one side is enough at first"
+
+
+def test_a_thorough_fit_that_steps_do_not_suffice_for_has_slopes_of_one_side_till_its_last() -> None:
+    rig = ClosedForm(lambda genes: 10.0 * np.exp(3.0 * genes), 1)
+    fit = rig.thoroughly(np.array([0.95]), 1)[-1]
+    np.testing.assert_allclose(fit.jacobian, 30.0 * np.exp(3.0 * fit.unit[None]), rtol=1e-4)
+    assert rig.sizes.count(1) == 3
+    assert rig.sizes[-1] == 2
+
+
+@pytest.mark.parametrize("end", [0.0, 1.0])
+def test_a_fit_ends_at_a_bound_of_a_box_where_the_minimum_is_beyond_it(end: float) -> None:
+    """The other gene makes up for it: its best value there has a closed form."""
+    slopes, aim = np.array([[30.0, 20.0], [20.0, 30.0]]), np.array([1.4 * end - 0.2, 0.5])
+    rig = ClosedForm(lambda genes: (genes - aim) @ slopes.T, 2)
+    left = slopes[:, 0] * (end - aim[0]) - slopes[:, 1] * aim[1]
+    other = (0.5 / PRIOR**2 - slopes[:, 1] @ left) / (slopes[:, 1] @ slopes[:, 1] + 1.0 / PRIOR**2)
+    better, _ = _step(rig.look, begun(rig, np.array([0.5, 0.3]), slopes))
+    assert better is not None
+    np.testing.assert_allclose(better.unit, [end, other], atol=1e-4)
+    assert better.unit[0] == end
+    np.testing.assert_allclose(rig.thoroughly(np.array([0.5, 0.3]), 9)[-1].unit, [end, other], atol=1e-4)
+
+
+def test_no_step_depends_on_the_unit_of_what_is_recorded() -> None:
+    def scaled(unit: float, genes: Array) -> Array:
+        return unit * valley(3e4).residuals(genes)
+
+    fits = []
+    for unit in (1.0, 1e-3):
+        rig = ClosedForm(partial(scaled, unit), 2, noise=unit)
+        fits.append([fit.unit for fit in rig.thoroughly(np.array([0.1, 0.0]), 12)])
+    np.testing.assert_allclose(fits[0], fits[1], atol=1e-6)
 
 
 def test_individuals_begin_beside_a_fit_that_has_moved_far() -> None:
