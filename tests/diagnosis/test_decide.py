@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis.assess import _unended
-from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, weighed
+from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, tolerated, weighed
 from diagnosis.finding import Interval
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
@@ -201,6 +201,12 @@ def test_a_prediction_that_does_not_exist_counts_as_the_fit_and_noise_below_noth
     below = [replace(others[0], excess=-0.2, predicted=-0.3), others[1]]
     expected, *found = (weighed(stack(), refit(2.0), r, 0.0, 40).probabilities for r in (others, single, below))
     np.testing.assert_allclose(found, [expected] * 2)
+    assert tolerated(stack(), -0.2, 0.0) == tolerated(stack(), 0.0, 0.0)
+
+
+def test_a_single_suspect_is_no_likelier_beforehand_than_one_of_two() -> None:
+    one, two, many = (weighed(stack(), refit(2.0), [refit(0.9, ("a",))], 0.0, n).probabilities[1] for n in (1, 2, 40))
+    assert one == two > many
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
@@ -208,7 +214,10 @@ def test_a_prediction_that_does_not_exist_counts_as_the_fit_and_noise_below_noth
 def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, uncertainty: float) -> None:
     def judged(unit: float) -> tuple[list[float], bool, bool]:
         scaled = cast("Stack", SimpleNamespace(noise=unit, pieces=36.0, uncertainty=uncertainty * unit**2))
-        before, *others = (refit(unit * left, (name,)) for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b")))
+        before, *others = (
+            refit(unit * left, (name,), predicted=2.0 * unit * left)
+            for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))
+        )
         found = weighed(scaled, before, others, 0.2 * unit, 40)
         shares = [*found.probabilities, found.unknown, *found.left]
         return shares, refuted(scaled, before.excess, 0.2 * unit), beyond_doubt(scaled, before, 40)
