@@ -140,8 +140,8 @@ class _Runner:
         return self.fits[-1].cost if self.fits else np.inf
 
     def at_the_same(self, other: _Runner) -> bool:
-        """Whether two fits of the same suspects have come to the same."""
-        if self is other or not self.fits or not other.fits or self.entry.names != other.entry.names:
+        """Whether two fits of the same suspects, each begun, have come to the same."""
+        if self is other or self.entry.names != other.entry.names:
             return False
         return bool(np.abs(self.fits[-1].unit - other.fits[-1].unit).max() <= SAME)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis.assess import _unended
-from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, weighed
+from diagnosis.decide import KNOWN, Weighed, beyond_doubt, refuted, tolerated, weighed
 from diagnosis.finding import Interval
 from diagnosis.refit import Refit
 from diagnosis.stack import Stack
@@ -19,12 +19,18 @@ from diagnosis.where import _variables, acting
 from records import Condition
 
 
-def refit(left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure") -> Refit:
-    """A refit that leaves ``left`` noises (root mean square)."""
+def refit(
+    left: float,
+    names: tuple[str, ...] = (),
+    genes: int = 1,
+    family: str = "structure",
+    predicted: float | None = None,
+) -> Refit:
+    """A refit that leaves ``left`` noises (root mean square); of recordings left out as much unless ``predicted``."""
     trials = tuple(
         SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
     )
-    return Refit(cast("Any", trials), cast("Any", None), left**2, left**2)
+    return Refit(cast("Any", trials), cast("Any", None), left**2, (left if predicted is None else predicted) ** 2)
 
 
 def stack(recordings: int = 6, uncertainty: float = 0.0) -> Stack:
@@ -107,6 +113,14 @@ def test_a_misfit_that_noise_cannot_make_is_looked_into_however_few_the_pieces()
     assert beyond_doubt(stack(1, 0.1), refit(0.45), 40)
 
 
+def test_an_explanation_is_looked_for_well_before_a_perfect_one_would_be_worth_its_price() -> None:
+    """Where none is looked for any more, one that left nothing would be less probable than the nominal model."""
+    doubtless = [left for left in np.linspace(0.0, 2.0, 401) if beyond_doubt(stack(), refit(left), 40)]
+    evidence = weighed(stack(), refit(max(doubtless)), [refit(0.0, ("a",))], 0.0, 40).evidence
+    assert len(doubtless) > 10
+    assert evidence[1] < -1.0
+
+
 @pytest.mark.parametrize(
     ("left", "before", "part"),
     [(1.0, 4.0, 0.75), (-0.1, 4.0, 1.0), (9.0, 4.0, -1.0), (1.0, 0.0, 0.0), (0.1, -0.1, 0.0)],
@@ -170,6 +184,48 @@ def test_an_effect_that_something_unknown_rivals_is_not_named() -> None:
         shares.append(share)
     assert min(shares) < 0.5 < KNOWN < max(shares)
     assert any(0.5 < share < KNOWN for share in shares)
+
+
+def test_of_two_that_fit_alike_the_one_that_predicts_recordings_left_out_is_more_probable() -> None:
+    """But a prediction counts less than a fit: it is that of a linearised model."""
+    alike, better = refit(0.6, ("a",)), refit(0.6, ("b",), predicted=0.3)
+    fitted = refit(0.3, ("c",), predicted=0.6)
+    _, *shares = weighed(stack(), refit(2.0), [alike, better, fitted], 0.0, 40).probabilities
+    assert 2.0 * shares[0] < shares[1] < shares[2] / 2.0
+
+
+def test_a_prediction_that_does_not_exist_counts_as_the_fit_and_noise_below_nothing_as_nothing() -> None:
+    """A single recording predicts none; and of no misfit noise makes a mean square that may be negative."""
+    others = [refit(0.0, ("a",)), refit(0.5, ("b",))]
+    single = [others[0], replace(others[1], predicted=None)]
+    below = [replace(others[0], excess=-0.2, predicted=-0.3), others[1]]
+    expected, *found = (weighed(stack(), refit(2.0), r, 0.0, 40).probabilities for r in (others, single, below))
+    np.testing.assert_allclose(found, [expected] * 2)
+    assert tolerated(stack(), -0.2, 0.0) == tolerated(stack(), 0.0, 0.0)
+
+
+def test_a_single_suspect_is_no_likelier_beforehand_than_one_of_two() -> None:
+    one, two, many = (weighed(stack(), refit(2.0), [refit(0.9, ("a",))], 0.0, n).probabilities[1] for n in (1, 2, 40))
+    assert one == two > many
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+@pytest.mark.parametrize(("nominal", "uncertainty"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
+def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, uncertainty: float) -> None:
+    def judged(unit: float) -> tuple[list[float], bool, bool]:
+        scaled = cast("Stack", SimpleNamespace(noise=unit, pieces=36.0, uncertainty=uncertainty * unit**2))
+        before, *others = (
+            refit(unit * left, (name,), predicted=2.0 * unit * left)
+            for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))
+        )
+        found = weighed(scaled, before, others, 0.2 * unit, 40)
+        shares = [*found.probabilities, found.unknown, *found.left]
+        return shares, refuted(scaled, before.excess, 0.2 * unit), beyond_doubt(scaled, before, 40)
+
+    shares, *flags = judged(unit)
+    expected, *others = judged(1.0)
+    np.testing.assert_allclose(shares, expected)
+    assert flags == others
 
 
 def test_more_genes_must_earn_theirs() -> None:

@@ -17,8 +17,8 @@ from service.client import Client, WingfitError
 from service.database import FILE_NAME, Database
 from service.housekeeping import Housekeeping
 from service.settings import Settings
-from service.store import timestamp
-from service.tables import GenerationRow, RunRow
+from service.store import ANSWERS_KEPT, timestamp
+from service.tables import AnswerRow, GenerationRow, RunRow
 from tests.service import toy
 from tests.service.conftest import Api, Gate, serving
 from tests.service.test_restart import numbers
@@ -124,4 +124,22 @@ def test_jobs_that_ended_long_ago_are_forgotten_where_it_is_asked_for(tmp_path: 
     with database.read() as session:
         assert session.scalars(select(RunRow.id)).all() == [new]
         assert set(session.scalars(select(GenerationRow.run_id))) == {new}
+    database.close()
+
+
+def test_answers_to_repeated_requests_are_kept_for_their_time_and_then_deleted(tmp_path: Path) -> None:
+    database, minute = Database(tmp_path), timedelta(minutes=1)
+    ages = {
+        "new": timedelta(0),
+        "kept": ANSWERS_KEPT - minute,
+        "old": ANSWERS_KEPT + minute,
+        "oldest": 2 * ANSWERS_KEPT,
+    }
+    insert = text("insert into answer values ('p', :key, 'f', 200, 'l', '{}', :made)")
+    with database.write() as session:
+        for key, age in ages.items():
+            session.execute(insert, {"key": key, "made": timestamp(datetime.now(UTC) - age)})
+    Housekeeping(database, None, lambda _: None).tidy()
+    with database.read() as session:
+        assert set(session.scalars(select(AnswerRow.key))) == {"new", "kept"}
     database.close()

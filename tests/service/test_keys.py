@@ -55,6 +55,13 @@ def test_without_a_good_key_nothing_is_told(client: httpx.Client, headers: dict[
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
 
 
+def test_a_key_is_good_only_as_it_was_written(client: httpx.Client, secrets: dict[str, str]) -> None:
+    secret = secrets["ann"]
+    assert client.get("/v1/runs", headers=bearer(secret)).status_code == 200
+    for other in (secret.lower(), secret.upper(), secret.swapcase(), secret[:-1], secret + "A"):
+        assert client.get("/v1/runs", headers=bearer(other)).status_code == 401, other
+
+
 def test_the_page_health_and_who_is_calling_are_open(client: httpx.Client) -> None:
     for path in ("/", "/app.js", "/v1/health", "/docs", "/openapi.json"):
         assert client.get(path).status_code == 200, path

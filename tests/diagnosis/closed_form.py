@@ -1,0 +1,100 @@
+"""Residuals in closed form: the minimum of a fit is known, and every evaluation is counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from calibration.problem import Problem
+from diagnosis import fit
+from diagnosis.fit import Fit
+from records import Gene, Genome
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+NO_EVALUATOR = cast("Any", None)
+
+
+@dataclass
+class ClosedForm:
+    """A subject and its stack in one: least squares in genes whose boxes are [0, 1].
+
+    Attributes:
+        residuals: gives [B, D] for genes [B, F].
+        size: F.
+        reach: an individual fails where one of its genes is farther than this from the genome that it begins beside.
+        noise: of each residual.
+        batches: genes [B, F] of each batch that was evaluated.
+        near: the genome that each batch began beside.
+    """
+
+    residuals: Callable[[Array], Array]
+    size: int
+    reach: float = np.inf
+    noise: float = 1.0
+    batches: list[Array] = field(default_factory=list)
+    near: list[Array] = field(default_factory=list)
+
+    @cached_property
+    def problem(self) -> Problem:
+        genes = tuple(Gene(f"gene_{k}", "1", 0.5, 0.0, 1.0, "linear", "any") for k in range(self.size))
+        free = tuple(gene.name for gene in genes)
+        return Problem(cast("Any", SimpleNamespace(genes=genes)), (), free, Genome.nominal(genes))
+
+    def beside(self, model: Any, genome: Array) -> Any:
+        self.near.append(genome)
+        return model
+
+    @cached_property
+    def scale(self) -> Array:
+        return np.full(self.residuals(np.full((1, self.size), 0.5)).shape[1], self.noise)
+
+    def chi_squared(self, coefficients: Array) -> float:
+        return float(self.surprise(coefficients))
+
+    def surprise(self, coefficients: Array) -> Array:
+        return np.asarray(((coefficients / self.scale) ** 2).sum(axis=-1))
+
+    def trust(self, coefficients: Array) -> float:  # noqa: ARG002
+        return 1.0
+
+    def evaluate(self, problem: Problem, evaluator: Any, values: Array) -> tuple[Array, tuple[str | None, ...], Any]:  # noqa: ARG002
+        assert ((values >= 0.0) & (values <= 1.0)).all(), "genes leave their boxes"
+        self.batches.append(values)
+        far = np.abs(values - self.near[-1]).max(axis=1) > self.reach
+        found = np.where(far[:, None], np.nan, self.residuals(values))
+        return found, tuple("it flutters" if one else None for one in far), [found[:, None]]
+
+    @property
+    def sizes(self) -> list[int]:
+        """Number of individuals in each batch."""
+        return [len(batch) for batch in self.batches]
+
+    def fitted(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
+        """See :func:`diagnosis.fit.fitted`."""
+        return fit.fitted(self.rig, self.rig, self.problem, NO_EVALUATOR, start, jacobian, known=known)
+
+    def thoroughly(self, start: Array, steps: int) -> list[Fit]:
+        """See :func:`diagnosis.fit.thoroughly`."""
+        return list(fit.thoroughly(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
+
+    def measured(self, fitted: Fit) -> Fit:
+        """See :func:`diagnosis.fit.measured`."""
+        return fit.measured(self.rig, self.rig, NO_EVALUATOR, fitted)
+
+    @property
+    def look(self) -> fit._Look:
+        """What a single step is given."""
+        return fit._Look(self.rig, self.rig, self.problem, NO_EVALUATOR)
+
+    @property
+    def rig(self) -> Any:
+        """Itself, as a subject or a stack: it has what fits use of either."""
+        return self
