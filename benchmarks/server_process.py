@@ -17,6 +17,7 @@ from benchmarks.ray_nodes import REPOSITORY, environment, free_port
 
 START_SECONDS = 120.0
 DIE_SECONDS = 30.0
+WORKERS = 2
 
 
 class Server:
@@ -36,7 +37,7 @@ class Server:
             "WINGFIT_DATA": str(folder / "data"),
             "WINGFIT_PORT": str(self.port),
             "WINGFIT_EVALUATOR": evaluator,
-            "WINGFIT_WORKERS": "2",
+            "WINGFIT_WORKERS": str(WORKERS),
             "OMP_NUM_THREADS": "1",
             **(settings or {}),
         }

@@ -1,5 +1,7 @@
 """``python -m benchmarks.durability --json``: deaths of the server, of workers, of nodes and of all at once.
 
+Workers are also stopped (SIGSTOP), as a machine that swaps or a debugger does: each must be replaced.
+
 Visitors upload, submit, watch, pause, resume and cancel meanwhile, and note every answer. In the end all that was
 acknowledged must be there, every run must have ended as an undisturbed one does, and the database must be whole.
 """
@@ -27,19 +29,22 @@ from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
 from benchmarks.durability.visitors import FINAL, Visitor, finding, outcome, settle, settle_diagnosis
 from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, archive
-from benchmarks.server_process import Server
+from benchmarks.server_process import WORKERS, Server
 from service.database import FILE_NAME
 
 Json = dict[str, Any]
-KILLS = {"server": 300, "workers": 60, "nodes": 20, "stack": 20}
+KILLS = {"server": 300, "workers": 60, "hung": 20, "nodes": 20, "stack": 20}
 VISITORS = 2
 LONGEST_LIFE = 2.5  # s
 # A diagnosis begins again with every life of the server: it must not stand in the way of the runs.
-ROOMY = {"WINGFIT_MAX_RUNS": "4"}
+# And it says nothing against a job that the server was killed from outside while it ran.
+ROOMY = {"WINGFIT_MAX_RUNS": "4", "WINGFIT_MAX_STARTS": "1000"}
 OF_DIAGNOSES = "diagnosis"
 PLACES = ("commit", "committed", "answer")
 QUIET_SECONDS = 600.0
-EVALUATORS = {"server": "in_process", "workers": "processes", "nodes": "ray", "stack": "ray"}
+# Longer than any unit of these works may take before its worker is taken to hang.
+REPLACED_SECONDS = 300.0
+EVALUATORS = {"server": "in_process", "workers": "processes", "hung": "processes", "nodes": "ray", "stack": "ray"}
 
 
 def main() -> None:
@@ -64,6 +69,8 @@ def main() -> None:
     results, identical = (sum(one[name] for one in found.values()) for name in ("results", "identical"))
     told = {
         "kills": {kind: one["kills"] for kind, one in found.items()},
+        "hung": found["hung"]["kills"] if "hung" in found else 0,
+        "hung_recovered": found["hung"]["recovered"] if "hung" in found else 0,
         "lost": sum(len(one["lost"]) for one in found.values()),
         "stuck": sum(one["stuck"] for one in found.values()),
         "integrity": "ok" if all(one["integrity"] == "ok" for one in found.values()) else "damaged",
@@ -74,7 +81,8 @@ def main() -> None:
         "commit": machine.commit(),
     }
     print(json.dumps(told))
-    sys.exit(0 if not told["lost"] and not told["stuck"] and told["integrity"] == "ok" and identical == results else 1)
+    whole = not told["lost"] and not told["stuck"] and told["integrity"] == "ok" and identical == results
+    sys.exit(0 if whole and told["hung"] == told["hung_recovered"] else 1)
 
 
 def undisturbed(folder: Path) -> dict[str, Json]:
@@ -117,9 +125,9 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
     visitors = [Visitor(number, seed, server.port, ledger, expected) for number in range(VISITORS)]
     for visitor in visitors:
         visitor.start()
-    began = time.monotonic()
+    began, recovered = time.monotonic(), 0
     for number in range(kills):
-        DEATHS[kind](server, cluster, rng)
+        recovered += DEATHS[kind](server, cluster, rng) is not False
         failed = next((visitor.error for visitor in visitors if visitor.error), None)
         if failed:
             raise failed
@@ -136,6 +144,7 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
         cluster.kill()
     return {
         "kills": kills,
+        "recovered": recovered,
         "acknowledged": ledger.acknowledged,
         "runs": len(ledger.runs),
         "diagnoses": len(ledger.diagnoses),
@@ -161,13 +170,33 @@ def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> N
 
 def _of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
     """Of one that evaluates, while the server lives."""
+    with suppress(ProcessLookupError):
+        os.kill(_some_worker(server, rng), signal.SIGKILL)
+
+
+def _stop_of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> bool:
+    """One that evaluates is stopped; whether it is replaced."""
+    worker = _some_worker(server, rng)
+    try:
+        os.kill(worker, signal.SIGSTOP)
+    except ProcessLookupError:
+        return _stop_of_worker(server, None, rng)
+    deadline = time.monotonic() + REPLACED_SECONDS
+    while time.monotonic() < deadline:
+        workers = server.workers()
+        if worker not in workers and len(workers) == WORKERS:
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _some_worker(server: Server, rng: np.random.Generator) -> int:
     time.sleep(rng.uniform(0.2, LONGEST_LIFE))
     workers = server.workers()
     while not workers:
         time.sleep(0.1)
         workers = server.workers()
-    with suppress(ProcessLookupError):
-        os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
+    return int(workers[rng.integers(len(workers))])
 
 
 def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
@@ -188,9 +217,10 @@ def _of_all(server: Server, cluster: Cluster | None, rng: np.random.Generator) -
     server.start()
 
 
-DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], None]] = {
+DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], bool | None]] = {
     "server": _of_server,
     "workers": _of_worker,
+    "hung": _stop_of_worker,
     "nodes": _of_node,
     "stack": _of_all,
 }
