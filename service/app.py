@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,7 +16,7 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
-from service import http, problems
+from service import http, problems, threads
 from service.database import Database
 from service.describing import describe
 from service.diagnoser import Diagnoser
@@ -27,6 +28,7 @@ from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
 from service.shortcut import SHORTCUT, Shortcut
+from service.shutdown import StopLimits
 from service.state import MakeEvaluator, Service, wingfit_version
 from service.unforeseen import Unforeseen
 
@@ -59,6 +61,7 @@ def create_app(
     engine: Engine | None = None,
     make_evaluator: MakeEvaluator | None = None,
     diagnoser: Diagnoser | None = None,
+    limits: StopLimits | None = None,
 ) -> FastAPI:
     """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
 
@@ -69,7 +72,8 @@ def create_app(
         app.state.service = service
         await run_in_threadpool(service.start)
         yield {SHORTCUT: service.shortcut}  # for the protocol
-        app.state.stopped = await run_in_threadpool(service.stop)
+        # Not in a thread of the pool: requests that hang may hold them all.
+        app.state.stopped = await asyncio.wrap_future(threads.call("stop", lambda: service.stop(limits)))
 
     app = FastAPI(
         title="wingfit",

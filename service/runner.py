@@ -117,6 +117,10 @@ class Runner:
             thread.join(max(0.0, deadline - time.monotonic()))
         return not any(thread.is_alive() for thread in threads)
 
+    def under_way(self) -> list[Known]:
+        """Jobs that are computed now; without the lock, which may be held by what hangs."""
+        return list(self._threads)
+
     # -- the waiting line ------------------------------------------------------------------------------------
 
     def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, Work]]:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import logging
 import sqlite3
-from collections.abc import AsyncIterator, Callable
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
-from service import store
+from service import store, threads
 from service.access import KeyRing, calling
 from service.backup import forget_snapshots
 from service.calibrating import Calibrating
@@ -26,16 +27,17 @@ from service.housekeeping import Housekeeping
 from service.observing import Gauges, Metrics
 from service.pool import Pool
 from service.reading import Reading
-from service.runner import Runner
+from service.runner import Known, Runner
 from service.schemas import HealthOut
 from service.settings import Settings
 from service.shortcut import Shortcut
+from service.shutdown import StopLimits
 from service.tables import DiagnosisRow, RunRow
 from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
 from service.work import Work
 
 LOG = logging.getLogger("wingfit")
-STOP_SECONDS = 3.0
+LOOK_SECONDS = 1.0
 
 MakeEvaluator = Callable[[], Evaluator]
 
@@ -55,6 +57,8 @@ class Service:
         self.engine: Engine = engine or ModelEngine()
         self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
         self.keys = KeyRing()
+        # Requests that are being answered: method, path, and when they came.
+        self.under_way: dict[int, tuple[str, str, float]] = {}
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
         self.reading = Reading(database)
@@ -95,13 +99,41 @@ class Service:
         self._housekeeping.stop()
         self.changes.close()
 
-    def stop(self) -> bool:
-        """Stop within seconds, leaving jobs as stored; whether all threads ended."""
+    def stop(self, limits: StopLimits | None = None) -> bool:
+        """Stop within ``limits``, leaving jobs as stored; whether all threads ended. The log says what did not."""
+        limits = limits or StopLimits()
         self.begin_stop()
-        ended = self.runner.stop(STOP_SECONDS)
-        closed = self._pool.close()
-        self.database.close()
-        return ended and closed
+        # A job that waits for the database may hold the lock by which the runner knows its threads.
+        ended = threads.done_within(limits.jobs, "stop-jobs", lambda: self.runner.stop(limits.jobs))
+        for line in () if ended else self._jobs_under_way():
+            LOG.warning("given up after %g s: %s", limits.jobs, line)
+        if not (closed := self._pool.close(limits.evaluator)):
+            LOG.warning(
+                "given up: the evaluator does not stop within %g s; its workers end by themselves", limits.evaluator
+            )
+        if not (stored := self.database.close(limits.database)):
+            LOG.warning("given up: a write to the database does not end within %g s; it is undone", limits.database)
+        return ended and closed and stored
+
+    def unfinished(self) -> Iterator[str]:
+        """What is under way, in words: requests, jobs."""
+        for method, path, began in list(self.under_way.values()):
+            yield f"{method} {path}, since {time.monotonic() - began:.1f} s"
+        yield from self._jobs_under_way()
+
+    def _jobs_under_way(self) -> Iterator[str]:
+        for job in self.runner.under_way():
+            yield f"{job} is left as stored ({self._last_step(job)}) and goes on at the next start"
+
+    def _last_step(self, job: Known) -> str:
+        def stored() -> str:
+            with self.database.read() as session:
+                return f"after step {job.work.row(session, job.id).generations}"
+
+        try:
+            return threads.call("stop-look", stored).result(LOOK_SECONDS)
+        except Exception as error:  # the words are for the log, and the stop goes on
+            return f"its last step is unknown: {type(error).__name__}"
 
     def gauges(self) -> Gauges:
         """Standing of the service as numbers, of all owners, whoever asks."""
