@@ -29,8 +29,9 @@ from service.routes import backup, datasets, diagnoses, effects, exports, forces
 from service.settings import Settings
 from service.shortcut import SHORTCUT, Shortcut
 from service.shutdown import StopLimits
-from service.state import MakeEvaluator, Service, wingfit_version
+from service.state import MakeEvaluator, Service
 from service.unforeseen import Unforeseen
+from service.version import wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import logging
-import sqlite3
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
-from service import store, threads
-from service.access import KeyRing, calling
+from service import threads
+from service.access import KeyRing
 from service.backup import forget_snapshots
 from service.calibrating import Calibrating
 from service.changes import Changes
@@ -23,18 +21,18 @@ from service.diagnoser import Diagnoser, ModelDiagnoser
 from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
 from service.events import Events
+from service.health import Health
 from service.housekeeping import Housekeeping
 from service.observing import Gauges, Metrics
 from service.pool import Pool
 from service.reading import Reading
 from service.runner import Known, Runner
-from service.schemas import HealthOut
 from service.settings import Settings
 from service.shortcut import Shortcut
 from service.shutdown import StopLimits
-from service.tables import DiagnosisRow, RunRow
 from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
 from service.work import Work
+from workers.jobs import State
 
 LOG = logging.getLogger("wingfit")
 LOOK_SECONDS = 1.0
@@ -73,6 +71,8 @@ class Service:
         self.runner = Runner(database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner)
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
+        self.health = Health(settings, database, self._pool, kinds)
+        self._metrics_text = threads.Shared("metrics", self.metrics.text)
 
     def start(self) -> None:
         """Take up what was left and start the evaluator."""
@@ -135,45 +135,27 @@ class Service:
         except Exception as error:  # the words are for the log, and the stop goes on
             return f"its last step is unknown: {type(error).__name__}"
 
+    async def metrics_text(self) -> bytes:
+        """Counters and gauges in the text format of Prometheus; TimeoutError where they take too long."""
+        await self.health.look()
+        return await self._metrics_text.result(LOOK_SECONDS)
+
     def gauges(self) -> Gauges:
-        """Standing of the service as numbers, of all owners, whoever asks."""
-        with calling(None), self.database.read() as session:
-            jobs: dict[tuple[tuple[str, str], ...], float] = {
-                (("kind", work.what), ("state", state)): float(count)
-                for work in (self.calibrating, self.diagnosing)
-                for state, count in store.states(session, work.table)
-            }
+        """Standing of the service as numbers, of all owners, whoever asks; jobs as of the last look at them."""
+        jobs: dict[tuple[tuple[str, str], ...], float] = {
+            (("kind", kind), ("state", state.value)): float(counts.get(state, 0))
+            for kind, counts in (self.health.jobs or {}).items()
+            for state in State
+        }
         size = sum(path.stat().st_size for path in self.settings.data.glob(f"{FILE_NAME}*"))
         return {
             "wingfit_jobs": ("Calibrations and diagnoses by state.", jobs),
+            "wingfit_database_up": ("Whether the database answers.", {(): float(self.health.jobs is not None)}),
             "wingfit_evaluator_up": ("Whether jobs are computed.", {(): float(self._pool.status == "ok")}),
             "wingfit_workers": ("Workers of the evaluator.", {(): float(self._pool.workers or 0)}),
             "wingfit_watchers": ("Open event streams.", {(): float(self.changes.watchers)}),
             "wingfit_database_bytes": ("Size of the database and its log.", {(): float(size)}),
         }
-
-    def health(self) -> HealthOut:
-        """Standing of the service, of all owners, whoever asks."""
-        with calling(None), self.database.read() as session:
-            active, diagnoses = store.active(session, RunRow), store.active(session, DiagnosisRow)
-        return HealthOut(
-            status=self._pool.status,
-            version=wingfit_version(),
-            sqlite_version=sqlite3.sqlite_version,
-            evaluator=self.settings.evaluator,
-            workers=self._pool.workers,
-            runs_active=active,
-            diagnoses_active=diagnoses,
-            detail=self._pool.error,
-        )
-
-
-def wingfit_version() -> str:
-    """Version of the installed package."""
-    try:
-        return version("wingfit")
-    except PackageNotFoundError:
-        return "0+uninstalled"
 
 
 def _maker(settings: Settings) -> MakeEvaluator:

@@ -196,11 +196,6 @@ def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | Non
 # -- jobs of any kind ------------------------------------------------------------------------------------
 
 
-def active(session: Session, table: type[JobRow]) -> int:
-    """Number of jobs that have not ended."""
-    return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE))) or 0
-
-
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
     owner = dataset(session, dataset_id).owner
@@ -221,13 +216,6 @@ def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
     return table.owner.is_(None) if owner is None else table.owner == owner
-
-
-def states(session: Session, table: type[JobRow]) -> list[tuple[str, int]]:
-    """How many jobs are in which state."""
-    rows = session.execute(select(table.state, func.count()).group_by(table.state))
-    found: dict[str, int] = {row[0]: row[1] for row in rows}
-    return [(state.value, found.get(state.value, 0)) for state in State]
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:
