@@ -23,7 +23,8 @@ from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
-from service.observing import Observer
+from service.observing import METRICS, Metrics, Observer
+from service.pieces import Pieces
 from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
@@ -67,12 +68,12 @@ def create_app(
     """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
 
     @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut]]:
+    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut | Metrics]]:
         opened = Database(settings.data) if database is None else database
         service = Service(settings, opened, engine, make_evaluator, diagnoser)
         app.state.service = service
         await run_in_threadpool(service.start)
-        yield {SHORTCUT: service.shortcut}  # for the protocol
+        yield {SHORTCUT: service.shortcut, METRICS: service.metrics}  # for the protocol
         # Not in a thread of the pool: requests that hang may hold them all.
         app.state.stopped = await asyncio.wrap_future(threads.call("stop", lambda: service.stop(limits)))
 
@@ -91,6 +92,7 @@ def create_app(
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
     describe(app)
     _mount_pages(app)
+    app.add_middleware(Pieces)
     app.add_middleware(Quick)
     if settings.keys:
         app.add_middleware(Gate)

@@ -30,7 +30,16 @@ from service.runner import Known, Runner
 from service.settings import Settings
 from service.shortcut import Shortcut
 from service.shutdown import StopLimits
-from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
+from service.turns import (
+    ANSWERS_AT_ONCE,
+    BACKUPS_AT_ONCE,
+    BACKUPS_WAITING,
+    DOWNLOADS_AT_ONCE,
+    EXPORTS_AT_ONCE,
+    UPLOADS_AT_ONCE,
+    Place,
+    Turns,
+)
 from service.work import Work
 from workers.jobs import State
 
@@ -64,6 +73,8 @@ class Service:
         self.events = Events(database, self.changes)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.exports = Turns("exports", EXPORTS_AT_ONCE)
+        self.downloads, self.answers = Turns("downloads", DOWNLOADS_AT_ONCE), Turns("answers", ANSWERS_AT_ONCE)
+        self.backups = Turns("backups", BACKUPS_AT_ONCE, BACKUPS_WAITING)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
@@ -174,14 +185,33 @@ async def _service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(_service)]
 
 
+async def _place() -> AsyncIterator[Place]:
+    place = Place()
+    try:
+        yield place
+    finally:
+        place.give_back()
+
+
+# Held until the answer is sent, or the client is gone.
+PlaceDep = Annotated[Place, Depends(_place)]
+
+
 def _in_turn(turns_of: Callable[[Service], Turns]) -> Any:
-    async def taken(service: ServiceDep) -> AsyncIterator[None]:
-        async with turns_of(service).turn():
-            yield
+    async def taken(service: ServiceDep, place: PlaceDep) -> None:
+        await place.take(turns_of(service))
 
     return Depends(taken)
 
 
-# Of a route that simulates, or reads an upload: it begins when its turn comes.
-IN_TURN = _in_turn(lambda service: service.turns)
+async def _simulating(service: ServiceDep, place: PlaceDep) -> AsyncIterator[None]:
+    async with service.turns.turn():
+        yield
+        # Before the turn is given back, so that few answers are in memory; a slow reader then holds no turn to simulate.
+        await place.take(service.answers)
+
+
+# Of a route that simulates, whose answer may be large, or that reads an upload: it begins when its turn comes.
+IN_TURN = Depends(_simulating, scope="function")
+IN_TURN_OF_DOWNLOADS = _in_turn(lambda service: service.downloads)
 IN_TURN_OF_UPLOADS = _in_turn(lambda service: service.uploads)

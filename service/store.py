@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 import secrets
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
@@ -109,6 +110,16 @@ def archive(session: Session, dataset_id: str) -> bytes:
     if body is None:
         raise not_found("dataset", dataset_id)
     return body
+
+
+def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
+    """``size`` bytes of the dataset's archive from ``start``, without reading the others; a 404 where it is gone."""
+    row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
+    if row is None:
+        raise not_found("dataset", dataset_id)
+    with connection.blobopen("archive", "body", row[0], readonly=True) as blob:
+        blob.seek(start)
+        return blob.read(size)
 
 
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
