@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 import fcntl
 import logging
+import os
+import socket
+import struct
 import sys
 import termios
 from contextlib import suppress
@@ -138,7 +141,14 @@ class Protocol(HttpToolsProtocol):
             metrics.slow_clients.inc()
         line = "hung up on %s, which took %.1f KiB/s of %s; at least %g KiB/s are needed"
         LOG.info(line, self.client, rate / 2**10, self.scope["path"], SLOWEST_BYTES_PER_SECOND / 2**10)
+        self._forget_untaken()
         self.transport.abort()
+
+    def _forget_untaken(self) -> None:
+        """Let the operating system drop what waits when the connection is closed; it would keep it for minutes."""
+        connection = self.transport.get_extra_info("socket")
+        with suppress(OSError, ValueError), socket.socket(fileno=os.dup(connection.fileno())) as same:
+            same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
     def _untaken(self) -> int:
         """Bytes that wait for the client: here, and in the buffer of the operating system, which may have megabytes."""

@@ -207,7 +207,7 @@ def _in_turn(turns_of: Callable[[Service], Turns]) -> Any:
 async def _simulating(service: ServiceDep, place: PlaceDep) -> AsyncIterator[None]:
     async with service.turns.turn():
         yield
-        # Before the turn is given back, so that few answers are in memory; a slow reader then holds no turn to simulate.
+        # Before the turn is given back, so that few answers are in memory; who reads slowly then holds no such turn.
         await place.take(service.answers)
 
 

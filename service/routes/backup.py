@@ -6,7 +6,7 @@ import os
 from collections.abc import AsyncIterator
 from typing import Annotated, BinaryIO
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
@@ -20,9 +20,11 @@ MEDIA_TYPE = "application/vnd.sqlite3"
 PIECE = 2**20
 
 
-async def _copy(service: ServiceDep) -> AsyncIterator[BinaryIO]:
+async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
     """A copy of the database, one at a time, which goes with the request, however that ends."""
     async with service.backups.turn():
+        if await request.is_disconnected():
+            raise ProblemError(503, "busy", "nobody waits for this backup any more")
         opened = await run_in_threadpool(_opened, service)
         try:
             yield opened
