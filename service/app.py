@@ -92,8 +92,8 @@ def create_app(
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
     describe(app)
     _mount_pages(app)
-    app.add_middleware(Pieces)
     app.add_middleware(Quick)
+    app.add_middleware(Pieces)
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)

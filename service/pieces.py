@@ -12,7 +12,7 @@ PIECE = 256 * 2**10
 
 
 class Pieces:
-    """Plain ASGI, like :mod:`service.guard`; innermost, so that nothing has to look at more messages."""
+    """Plain ASGI, like :mod:`service.guard`."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import subprocess
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -145,8 +144,7 @@ def toy(folder: Path) -> Iterator[ServerProcess]:
 
 
 def watchdog_of(server: ServerProcess) -> int:
-    told = subprocess.run(
-        ["ps", "-o", "pid=,args=", "--ppid", str(server.process.pid)], capture_output=True, text=True, check=True
-    )
-    (line,) = [line for line in told.stdout.splitlines() if "watchdog.py" in line]
-    return int(line.split()[0])
+    pid = server.process.pid
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    (watchdog,) = [one for one in children if b"watchdog.py" in Path(f"/proc/{one}/cmdline").read_bytes()]
+    return int(watchdog)
