@@ -113,7 +113,7 @@ def test_an_ordinary_stop_is_quick_and_the_watchdog_ends_with_the_server(
         assert watchdog_of(server) == watchdog
         began = time.monotonic()
         assert stopped(server, 5, number) == (0 if number == signal.SIGTERM else -number)
-        assert time.monotonic() - began < 1.5
+        assert time.monotonic() - began < 3
         assert "WARNING" not in server.log
         deadline = time.monotonic() + 2
         while Path(f"/proc/{watchdog}").exists():
