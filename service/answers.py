@@ -19,15 +19,15 @@ CONDITION = (
 
 
 class Health(TypedDict):
-    """Answer of ``GET /v1/health``."""
+    """Answer of ``GET /v1/health``; the numbers of active jobs are None where the database does not answer."""
 
     status: str
     version: str
     sqlite_version: str
     evaluator: str
     workers: int | None
-    runs_active: int
-    diagnoses_active: int
+    runs_active: int | None
+    diagnoses_active: int | None
 
 
 class RecordingInfo(TypedDict):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,20 +16,23 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
-from service import http, problems
+from service import http, problems, threads
 from service.database import Database
 from service.describing import describe
 from service.diagnoser import Diagnoser
 from service.engine import Engine
 from service.gate import Gate
 from service.guard import Guard
-from service.observing import Observer
+from service.observing import METRICS, Metrics, Observer
+from service.pieces import Pieces
 from service.quick import Quick
 from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from service.settings import Settings
 from service.shortcut import SHORTCUT, Shortcut
-from service.state import MakeEvaluator, Service, wingfit_version
+from service.shutdown import StopLimits
+from service.state import MakeEvaluator, Service
 from service.unforeseen import Unforeseen
+from service.version import wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"
@@ -59,17 +63,19 @@ def create_app(
     engine: Engine | None = None,
     make_evaluator: MakeEvaluator | None = None,
     diagnoser: Diagnoser | None = None,
+    limits: StopLimits | None = None,
 ) -> FastAPI:
     """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
 
     @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut]]:
+    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut | Metrics]]:
         opened = Database(settings.data) if database is None else database
         service = Service(settings, opened, engine, make_evaluator, diagnoser)
         app.state.service = service
         await run_in_threadpool(service.start)
-        yield {SHORTCUT: service.shortcut}  # for the protocol
-        app.state.stopped = await run_in_threadpool(service.stop)
+        yield {SHORTCUT: service.shortcut, METRICS: service.metrics}  # for the protocol
+        # Not in a thread of the pool: requests that hang may hold them all.
+        app.state.stopped = await asyncio.wrap_future(threads.call("stop", lambda: service.stop(limits)))
 
     app = FastAPI(
         title="wingfit",
@@ -87,6 +93,7 @@ def create_app(
     describe(app)
     _mount_pages(app)
     app.add_middleware(Quick)
+    app.add_middleware(Pieces)
     if settings.keys:
         app.add_middleware(Gate)
     app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)

@@ -99,7 +99,7 @@ class Database:
             ) from None
         self._lock = FolderLock(folder)
         self._guard = threading.Lock()
-        self._closed = False
+        self._closed = self._released = False
         path = (folder / FILE_NAME).resolve()
         try:
             self._writer = _writer(path)
@@ -160,16 +160,24 @@ class Database:
             while True:
                 self._bare.pop().close()
 
-    def close(self) -> None:
-        """Finish the write under way, refuse further ones, give the folder free."""
-        with self._guard:
-            if self._closed:
-                return
-            self._closed = True
-            self._readers.dispose()
-            self._close_bare()
-            self._writer.dispose()
-            self._lock.release()
+    def close(self, seconds: float = -1) -> bool:
+        """Refuse further reads and writes, finish the write under way, give the folder free.
+
+        Whether the write under way has ended within ``seconds`` (negative: however long it takes); else all stays open.
+        """
+        self._closed = True
+        if not self._guard.acquire(timeout=seconds):
+            return False
+        try:
+            if not self._released:
+                self._released = True
+                self._readers.dispose()
+                self._close_bare()
+                self._writer.dispose()
+                self._lock.release()
+        finally:
+            self._guard.release()
+        return True
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:

@@ -12,8 +12,9 @@ import numpy as np
 
 from service import csv_text, diagnosis_views, netcdf, store, views
 from service.export_schemas import DiagnosisExportOut
-from service.state import Service, wingfit_version
+from service.state import Service
 from service.tables import DatasetRow, DiagnosisRow
+from service.version import wingfit_version
 
 Json = dict[str, Any]
 RANKING = (

@@ -12,6 +12,7 @@ from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.gate import API
 from service.problems import ProblemError, response
 
 UPLOAD_PATH = "/v1/datasets"
@@ -66,8 +67,13 @@ class Guard:
                 f"this server does not answer for the host name {host[:200]!r}; use localhost, or name the "
                 "host in WINGFIT_ALLOWED_HOSTS",
             )
-        if scope["method"] in CHANGING and _is_foreign(headers, host):
-            return ProblemError(403, "origin", "a page of another origin may not change anything here")
+        if _is_foreign(headers, host):
+            if scope["method"] in CHANGING:
+                return ProblemError(403, "origin", "a page of another origin may not change anything here")
+            if scope["path"].startswith(API):
+                return ProblemError(
+                    403, "origin", f"a page of another site may not read or link to {API}; open the page of this server"
+                )
         length = headers.get("content-length", "0")
         if length.isdecimal() and int(length) > _limit(scope):
             return _too_large(_limit(scope))

@@ -51,6 +51,7 @@ def errors(*statuses: int) -> Responses:
             "host (400), key (401), scope or origin (403), size (413), internal (500), busy or ending (503), "
             "disk full (507)"
         ),
+        "headers": {"Retry-After": {"description": "of a 503: seconds", "schema": {"type": "integer"}}},
         "content": content,
     }
     return documented

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from service.state import wingfit_version
 from service.tables import DatasetRow, DiagnosisRow, RunRow
+from service.version import wingfit_version
 
 MEDIA_TYPE = "application/x-netcdf"
 CONVENTIONS = "CF-1.11"

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
-from prometheus_client.core import GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -27,6 +27,7 @@ from service.settings import LogFormat
 LOG = logging.getLogger("wingfit.access")
 SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0, 60.0)
 REQUEST_ID = "X-Request-ID"
+METRICS = "metrics"  # where they are in the state of the server
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 
 # Of the request being answered; None elsewhere.
@@ -53,6 +54,9 @@ class Metrics:
             registry=self._registry,
         )
 
+        self.slow_clients = Counter(
+            "wingfit_slow_clients", "Connections ended because the client read too slowly.", registry=self._registry
+        )
         # Finding the series of a request by its labels takes longer than counting it.
         self._series: dict[tuple[str, str, int], tuple[Counter, Histogram | None]] = {}
 
@@ -84,7 +88,8 @@ class _Standing(Collector):
         """The gauges as they are now."""
         for name, (told, values) in self._gauges().items():
             names = [label for label, _ in next(iter(values), ())]
-            family = GaugeMetricFamily(name, told, labels=names)
+            kind = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
+            family = kind(name, told, labels=names)
             for labels, value in values.items():
                 family.add_metric([text for _, text in labels], value)
             yield family

@@ -58,8 +58,8 @@ class Pool:
         standing = getattr(self._evaluator, "standing", None)
         return standing if isinstance(standing, Standing) else None
 
-    def close(self) -> bool:
-        """Close the evaluator, or abandon it after a few seconds; whether it closed."""
+    def close(self, seconds: float = CLOSE_SECONDS) -> bool:
+        """Close the evaluator, or abandon it after ``seconds``; whether it closed."""
         self._stop.set()
         with self._lock:
             evaluator, self._evaluator = self._evaluator, None
@@ -67,7 +67,7 @@ class Pool:
             return not self._thread.is_alive()
         closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)
         closing.start()
-        closing.join(CLOSE_SECONDS)
+        closing.join(seconds)
         return not closing.is_alive()
 
     def _start(self) -> None:

@@ -21,6 +21,8 @@ from service.database import DatabaseClosedError, is_full
 MEDIA_TYPE = "application/problem+json"
 LONGEST_VALUE = 200
 KINDS = {413: "too-large", 422: "invalid"}
+# Seconds after which to come again, by the kind of a problem that passes by itself.
+RETRY_AFTER = {"busy": 5, "not-ready": 5, "stopping": 5, "disk-full": 30}
 LOG = logging.getLogger("wingfit.http")
 
 ErrorItem = dict[str, Any]
@@ -81,8 +83,9 @@ def response(problem: ProblemError, headers: Mapping[str, str] | None = None) ->
     }
     if problem.errors:
         body["errors"] = problem.errors
+    later = {"Retry-After": str(RETRY_AFTER[problem.kind])} if problem.kind in RETRY_AFTER else {}
     # ASCII, because a lone surrogate that came in must be able to go out again.
-    return Response(json.dumps(body), problem.status, dict(headers or {}), MEDIA_TYPE)
+    return Response(json.dumps(body), problem.status, {**later, **(headers or {})}, MEDIA_TYPE)
 
 
 def install(app: FastAPI) -> None:
@@ -112,7 +115,7 @@ async def _on_validation(_: Request, error: Exception) -> Response:
 
 
 async def _on_closed(_: Request, error: Exception) -> Response:
-    return response(ProblemError(503, "stopping", str(error)), {"Retry-After": "5"})
+    return response(ProblemError(503, "stopping", str(error)))
 
 
 async def _on_operational(request: Request, error: Exception) -> Response:
@@ -120,7 +123,7 @@ async def _on_operational(request: Request, error: Exception) -> Response:
         return of_a_mistake(request, error)
     LOG.error("%s %s: %s", request.method, request.url.path, error)
     detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
-    return response(ProblemError(507, "disk-full", detail), {"Retry-After": "30"})
+    return response(ProblemError(507, "disk-full", detail))
 
 
 def of_a_mistake(request: Request, error: Exception) -> Response:

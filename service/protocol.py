@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
+import fcntl
+import logging
+import os
+import socket
+import struct
+import sys
+import termios
+from contextlib import suppress
+
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.guard import RAW_HEADERS
+from service.observing import METRICS, Metrics
 from service.problems import ProblemError, response
 from service.shortcut import BLOCK, SHORTCUT, Block, Shortcut
 
+LOG = logging.getLogger("wingfit.http")
 HEAD_LIMIT = 64 * 2**10
+# A client that takes less of what waits for it is hung up on: it would hold memory, and the places of others.
+SLOWEST_BYTES_PER_SECOND = 16 * 2**10
+SLOW_SECONDS = 15.0
 
 
 class Protocol(HttpToolsProtocol):
@@ -18,6 +33,12 @@ class Protocol(HttpToolsProtocol):
     _between = True  # the end of a request and the beginning of the next
     _block: Block | None = None
     _answered = 0.0
+    # While the server waits for the client: since when, and how much was not taken then; in all so far.
+    _paused_at = 0.0
+    _waiting = 0
+    _slow_seconds = 0.0
+    _slow_bytes = 0
+    _slow_timer: asyncio.TimerHandle | None = None
 
     def data_received(self, data: bytes) -> None:
         """Take the next bytes of the connection."""
@@ -81,6 +102,62 @@ class Protocol(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002  uvicorn's signature
         """Refuse what cannot be parsed."""
         self._refuse("what came is no request of HTTP/1.1 with a known method")
+
+    def pause_writing(self) -> None:
+        """Wait for the client, who has not taken what was sent."""
+        super().pause_writing()
+        if self._slow_timer is None:
+            self._paused_at, self._waiting = self.loop.time(), self._untaken()
+            self._slow_timer = self.loop.call_later(SLOW_SECONDS - self._slow_seconds, self._judge)
+
+    def resume_writing(self) -> None:
+        """Go on: it has."""
+        super().resume_writing()
+        self._count_taken()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """End it."""
+        if self._slow_timer is not None:
+            self._slow_timer.cancel()
+        super().connection_lost(exc)
+
+    def _count_taken(self) -> None:
+        if self._slow_timer is not None:
+            self._slow_timer.cancel()
+            self._slow_timer = None
+            self._slow_seconds += self.loop.time() - self._paused_at
+            self._slow_bytes += self._waiting - self._untaken()
+
+    def _judge(self) -> None:
+        """Hang up on a client that was waited for during ``SLOW_SECONDS`` in all, and took too little meanwhile."""
+        self._count_taken()
+        rate = self._slow_bytes / max(self._slow_seconds, 1e-3)
+        self._slow_seconds, self._slow_bytes = 0.0, 0
+        if rate >= SLOWEST_BYTES_PER_SECOND:
+            self.pause_writing()
+            return
+        metrics: Metrics | None = self.app_state.get(METRICS)
+        if metrics is not None:
+            metrics.slow_clients.inc()
+        line = "hung up on %s, which took %.1f KiB/s of %s; at least %g KiB/s are needed"
+        LOG.info(line, self.client, rate / 2**10, self.scope["path"], SLOWEST_BYTES_PER_SECOND / 2**10)
+        self._forget_untaken()
+        self.transport.abort()
+
+    def _forget_untaken(self) -> None:
+        """Let the operating system drop what waits when the connection is closed; it would keep it for minutes."""
+        connection = self.transport.get_extra_info("socket")
+        with suppress(OSError, ValueError), socket.socket(fileno=os.dup(connection.fileno())) as same:
+            same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+
+    def _untaken(self) -> int:
+        """Bytes that wait for the client: here, and in the buffer of the operating system, which may have megabytes."""
+        waiting = self.transport.get_write_buffer_size()
+        connection = self.transport.get_extra_info("socket")
+        with suppress(OSError, ValueError):  # where it cannot be asked for, or the connection is gone
+            left = fcntl.ioctl(connection.fileno(), termios.TIOCOUTQ, b"\0" * 4)
+            waiting += int.from_bytes(left, sys.byteorder)
+        return waiting
 
     def _refuse(self, detail: str) -> None:
         """Hang up, with an error in the form of all others: the application has not been asked yet."""

@@ -12,8 +12,9 @@ from service import csv_text, force_views, genomes, store, views
 from service.database import Database
 from service.export_schemas import RunExportOut
 from service.schemas import RunOut
-from service.state import Service, wingfit_version
+from service.state import Service
 from service.tables import DatasetRow, GenerationRow, RunRow
+from service.version import wingfit_version
 
 BLOCK = 1000
 # Columns of the table, by the fields of a generation; the first two are squares of the unit of the run's kind.

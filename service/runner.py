@@ -136,11 +136,11 @@ class Runner:
         """Wait for the steps under way, at most ``timeout`` s; whether all threads ended."""
         self.begin_stop()
         deadline = time.monotonic() + timeout
+        self._leave()
         with self._lock:
             threads = list(self._threads.values())
         for thread in threads:
             thread.join(max(0.0, deadline - time.monotonic()))
-        self._leave()
         return not any(thread.is_alive() for thread in threads)
 
     def pace(self) -> Pace:
@@ -160,6 +160,10 @@ class Runner:
                     _step(row, jobs.Leave())
         except (DatabaseClosedError, OperationalError) as error:
             LOG.warning("the stop is not stored (%s); it counts as an end of the server", error)
+
+    def under_way(self) -> list[Known]:
+        """Jobs that are computed now; without the lock, which may be held by what hangs."""
+        return list(self._threads)
 
     # -- the waiting line ------------------------------------------------------------------------------------
 

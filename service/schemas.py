@@ -103,15 +103,18 @@ class ProblemOut(BaseModel):
 
 
 class HealthOut(BaseModel):
-    """Standing of the service; ``detail`` says what is wrong when it is degraded."""
+    """Standing of the service; ``detail`` says what is wrong when it is degraded.
+
+    The numbers of jobs that have not ended are null where the database does not answer.
+    """
 
     status: Literal["starting", "ok", "degraded"]
     version: str
     sqlite_version: str
     evaluator: str
     workers: int | None
-    runs_active: int
-    diagnoses_active: int
+    runs_active: int | None
+    diagnoses_active: int | None
     detail: str | None = None
 
 

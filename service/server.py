@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import gc
 import logging
-import os
 import signal
 import socket
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
 
-from service import keys
+from service import keys, shutdown
 from service.app import create_app
 from service.database import Database, DataFolderError
 from service.diagnoser import Diagnoser
@@ -22,10 +22,10 @@ from service.engine import Engine
 from service.observing import set_up_log
 from service.protocol import Protocol
 from service.settings import Settings, SettingsError, is_loopback
+from service.shutdown import Deadline, StopLimits, Watchdog
 from service.state import MakeEvaluator
 
 LOG = logging.getLogger("wingfit")
-GRACE_SECONDS = 2
 # For which a thread that computes may keep others from running Python. Reading gives its turn away at every row, so
 # that with the usual 5 ms a page of some rows could wait for longer than it takes.
 SWITCH_SECONDS = 0.0005
@@ -36,25 +36,39 @@ class ServeError(RuntimeError):
 
 
 class _Server(uvicorn.Server):
-    """Tells the service of a signal at once, because open event streams would hold up uvicorn's own stop."""
+    """Begins the stop at a signal, because open event streams would hold up uvicorn's own, and ends it in time."""
 
-    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+    def __init__(self, config: uvicorn.Config, app: FastAPI, limits: StopLimits) -> None:
         super().__init__(config)
         self._app = app
+        self._deadline = Deadline(lambda: _unfinished(app), limits.give_up)
+        self._watchdog = Watchdog(limits.kill)
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Start, and stop in time even if the start hangs."""
+        self._watchdog.listen()
+        await super().startup(sockets)
 
     async def on_tick(self, counter: int) -> bool:
         """Take the signals back from Ray, whose handler aborts the process three seconds after a SIGTERM."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in shutdown.SIGNALS:
             signal.signal(number, self.handle_exit)
+        self._watchdog.listen()
         return await super().on_tick(counter)
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002  uvicorn's signature
-        service = getattr(self._app.state, "service", None)
-        if service is not None:
-            service.begin_stop()
+        self._deadline.begin()
         # Not uvicorn's own, which ends the process by raising the signal again: a clean stop is no death by signal.
-        self.force_exit = self.should_exit and sig == signal.SIGINT
-        self.should_exit = True
+        first, self.should_exit = not self.should_exit, True
+        self.force_exit = not first and sig == signal.SIGINT
+        service = getattr(self._app.state, "service", None)
+        if service is not None and first:  # a second signal may interrupt the handler of the first
+            service.begin_stop()
+
+
+def _unfinished(app: FastAPI) -> Iterator[str]:
+    service = getattr(app.state, "service", None)
+    return service.unfinished() if service is not None else iter(())
 
 
 def serve(
@@ -63,8 +77,10 @@ def serve(
     engine: Engine | None = None,
     make_evaluator: MakeEvaluator | None = None,
     diagnoser: Diagnoser | None = None,
+    limits: StopLimits | None = None,
 ) -> None:
     """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
+    limits = limits or StopLimits()
     set_up_log(settings.log)
     sys.setswitchinterval(SWITCH_SECONDS)
     listening = _listen(settings)
@@ -78,27 +94,34 @@ def serve(
         _need_a_key(settings, database, listening)
     elif not is_loopback(settings.host):
         LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
-    app = create_app(settings, database=database, engine=engine, make_evaluator=make_evaluator, diagnoser=diagnoser)
+    app = create_app(
+        settings,
+        database=database,
+        engine=engine,
+        make_evaluator=make_evaluator,
+        diagnoser=diagnoser,
+        limits=limits,
+    )
     config = uvicorn.Config(
         app,
         loop="uvloop",
         http=Protocol,
         access_log=False,
         log_level="warning",
-        timeout_graceful_shutdown=GRACE_SECONDS,
+        timeout_graceful_shutdown=limits.requests,
         server_header=False,
     )
     # What is loaded by now stays: to look through it for garbage would hold up every answer for a tenth of a second.
     gc.freeze()
     LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
     try:
-        _Server(config, app).run(sockets=[listening])
+        _Server(config, app, limits).run(sockets=[listening])
     finally:
-        database.close()
-    if not getattr(app.state, "stopped", True):
-        # A thread is still computing what will be computed again after the next start; do not wait for it.
-        logging.shutdown()
-        os._exit(0)
+        stopped = getattr(app.state, "stopped", True) and database.close(limits.database)
+    if not stopped or shutdown.held_up():
+        # A thread goes on; do not wait for it. What it computes is computed again after the next start.
+        shutdown.log_threads()
+        shutdown.leave()
 
 
 def _need_a_key(settings: Settings, database: Database, listening: socket.socket) -> None:

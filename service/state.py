@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import logging
-import sqlite3
-from collections.abc import AsyncIterator, Callable
-from importlib.metadata import PackageNotFoundError, version
+import shutil
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
 
 from calibration.evaluator import Evaluator
-from service import store
-from service.access import KeyRing, calling
+from service import threads
+from service.access import KeyRing
 from service.backup import forget_snapshots
 from service.calibrating import Calibrating
 from service.changes import Changes
@@ -22,20 +22,31 @@ from service.diagnoser import Diagnoser, ModelDiagnoser
 from service.diagnosing import Diagnosing
 from service.engine import Engine, ModelEngine
 from service.events import Events
+from service.health import Health
 from service.housekeeping import Housekeeping
 from service.observing import Gauges, Metrics
 from service.pool import Pool
 from service.reading import Reading
-from service.runner import Runner
-from service.schemas import HealthOut
+from service.runner import Known, Runner
 from service.settings import Settings
 from service.shortcut import Shortcut
-from service.tables import DiagnosisRow, RunRow
-from service.turns import EXPORTS_AT_ONCE, UPLOADS_AT_ONCE, Turns
+from service.shutdown import StopLimits
+from service.turns import (
+    ANSWERS_AT_ONCE,
+    BACKUPS_AT_ONCE,
+    BACKUPS_WAITING,
+    DOWNLOADS_AT_ONCE,
+    EXPORTS_AT_ONCE,
+    UPLOADS_AT_ONCE,
+    Place,
+    Turns,
+)
 from service.work import Work
+from workers.jobs import State
+from workers.watch import Standing
 
 LOG = logging.getLogger("wingfit")
-STOP_SECONDS = 3.0
+LOOK_SECONDS = 1.0
 
 MakeEvaluator = Callable[[], Evaluator]
 
@@ -55,6 +66,8 @@ class Service:
         self.engine: Engine = engine or ModelEngine()
         self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
         self.keys = KeyRing()
+        # Requests that are being answered: method, path, and when they came.
+        self.under_way: dict[int, tuple[str, str, float]] = {}
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
         self.reading = Reading(database)
@@ -62,6 +75,8 @@ class Service:
         self.events = Events(database, self.changes)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.exports = Turns("exports", EXPORTS_AT_ONCE)
+        self.downloads, self.answers = Turns("downloads", DOWNLOADS_AT_ONCE), Turns("answers", ANSWERS_AT_ONCE)
+        self.backups = Turns("backups", BACKUPS_AT_ONCE, BACKUPS_WAITING)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
@@ -69,6 +84,8 @@ class Service:
         self.runner = Runner(database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner)
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
+        self.health = Health(settings, database, self._pool, kinds)
+        self._metrics_text = threads.Shared("metrics", self.metrics.text)
 
     def start(self) -> None:
         """Take up what was left and start the evaluator."""
@@ -95,53 +112,79 @@ class Service:
         self._housekeeping.stop()
         self.changes.close()
 
-    def stop(self) -> bool:
-        """Stop within seconds, leaving jobs as stored; whether all threads ended."""
+    def stop(self, limits: StopLimits | None = None) -> bool:
+        """Stop within ``limits``, leaving jobs as stored; whether all threads ended. The log says what did not."""
+        limits = limits or StopLimits()
         self.begin_stop()
-        ended = self.runner.stop(STOP_SECONDS)
-        closed = self._pool.close()
-        self.database.close()
-        return ended and closed
+        # A job that waits for the database may hold the lock by which the runner knows its threads.
+        ended = threads.done_within(limits.jobs, "stop-jobs", lambda: self.runner.stop(limits.jobs))
+        for line in () if ended else self._jobs_under_way():
+            LOG.warning("given up after %g s: %s", limits.jobs, line)
+        if not (closed := self._pool.close(limits.evaluator)):
+            LOG.warning(
+                "given up: the evaluator does not stop within %g s; its workers end by themselves", limits.evaluator
+            )
+        if not (stored := self.database.close(limits.database)):
+            LOG.warning("given up: a write to the database does not end within %g s; it is undone", limits.database)
+        return ended and closed and stored
+
+    def unfinished(self) -> Iterator[str]:
+        """What is under way, in words: requests, jobs."""
+        for method, path, began in list(self.under_way.values()):
+            yield f"{method} {path}, since {time.monotonic() - began:.1f} s"
+        yield from self._jobs_under_way()
+
+    def _jobs_under_way(self) -> Iterator[str]:
+        for job in self.runner.under_way():
+            yield f"{job} is left as stored ({self._last_step(job)}) and goes on at the next start"
+
+    def _last_step(self, job: Known) -> str:
+        def stored() -> str:
+            with self.database.read() as session:
+                return f"after step {job.work.row(session, job.id).generations}"
+
+        try:
+            return threads.call("stop-look", stored).result(LOOK_SECONDS)
+        except Exception as error:  # the words are for the log, and the stop goes on
+            return f"its last step is unknown: {type(error).__name__}"
+
+    async def metrics_text(self) -> bytes:
+        """Counters and gauges in the text format of Prometheus; TimeoutError where they take too long."""
+        await self.health.look()
+        return await self._metrics_text.result(LOOK_SECONDS)
 
     def gauges(self) -> Gauges:
-        """Standing of the service as numbers, of all owners, whoever asks."""
-        with calling(None), self.database.read() as session:
-            jobs: dict[tuple[tuple[str, str], ...], float] = {
-                (("kind", work.what), ("state", state)): float(count)
-                for work in (self.calibrating, self.diagnosing)
-                for state, count in store.states(session, work.table)
-            }
+        """Standing of the service as numbers, of all owners, whoever asks; jobs as of the last look at them."""
+        jobs: dict[tuple[tuple[str, str], ...], float] = {
+            (("kind", kind), ("state", state.value)): float(counts.get(state, 0))
+            for kind, counts in (self.health.jobs or {}).items()
+            for state in State
+        }
         size = sum(path.stat().st_size for path in self.settings.data.glob(f"{FILE_NAME}*"))
+        workers, pace = self._pool.standing or Standing(0), self.runner.pace()
+        lost: dict[tuple[tuple[str, str], ...], float] = {
+            (("reason", "died"),): float(workers.died),
+            (("reason", "hung"),): float(workers.hung),
+        }
         return {
             "wingfit_jobs": ("Calibrations and diagnoses by state.", jobs),
+            "wingfit_database_up": ("Whether the database answers.", {(): float(self.health.jobs is not None)}),
             "wingfit_evaluator_up": ("Whether jobs are computed.", {(): float(self._pool.status == "ok")}),
-            "wingfit_workers": ("Workers of the evaluator.", {(): float(self._pool.workers or 0)}),
+            "wingfit_workers": ("Workers of the evaluator that live.", {(): float(workers.workers)}),
+            "wingfit_worker_deaths_total": ("Workers that died, or hung and were killed.", lost),
+            "wingfit_worker_restarts_total": ("Workers started in place of others.", {(): float(workers.restarts)}),
+            "wingfit_job_stalled_seconds": (
+                "Time since the last progress of the running job that has waited longest for one.",
+                {(): pace.stalled_s},
+            ),
+            "wingfit_queue_age_seconds": ("Time that the oldest waiting job has waited.", {(): pace.waited_s}),
+            "wingfit_disk_free_bytes": (
+                "Free space where the data folder is.",
+                {(): float(shutil.disk_usage(self.settings.data).free)},
+            ),
             "wingfit_watchers": ("Open event streams.", {(): float(self.changes.watchers)}),
             "wingfit_database_bytes": ("Size of the database and its log.", {(): float(size)}),
         }
-
-    def health(self) -> HealthOut:
-        """Standing of the service, of all owners, whoever asks."""
-        with calling(None), self.database.read() as session:
-            active, diagnoses = store.active(session, RunRow), store.active(session, DiagnosisRow)
-        return HealthOut(
-            status=self._pool.status,
-            version=wingfit_version(),
-            sqlite_version=sqlite3.sqlite_version,
-            evaluator=self.settings.evaluator,
-            workers=self._pool.workers,
-            runs_active=active,
-            diagnoses_active=diagnoses,
-            detail=self._pool.detail,
-        )
-
-
-def wingfit_version() -> str:
-    """Version of the installed package."""
-    try:
-        return version("wingfit")
-    except PackageNotFoundError:
-        return "0+uninstalled"
 
 
 def _maker(settings: Settings) -> MakeEvaluator:
@@ -160,14 +203,33 @@ async def _service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(_service)]
 
 
+async def _place() -> AsyncIterator[Place]:
+    place = Place()
+    try:
+        yield place
+    finally:
+        place.give_back()
+
+
+# Held until the answer is sent, or the client is gone.
+PlaceDep = Annotated[Place, Depends(_place)]
+
+
 def _in_turn(turns_of: Callable[[Service], Turns]) -> Any:
-    async def taken(service: ServiceDep) -> AsyncIterator[None]:
-        async with turns_of(service).turn():
-            yield
+    async def taken(service: ServiceDep, place: PlaceDep) -> None:
+        await place.take(turns_of(service))
 
     return Depends(taken)
 
 
-# Of a route that simulates, or reads an upload: it begins when its turn comes.
-IN_TURN = _in_turn(lambda service: service.turns)
+async def _simulating(service: ServiceDep, place: PlaceDep) -> AsyncIterator[None]:
+    async with service.turns.turn():
+        yield
+        # Before the turn is given back, so that few answers are in memory; who reads slowly then holds no such turn.
+        await place.take(service.answers)
+
+
+# Of a route that simulates, whose answer may be large, or that reads an upload: it begins when its turn comes.
+IN_TURN = Depends(_simulating, scope="function")
+IN_TURN_OF_DOWNLOADS = _in_turn(lambda service: service.downloads)
 IN_TURN_OF_UPLOADS = _in_turn(lambda service: service.uploads)

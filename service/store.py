@@ -6,6 +6,7 @@ import base64
 import binascii
 import json
 import secrets
+import sqlite3
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
@@ -123,6 +124,16 @@ def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
         session.merge(ParsedRow(dataset_id=dataset_id, body=body))
 
 
+def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
+    """``size`` bytes of the dataset's archive from ``start``, without reading the others; a 404 where it is gone."""
+    row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
+    if row is None:
+        raise not_found("dataset", dataset_id)
+    with connection.blobopen("archive", "body", row[0], readonly=True) as blob:
+        blob.seek(start)
+        return blob.read(size)
+
+
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
     """A 429 where the archives of an owner, with what is stored beside them, would take more than ``most_mb``."""
     held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
@@ -210,11 +221,6 @@ def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | Non
 # -- jobs of any kind ------------------------------------------------------------------------------------
 
 
-def active(session: Session, table: type[JobRow]) -> int:
-    """Number of jobs that have not ended."""
-    return session.scalar(select(func.count()).select_from(table).where(table.state.in_(ACTIVE))) or 0
-
-
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
     owner = dataset(session, dataset_id).owner
@@ -235,13 +241,6 @@ def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
     return table.owner.is_(None) if owner is None else table.owner == owner
-
-
-def states(session: Session, table: type[JobRow]) -> list[tuple[str, int]]:
-    """How many jobs are in which state."""
-    rows = session.execute(select(table.state, func.count()).group_by(table.state))
-    found: dict[str, int] = {row[0]: row[1] for row in rows}
-    return [(state.value, found.get(state.value, 0)) for state in State]
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:

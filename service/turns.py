@@ -13,6 +13,11 @@ AT_ONCE = 4
 UPLOADS_AT_ONCE = 2
 # Each simulates every recording, which may take an hour, and is made in memory.
 EXPORTS_AT_ONCE = 1
+# Large answers, until the client has taken them: those that are read, and those that are simulated, of which each may
+# take tens of megabytes of memory.
+DOWNLOADS_AT_ONCE = ANSWERS_AT_ONCE = 8
+# A copy of the whole database, on the disk until the client has taken it.
+BACKUPS_AT_ONCE, BACKUPS_WAITING = 1, 2
 MOST_WAITING = 64
 
 
@@ -47,3 +52,21 @@ class Turns:
     def give_back(self) -> None:
         """Let the next one in."""
         self._free.release()
+
+
+class Place:
+    """One turn of a request, taken when it is needed and given back at its end."""
+
+    def __init__(self) -> None:
+        self._turns: Turns | None = None
+
+    async def take(self, turns: Turns) -> None:
+        """Wait for a turn, once; a 503 where too many do."""
+        await turns.take()
+        self._turns = turns
+
+    def give_back(self) -> None:
+        """Let the next one in, if a turn was taken."""
+        if self._turns is not None:
+            self._turns.give_back()
+            self._turns = None

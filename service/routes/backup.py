@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import BinaryIO
+import os
+from collections.abc import AsyncIterator
+from typing import Annotated, BinaryIO
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Depends, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from service import http, store
 from service.backup import BackupError, snapshot
 from service.problems import ProblemError
-from service.state import ServiceDep
+from service.state import Service, ServiceDep
 
 router = APIRouter(prefix="/v1/backup", tags=["service"])
 MEDIA_TYPE = "application/vnd.sqlite3"
 PIECE = 2**20
+
+
+async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
+    """A copy of the database, one at a time, which goes with the request, however that ends."""
+    async with service.backups.turn():
+        if await request.is_disconnected():
+            raise ProblemError(503, "busy", "nobody waits for this backup any more")
+        opened = await run_in_threadpool(_opened, service)
+        try:
+            yield opened
+        finally:
+            opened.close()
 
 
 @router.get(
@@ -23,25 +37,28 @@ PIECE = 2**20
     response_class=StreamingResponse,
     responses={
         200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}},
-        **http.errors(507),
+        **http.errors(503, 507),
     },
     summary="Fetch a backup",
 )
-def backup(service: ServiceDep) -> StreamingResponse:
+async def backup(copy: Annotated[BinaryIO, Depends(_copy)]) -> StreamingResponse:
     """Return a checked copy of the database as it is now: datasets, runs, diagnoses and keys."""
+    name = f"wingfit-{store.now()[:19].replace(':', '')}Z.sqlite3"
+    headers = {"Content-Length": str(os.fstat(copy.fileno()).st_size), **http.attachment(name)}
+    return StreamingResponse(_pieces(copy), media_type=MEDIA_TYPE, headers=headers)
+
+
+def _opened(service: Service) -> BinaryIO:
     try:
         path = snapshot(service.settings.data)
     except BackupError as error:
         raise ProblemError(507, "no-backup", str(error)) from None
-    opened = path.open("rb")
-    size = path.stat().st_size
-    path.unlink()  # the open file lasts as long as the answer, however that ends
-    name = f"wingfit-{store.now()[:19].replace(':', '')}Z.sqlite3"
-    headers = {"Content-Length": str(size), **http.attachment(name)}
-    return StreamingResponse(_pieces(opened), media_type=MEDIA_TYPE, headers=headers)
+    try:
+        return path.open("rb")
+    finally:
+        path.unlink()  # the open file lasts as long as it is open
 
 
-def _pieces(opened: BinaryIO) -> Iterator[bytes]:
-    with opened:
-        while piece := opened.read(PIECE):
-            yield piece
+async def _pieces(opened: BinaryIO) -> AsyncIterator[bytes]:
+    while piece := await run_in_threadpool(opened.read, PIECE):
+        yield piece

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import AsyncIterator
 from pathlib import PurePath
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Request, UploadFile
 from sqlalchemy.orm import Session
-from starlette.responses import Response
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import Response, StreamingResponse
 
 from records import Dataset
 from service import http, store, views
 from service.access import owner_of_new
+from service.database import Database
 from service.datasets import Opened
 from service.guard import UPLOAD_LIMIT
 from service.problems import ProblemError, error_item, invalid
 from service.schemas import DatasetOut, Page
-from service.state import IN_TURN_OF_UPLOADS, Service, ServiceDep
+from service.state import IN_TURN_OF_DOWNLOADS, IN_TURN_OF_UPLOADS, Service, ServiceDep
 from service.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 MEDIA_TYPES = {".zip": "application/zip", ".nc": "application/x-netcdf"}
 OTHER_TYPE = "application/octet-stream"
+PIECE = 4 * 2**20
 ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
 
 
@@ -95,6 +99,7 @@ def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch 
         **http.errors(404),
     },
     summary="Fetch the archive",
+    dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the bytes that were uploaded."""
@@ -103,11 +108,23 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
         tag = f'"{row.sha256}"'
         if http.matches(if_none_match, tag):
             return Response(status_code=304, headers={"ETag": tag})
-        body = store.archive(session, dataset_id)
     suffix = PurePath(row.filename).suffix.lower()
     known = suffix in MEDIA_TYPES
-    headers = {"ETag": tag, **http.attachment(f"{dataset_id}{suffix if known else '.bin'}")}
-    return Response(body, media_type=MEDIA_TYPES.get(suffix, OTHER_TYPE), headers=headers)
+    size = {"Content-Length": str(row.size_bytes)}
+    headers = {"ETag": tag, **size, **http.attachment(f"{dataset_id}{suffix if known else '.bin'}")}
+    pieces = _pieces(service.database, dataset_id, row.size_bytes)
+    return StreamingResponse(pieces, media_type=MEDIA_TYPES.get(suffix, OTHER_TYPE), headers=headers)
+
+
+async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterator[bytes]:
+    """The archive, each piece a reading of its own: a long one would let the database's log grow."""
+
+    def piece(start: int) -> bytes:
+        with database.look() as connection:
+            return store.archive_piece(connection, dataset_id, start, min(PIECE, size - start))
+
+    for start in range(0, size, PIECE):
+        yield await run_in_threadpool(piece, start)
 
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")

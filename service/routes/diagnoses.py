@@ -15,7 +15,7 @@ from service.events import LastEventId, Told, Watched, described
 from service.problems import ProblemError, conflict, error_item, invalid
 from service.routes.runs import load
 from service.schemas import Page
-from service.state import Service, ServiceDep
+from service.state import IN_TURN_OF_DOWNLOADS, Service, ServiceDep
 from service.tables import DiagnosisRow, RunRow
 from workers import jobs
 
@@ -120,7 +120,11 @@ def cancel(service: ServiceDep, diagnosis_id: str) -> DiagnosisOut:
 
 
 @router.get(
-    "/{diagnosis_id}/finding", response_model=dict[str, Any], responses=http.errors(404, 409), summary="Finding"
+    "/{diagnosis_id}/finding",
+    response_model=dict[str, Any],
+    responses=http.errors(404, 409),
+    summary="Finding",
+    dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return what a diagnosis found; see /v1/schemas/finding."""
@@ -133,6 +137,7 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
     response_class=HTMLResponse,
     responses=http.errors(404, 409),
     summary="Report",
+    dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the report: one HTML file that needs nothing else."""

@@ -13,7 +13,7 @@ from starlette.responses import Response, StreamingResponse
 
 from service import csv_text, diagnosis_exports, genomes, http, netcdf, run_exports, run_netcdf
 from service.export_schemas import DiagnosisExportOut, Format, RunExportOut
-from service.state import Service, ServiceDep
+from service.state import IN_TURN_OF_DOWNLOADS, PlaceDep, Service, ServiceDep
 
 router = APIRouter(prefix="/v1", tags=["exports"])
 JSON = "application/json"
@@ -50,16 +50,19 @@ def _described(example: str) -> dict[str, Any]:
 async def export_run(
     request: Request,
     service: ServiceDep,
+    place: PlaceDep,
     run_id: str,
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
     """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
     if format != "netcdf":
+        await place.take(service.downloads)
         return await run_in_threadpool(_run, service, run_id, format)
     exported = await run_in_threadpool(run_exports.of, service, run_id)
     genome = await run_in_threadpool(genomes.standing, service, exported.row)
     async with service.exports.turn():
         body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
+        await place.take(service.answers)
     return Response(body, media_type=netcdf.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
 
 
@@ -89,6 +92,7 @@ def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A0
     response_model=DiagnosisExportOut,
     responses={200: _described(_RANKING), **http.errors(404, 409)},
     summary="Export a diagnosis",
+    dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def export_diagnosis(
     service: ServiceDep,

@@ -28,7 +28,7 @@ from service.schemas import (
     SimulationOut,
     WingIn,
 )
-from service.state import IN_TURN, Service, ServiceDep
+from service.state import IN_TURN, IN_TURN_OF_DOWNLOADS, Service, ServiceDep
 from service.tables import RunRow
 from sim.outputs import Outputs
 from workers.jobs import State
@@ -51,6 +51,7 @@ data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
     response_model=Page[HistoryItem],
     responses=http.errors(404),
     summary="Fetch the history",
+    dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def history(
     service: ServiceDep,

@@ -18,15 +18,15 @@ router = APIRouter(tags=["service"])
 
 
 @router.get("/v1/health", responses=http.errors(), summary="Health")
-def health(service: ServiceDep) -> HealthOut:
+async def health(service: ServiceDep) -> HealthOut:
     """Say whether the service is up, and whether it can compute."""
-    return service.health()
+    return await service.health.now()
 
 
 @router.get("/v1/ready", responses=http.errors(503), summary="Readiness")
-def ready(service: ServiceDep) -> HealthOut:
-    """Say whether jobs are computed: 200 once the evaluator is ready, else 503."""
-    health = service.health()
+async def ready(service: ServiceDep) -> HealthOut:
+    """Say whether jobs are computed: 200 once the evaluator is ready and the database answers, else 503."""
+    health = await service.health.now()
     if health.status != "ok":
         detail = health.detail or "the evaluator is starting; jobs are accepted, and wait"
         raise ProblemError(503, "not-ready", detail)
@@ -36,12 +36,15 @@ def ready(service: ServiceDep) -> HealthOut:
 @router.get(
     "/v1/metrics",
     response_class=PlainTextResponse,
-    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **http.errors()},
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **http.errors(503)},
     summary="Metrics",
 )
-def metrics(service: ServiceDep) -> PlainTextResponse:
+async def metrics(service: ServiceDep) -> PlainTextResponse:
     """Return counters and gauges for Prometheus."""
-    return PlainTextResponse(service.metrics.text(), media_type=CONTENT_TYPE_LATEST)
+    try:
+        return PlainTextResponse(await service.metrics_text(), media_type=CONTENT_TYPE_LATEST)
+    except TimeoutError:
+        raise ProblemError(503, "busy", "the metrics are not ready in time; try again in some seconds") from None
 
 
 @router.get("/v1/schemas/dataset", responses=http.errors(), summary="Schema of dataset.yaml")

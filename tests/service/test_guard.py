@@ -40,7 +40,34 @@ def test_a_page_of_another_site_changes_nothing(api: Api) -> None:
         assert api.client.post("/v1/runs", json=run, headers=headers).status_code == 403, headers
     assert api.get("/v1/runs")["items"] == []
     assert api.client.post("/v1/runs", json=run, headers={"Origin": own}).status_code == 202
-    assert api.client.get("/v1/runs", headers={"Origin": "https://evil.example"}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "https://evil.example"},
+        {"Origin": "null"},
+        {"Sec-Fetch-Site": "cross-site"},
+        {"Sec-Fetch-Site": "same-site"},  # another port of this machine
+    ],
+)
+def test_a_page_of_another_site_reads_nothing(api: Api, headers: dict[str, str]) -> None:
+    run = api.submit(api.upload()["id"])["id"]
+    api.finish(run)
+    for path in ("/v1/runs", f"/v1/runs/{run}", "/v1/backup", "/v1/health", f"/v1/runs/{run}/export?format=netcdf"):
+        for _ in range(2):  # also where the headers are known from before
+            answer = api.client.get(path, headers=headers)
+            assert (answer.status_code, answer.json()["type"]) == (403, "urn:wingfit:problem:origin"), path
+            assert api.client.get(path).status_code == 200
+            assert api.client.head(path, headers=headers).status_code == 403
+    for path in ("/", "/docs", "/icon.svg", "/openapi.json"):  # links lead to the page, which holds no data
+        assert api.client.get(path, headers=headers).status_code == 200, path
+
+
+def test_the_page_and_who_types_an_address_read(api: Api) -> None:
+    own = str(api.client.base_url).rstrip("/")
+    for headers in ({"Sec-Fetch-Site": "same-origin"}, {"Sec-Fetch-Site": "none"}, {"Origin": own}, {}):
+        assert api.client.get("/v1/runs", headers=headers).status_code == 200, headers
 
 
 def test_a_large_body_is_refused_where_no_file_is_expected(client: httpx.Client) -> None:

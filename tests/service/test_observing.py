@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import logging
+import re
+import time
 from pathlib import Path
 
 import httpx
 import pytest
+import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
 from service.app import create_app
 from service.observing import JsonFormatter
 from service.settings import Settings, SettingsError
 from tests.service import toy
-from tests.service.conftest import Api, serving
-from tests.service.processes import ServerProcess
+from tests.service.conftest import Api, Gate, serving
+from tests.service.processes import ROOT, ServerProcess
+from workers.watch import Standing
 
 Samples = dict[tuple[str, tuple[tuple[str, str], ...]], float]
 
@@ -71,6 +75,55 @@ def test_not_ready_until_jobs_are_computed(tmp_path: Path) -> None:
         answer = client.get("/v1/ready")
         assert (answer.status_code, answer.json()["type"]) == (503, "urn:wingfit:problem:not-ready")
         assert client.get("/v1/health").status_code == 200
+
+
+def test_not_ready_while_no_worker_lives(tmp_path: Path) -> None:
+    evaluator = toy.NoEvaluator()
+    app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=lambda: evaluator)
+    with serving(app) as client:
+        api = Api(client)
+        Api._until(lambda: api.get("/v1/health"), lambda health: health["status"] == "ok", 5.0)
+        evaluator.standing = Standing(0, 1, 2, 1)
+        answer = client.get("/v1/ready")
+        assert (answer.status_code, "there is no worker" in answer.json()["detail"]) == (503, True)
+        assert (api.get("/v1/health")["status"], api.get("/v1/health")["workers"]) == ("degraded", 0)
+        found = samples(client)
+        assert found["wingfit_workers", ()] == 0
+        assert found["wingfit_evaluator_up", ()] == 0
+        assert found["wingfit_worker_deaths_total", (("reason", "died"),)] == 1
+        assert found["wingfit_worker_deaths_total", (("reason", "hung"),)] == 2
+        assert found["wingfit_worker_restarts_total", ()] == 1
+
+
+def test_jobs_that_stand_still_and_a_line_that_does_not_move_are_seen(api: Api, gate: Gate) -> None:
+    dataset = api.upload()["id"]
+    runs = [api.submit(dataset)["id"] for _ in range(3)]  # two at a time
+    api.until(runs[0], lambda run: run["state"] == "RUNNING")
+    time.sleep(0.3)
+    found = samples(api.client)
+    assert 0.2 < found["wingfit_job_stalled_seconds", ()] < 20
+    assert 0.2 < found["wingfit_queue_age_seconds", ()] < 20
+    assert found["wingfit_disk_free_bytes", ()] > 0
+    gate.let(100)
+    for run in runs:
+        api.finish(run)
+    Api._until(
+        lambda: {"stalled": samples(api.client)["wingfit_job_stalled_seconds", ()]}, lambda s: not s["stalled"], 5
+    )
+    assert samples(api.client)["wingfit_queue_age_seconds", ()] == 0
+
+
+def test_the_example_alerts_are_about_metrics_that_exist(api: Api) -> None:
+    rules = yaml.safe_load((ROOT / "deploy/prometheus/alerts.yml").read_text())
+    (group,) = rules["groups"]
+    api.get("/v1/runs")  # a request is counted once it is answered
+    known = {name for name, _ in samples(api.client)} | {"up"}
+    for rule in group["rules"]:
+        named = set(re.findall(r"\bwingfit_\w+", rule["expr"])) | ({"up"} if "up{" in rule["expr"] else set())
+        assert named, rule["alert"]
+        assert named <= known, rule["alert"]
+        assert rule["annotations"]["summary"]
+        assert rule["labels"]["severity"] in ("page", "ticket")
 
 
 def test_ready(api: Api) -> None:

@@ -250,13 +250,19 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "simulations at once": turns.AT_ONCE,
         "uploads read at once": turns.UPLOADS_AT_ONCE,
         "exports as NetCDF at once": turns.EXPORTS_AT_ONCE,
+        "archives, exports, findings, reports, histories sent at once": turns.DOWNLOADS_AT_ONCE,
+        "answers that were simulated sent at once": turns.ANSWERS_AT_ONCE,
         "requests that wait for each of these": turns.MOST_WAITING,
+        "backups at once": turns.BACKUPS_AT_ONCE,
+        "requests that wait for a backup": turns.BACKUPS_WAITING,
+        "slowest client that is waited for": protocol.SLOWEST_BYTES_PER_SECOND // 2**10,
         "event streams": events.MOST_STREAMS,
         "jobs of an owner that have not ended": settings.Settings.max_active,
         "jobs computed at once": settings.Settings.max_runs,
         "MB of archives of an owner": settings.Settings.max_stored_mb,
     }
     assert {name: int(value.replace(",", "")) for name, value in rows.items()} == in_force
+    assert f"KiB/s, over {protocol.SLOW_SECONDS:g} s" in PAGE
     assert DiagnosisSpec().refits <= in_force["effects that a diagnosis refits"]
 
 

@@ -34,6 +34,7 @@ NOMINAL = {"stiffness": 1.0, "damping": 0.1}
 BOUNDS = {"stiffness": (0.1, 10.0), "damping": (0.01, 1.0)}
 STAGES = ("structural", "aerodynamic")
 UNLUCKY, DEADLY = 13, 666
+STUCK_SEED = 14  # of runs whose check hangs in `stuck_server`
 
 
 class NoEvaluator:
