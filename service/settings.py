@@ -4,16 +4,37 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal, get_args
+
+from records.errors import nearest
 
 LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 MOST_WORKERS = 256  # each takes some hundred megabytes
-YES = frozenset({"1", "true", "yes", "on"})
+PREFIX = "WINGFIT_"
+YES = ("1", "true", "yes", "y", "on")
+NO = ("0", "false", "no", "n", "off")
+# Variables of other parts of wingfit, which a server's environment may hold too: of the client, of Compose, of tests.
+OF_OTHERS = frozenset(
+    {
+        "WINGFIT_URL",
+        "WINGFIT_API_KEY",
+        "WINGFIT_CPUS_PER_WORKER",
+        "WINGFIT_FAIL_POINT",
+        "WINGFIT_TEST_NODE",
+        "WINGFIT_FUZZ_GOOD",
+    }
+)
+# Kubernetes sets these in every container for each Service whose name begins with "wingfit".
+OF_KUBERNETES = re.compile(
+    r"WINGFIT_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(PROTO|PORT|ADDR))?)=.*"
+    r"|WINGFIT_\w+_PORT=(tcp|udp|sctp)://.*"
+)
 
 
 class SettingsError(ValueError):
@@ -82,9 +103,13 @@ class Settings:
 
     @classmethod
     def from_env(cls, env: Mapping[str, str] | None = None) -> Settings:
-        """Settings from ``env`` (default: the environment of the process)."""
+        """Settings from ``env`` (default: the environment of the process); an empty value counts as unset.
+
+        Raises SettingsError for a value that cannot be, and for a ``WINGFIT_`` variable that nothing reads.
+        """
         given = os.environ if env is None else env
-        read = {key: value.strip() for key, value in given.items() if key.startswith("WINGFIT_") and value.strip()}
+        read = {key: value.strip() for key, value in given.items() if key.startswith(PREFIX) and value.strip()}
+        _refuse_unknown(read)
         extra = tuple(name.strip().lower() for name in read.get("WINGFIT_ALLOWED_HOSTS", "").split(",") if name.strip())
         return cls(
             data=Path(read.get("WINGFIT_DATA", "wingfit-data")).expanduser(),
@@ -126,8 +151,27 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def _refuse_unknown(read: Mapping[str, str]) -> None:
+    """SettingsError for names that nothing reads: a misspelt setting would be ignored in silence."""
+    known = {f"{PREFIX}{field.name.upper()}" for field in fields(Settings)} | OF_OTHERS
+    unknown = [
+        f"{name} ({nearest(name, sorted(known))})"
+        for name, value in sorted(read.items())
+        if name not in known and not OF_KUBERNETES.fullmatch(f"{name}={value}")
+    ]
+    if unknown:
+        raise SettingsError(
+            f"the environment has what is no setting of wingfit: {', '.join(unknown)}; correct or unset it"
+        )
+
+
 def _yes(read: Mapping[str, str], name: str) -> bool:
-    return read.get(name, "").lower() in YES
+    text = read.get(name)
+    if text is None or text.lower() in NO:
+        return False
+    if text.lower() in YES:
+        return True
+    raise SettingsError(f"{name} is {text!r}; it must be one of {', '.join(YES)} (yes) or {', '.join(NO)} (no)")
 
 
 def _some(read: Mapping[str, str], name: str) -> int | None:
@@ -141,7 +185,12 @@ def _integer(read: Mapping[str, str], name: str, default: int) -> int:
     try:
         return int(text)
     except ValueError:
-        raise SettingsError(f"{name} is {text!r}; it must be a whole number, for example {name}={default}") from None
+        remedy = ""
+        if "://" in text:
+            remedy = "; if Kubernetes set it for a Service of that name, set it yourself, or enableServiceLinks: false"
+        raise SettingsError(
+            f"{name} is {text!r}; it must be a whole number, for example {name}={default}{remedy}"
+        ) from None
 
 
 def _in_range(name: str, value: int, lower: int, upper: int) -> None:
