@@ -4,37 +4,19 @@ from __future__ import annotations
 
 import ipaddress
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal, get_args
 
-from records.errors import nearest
+from service import environment
 
 LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 MOST_WORKERS = 256  # each takes some hundred megabytes
-PREFIX = "WINGFIT_"
 YES = ("1", "true", "yes", "y", "on")
 NO = ("0", "false", "no", "n", "off")
-# Variables of other parts of wingfit, which a server's environment may hold too: of the client, of Compose, of tests.
-OF_OTHERS = frozenset(
-    {
-        "WINGFIT_URL",
-        "WINGFIT_API_KEY",
-        "WINGFIT_CPUS_PER_WORKER",
-        "WINGFIT_FAIL_POINT",
-        "WINGFIT_TEST_NODE",
-        "WINGFIT_FUZZ_GOOD",
-    }
-)
-# Kubernetes sets these in every container for each Service whose name begins with "wingfit".
-OF_KUBERNETES = re.compile(
-    r"WINGFIT_(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(PROTO|PORT|ADDR))?)=.*"
-    r"|WINGFIT_\w+_PORT=(tcp|udp|sctp)://.*"
-)
 
 
 class SettingsError(ValueError):
@@ -107,8 +89,7 @@ class Settings:
 
         Raises SettingsError for a value that cannot be, and for a ``WINGFIT_`` variable that nothing reads.
         """
-        given = os.environ if env is None else env
-        read = {key: value.strip() for key, value in given.items() if key.startswith(PREFIX) and value.strip()}
+        read = environment.given(os.environ if env is None else env)
         _refuse_unknown(read)
         extra = tuple(name.strip().lower() for name in read.get("WINGFIT_ALLOWED_HOSTS", "").split(",") if name.strip())
         return cls(
@@ -153,12 +134,8 @@ def is_loopback(host: str) -> bool:
 
 def _refuse_unknown(read: Mapping[str, str]) -> None:
     """SettingsError for names that nothing reads: a misspelt setting would be ignored in silence."""
-    known = {f"{PREFIX}{field.name.upper()}" for field in fields(Settings)} | OF_OTHERS
-    unknown = [
-        f"{name} ({nearest(name, sorted(known))})"
-        for name, value in sorted(read.items())
-        if name not in known and not OF_KUBERNETES.fullmatch(f"{name}={value}")
-    ]
+    names = [f"{environment.PREFIX}{field.name.upper()}" for field in fields(Settings)]
+    unknown = environment.unknown(read, names)
     if unknown:
         raise SettingsError(
             f"the environment has what is no setting of wingfit: {', '.join(unknown)}; correct or unset it"
