@@ -59,7 +59,7 @@ class Service:
         self.changes = Changes()
         self.reading = Reading(database)
         self.shortcut = Shortcut(self.reading, self.keys, self.metrics)
-        self.events = Events(database, self.changes)
+        self.events = Events(database, self.changes, self.keys)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.exports = Turns("exports", EXPORTS_AT_ONCE)
         self.datasets = Datasets(database, self.engine)
@@ -85,9 +85,10 @@ class Service:
         self.runner.enqueue(work, job_id, owner)
 
     def load_keys(self) -> None:
-        """Take the keys that are good now."""
+        """Take the keys that are good now; streams that were opened with another one end."""
         with self.database.read() as session:
             self.keys.load(session)
+        self.changes.wake_all()
 
     def begin_stop(self) -> None:
         """Let go of whoever watches, start nothing more. Safe in a signal handler."""
