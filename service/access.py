@@ -49,6 +49,8 @@ class Caller:
         return None if self.may("admin") else self.owner
 
 
+# Where the gate leaves the caller in the scope of a request, for the layers outside of it.
+CALLER_OF = "wingfit.caller"
 # None where no key is asked for, and in the threads that compute.
 CALLER: ContextVar[Caller | None] = ContextVar("caller", default=None)
 

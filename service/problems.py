@@ -126,7 +126,7 @@ async def _on_operational(request: Request, error: Exception) -> Response:
 
 
 def _without_room(request: Request, error: BaseException | None, detail: str) -> Response:
-    LOG.error("%s %a: %s", request.method, request.url.path, error)
+    LOG.error("%s %a: %s", request.method, request.scope["path"], error)
     return response(ProblemError(507, "disk-full", detail), {"Retry-After": "30"})
 
 
@@ -134,7 +134,7 @@ def of_a_mistake(request: Request, error: Exception) -> Response:
     """The answer to an error that nothing else answers: a full disk, or a mistake of ours, which the log describes."""
     if lack := disk_space.anywhere(error):
         return _without_room(request, error, lack)
-    LOG.error("%s %a failed", request.method, request.url.path, exc_info=error)
+    LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)
     return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
 
 
