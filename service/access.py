@@ -49,6 +49,8 @@ class Caller:
         return None if self.may("admin") else self.owner
 
 
+# Where the gate leaves the caller in the scope of a request, for the layers outside of it.
+CALLER_OF = "wingfit.caller"
 # None where no key is asked for, and in the threads that compute.
 CALLER: ContextVar[Caller | None] = ContextVar("caller", default=None)
 
@@ -93,16 +95,22 @@ class KeyRing:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._good: dict[str, Caller] = {}
+        self._ids: frozenset[str] = frozenset()
 
     def load(self, session: Session) -> None:
         """Read the keys that are good now; ``session`` has read nothing yet."""
         with self._lock:  # around the reading: what was read before a change must not be kept after it
             rows = session.scalars(select(KeyRow).where(KeyRow.revoked_at.is_(None)))
             self._good = {row.sha256: Caller(row.id, row.owner, frozenset(row.scopes)) for row in rows}
+            self._ids = frozenset(caller.key for caller in self._good.values())
 
     def caller(self, secret: str) -> Caller | None:
         """Whose key it is; None where it is no key, or one that was revoked."""
         return self._good.get(digest(secret))
+
+    def admits(self, caller: Caller | None) -> bool:
+        """Whether who was let in before still is: the key was not revoked, or none was asked for."""
+        return caller is None or caller.key in self._ids
 
     @property
     def edition(self) -> object:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -10,7 +11,8 @@ from pathlib import Path
 from tempfile import mkstemp
 from urllib.parse import quote
 
-from service.database import FILE_NAME, Database, DataFolderError, FolderLock
+from service.database import FILE_NAME, Database, DataFolderError, FolderLock, make_folder
+from service.permissions import FILE, open_new
 
 SUFFIX = ".backup"
 
@@ -28,6 +30,7 @@ def snapshot(folder: Path) -> Path:
         handle, name = mkstemp(SUFFIX, "copy-", folder)
     except OSError as error:
         raise BackupError(f"cannot write into {folder}: {error.strerror}") from error
+    os.fchmod(handle, FILE)  # whatever the umask
     os.close(handle)
     target = Path(name)
     try:
@@ -73,7 +76,7 @@ def restore(backup: Path, folder: Path) -> None:
     check(backup)
     target = folder / FILE_NAME
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         lock = FolderLock(folder)
     except DataFolderError as error:
         raise BackupError(str(error)) from None
@@ -95,11 +98,23 @@ def restore(backup: Path, folder: Path) -> None:
         raise BackupError(str(error)) from None
 
 
+def move(copy: Path, target: Path) -> None:
+    """Move ``copy`` to ``target``, also into another file system; only its owner can read it there either."""
+    try:
+        copy.replace(target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        _copied(copy, target)
+    finally:
+        copy.unlink(missing_ok=True)
+
+
 def _copied(backup: Path, target: Path) -> None:
     """Copy whole or not at all."""
     part = target.with_suffix(".part")
     try:
-        with backup.open("rb") as source, part.open("wb") as into:
+        with backup.open("rb") as source, open_new(part) as into:
             shutil.copyfileobj(source, into)
             into.flush()
             os.fsync(into.fileno())

@@ -18,7 +18,7 @@ class Changes:
 
     @contextmanager
     def watch(self, run_id: str) -> Iterator[asyncio.Event]:
-        """An event that is set at every change of the run, and once when the service stops."""
+        """An event that is set at every change of the run, at every change of keys, and when the service stops."""
         watcher = (asyncio.get_running_loop(), asyncio.Event())
         with self._lock:
             self._watchers.setdefault(run_id, set()).add(watcher)
@@ -46,6 +46,10 @@ class Changes:
     def close(self) -> None:
         """Let all watchers go, so that open streams do not hold up the end of the process."""
         self.closed = True
+        self.wake_all()
+
+    def wake_all(self) -> None:
+        """Something changed that concerns every watcher, whatever he watches."""
         with self._lock:
             watchers = [watcher for group in self._watchers.values() for watcher in group]
         _wake(watchers)

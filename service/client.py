@@ -50,8 +50,11 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Health, self._json("GET", "/v1/health"))
 
     def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
-        """Write a checked copy of everything on the server to ``path``, as :meth:`download` does."""
-        return self._file("/v1/backup", Path(path), "wingfit.sqlite3", on_bytes)
+        """Write a checked copy of everything on the server to ``path``, as :meth:`download` does.
+
+        Only its owner can read the file.
+        """
+        return self._file("/v1/backup", Path(path), "wingfit.sqlite3", on_bytes, private=True)
 
     # -- datasets ------------------------------------------------------------
 

@@ -26,7 +26,7 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool, StaticPool
 
-from service import fail_points
+from service import fail_points, permissions
 from service.access import OwnSession
 
 FILE_NAME = "wingfit.sqlite3"
@@ -64,7 +64,14 @@ class FolderLock:
         self.path = (folder / LOCK_NAME).resolve()
         if self.path in self._held:
             raise DataFolderError(f"this process already serves the data folder {folder}")
-        self._file: IO[str] = self.path.open("a+", encoding="ascii")
+        try:
+            permissions.make_file(self.path)
+            self._file: IO[str] = self.path.open("a+", encoding="ascii")
+        except OSError as error:
+            raise DataFolderError(
+                f"cannot write into the data folder {folder}: {error.strerror}; set WINGFIT_DATA to one that you can "
+                "write into"
+            ) from None
         try:
             fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -90,9 +97,12 @@ class Database:
     """Sessions that read and the one that writes."""
 
     def __init__(self, folder: Path) -> None:
-        """Lock ``folder`` (created if missing), bring its database to the newest schema and open it."""
+        """Lock ``folder`` (created if missing), bring its database to the newest schema and open it.
+
+        Only the user who runs the process can read either.
+        """
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
         except OSError as error:
             raise DataFolderError(
                 f"cannot create the data folder {folder}: {error.strerror}; set WINGFIT_DATA"
@@ -102,6 +112,7 @@ class Database:
         self._closed = self._released = False
         path = (folder / FILE_NAME).resolve()
         try:
+            _close_to_others(path)
             self._writer = _writer(path)
             migrate(self._writer)
         except Exception as error:
@@ -178,6 +189,19 @@ class Database:
         finally:
             self._guard.release()
         return True
+
+
+def make_folder(folder: Path) -> None:
+    """Create a data folder, or close one to other users."""
+    permissions.make_folder(folder, FILE_NAME, LOCK_NAME)
+
+
+def _close_to_others(path: Path) -> None:
+    """Let only the owner read the database at ``path`` (created if missing) and its log."""
+    permissions.make_file(path)
+    for name in (f"{path}-wal", f"{path}-shm"):  # new ones get the rights of the database
+        with suppress(FileNotFoundError):
+            permissions.tighten(Path(name))
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:

@@ -14,6 +14,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
 from service import store, views
+from service.access import CALLER, Caller, KeyRing
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError
 from service.diagnosis_schemas import DiagnosisOut, StepEvent
@@ -71,8 +72,8 @@ class Seen:
 class Events:
     """The event streams of one service. Who waits for the same event shares the look at it."""
 
-    def __init__(self, database: Database, changes: Changes) -> None:
-        self._database, self._changes = database, changes
+    def __init__(self, database: Database, changes: Changes, keys: KeyRing) -> None:
+        self._database, self._changes, self._keys = database, changes, keys
         self._looks: dict[tuple[str, int, int], asyncio.Future[Seen | None]] = {}
 
     def answer(self, watched: Watched, last_event_id: str | None) -> StreamingResponse:
@@ -86,16 +87,17 @@ class Events:
                 503, "busy", f"{opened} event streams are open, the most that may; try again in some seconds"
             )
         headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
-        return StreamingResponse(self._stream(watched, int(text)), headers=headers, media_type=MEDIA_TYPE)
+        stream = self._stream(watched, int(text), CALLER.get())
+        return StreamingResponse(stream, headers=headers, media_type=MEDIA_TYPE)
 
-    async def _stream(self, watched: Watched, after: int) -> AsyncIterator[bytes]:
-        """Events after sequence ``after``, until the final state is sent or the service stops."""
+    async def _stream(self, watched: Watched, after: int, caller: Caller | None = None) -> AsyncIterator[bytes]:
+        """Events after sequence ``after``, until the final state is sent, the key is revoked or the service stops."""
         sent: tuple[object, ...] | None = None
         with self._changes.watch(watched.id) as changed:
             while True:
                 changed.clear()
                 seen = await self._seen(watched, after)
-                if seen is None:
+                if seen is None or not self._keys.admits(caller):
                     return
                 after, news = seen.after, seen.steps
                 if seen.complete and sent != seen.standing:

@@ -10,7 +10,7 @@ from http.cookies import CookieError, SimpleCookie
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.access import Caller, KeyRing, calling
+from service.access import CALLER_OF, Caller, KeyRing, calling
 from service.access import Scope as KeyScope
 from service.problems import ProblemError, response
 
@@ -33,6 +33,7 @@ class Gate:
             await self.app(scope, receive, send)
             return
         caller = _caller(Headers(scope=scope), scope["app"].state.service.keys)
+        scope[CALLER_OF] = caller
         refusal = _refusal(scope, caller)
         if refusal:
             challenge = {"WWW-Authenticate": "Bearer"} if refusal.status == 401 else {}

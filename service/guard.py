@@ -20,6 +20,8 @@ UPLOAD_LIMIT = 64 * 2**20
 # Boundaries and headers of the multipart form around a file of the largest size.
 FORM_SLACK = 64 * 2**10
 BODY_LIMIT = 2**20
+# Load balancers and Kubernetes probe by address; no answer has anything that was uploaded or computed.
+PROBES = frozenset({"/v1/health", "/v1/ready", "/v1/metrics"})
 CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
 SECURITY_HEADERS = {
@@ -60,7 +62,7 @@ class Guard:
     def _refusal(self, scope: Scope) -> ProblemError | None:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if _name(host) not in self.allowed_hosts:
+        if _name(host) not in self.allowed_hosts and not _is_probe(scope):
             return ProblemError(
                 400,
                 "host",
@@ -78,6 +80,10 @@ class Guard:
         if length.isdecimal() and int(length) > _limit(scope):
             return _too_large(_limit(scope))
         return None
+
+
+def _is_probe(scope: Scope) -> bool:
+    return scope["path"] in PROBES and scope["method"] in ("GET", "HEAD")
 
 
 def _name(host: str) -> str:

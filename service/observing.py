@@ -21,7 +21,7 @@ from prometheus_client.registry import Collector
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service import fail_points
+from service import audit, fail_points
 from service.settings import LogFormat
 
 LOG = logging.getLogger("wingfit.access")
@@ -123,6 +123,7 @@ class Observer:
             await self.app(scope, receive, noted)
         finally:
             _count(scope, status, time.perf_counter() - began)
+            audit.record(scope, status, request)
             REQUEST.reset(token)
 
 

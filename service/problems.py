@@ -16,6 +16,7 @@ from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
+from service import disk_space
 from service.database import DatabaseClosedError, is_full
 
 MEDIA_TYPE = "application/problem+json"
@@ -103,8 +104,10 @@ async def _on_problem(_: Request, error: Exception) -> Response:
     return response(error)
 
 
-async def _on_http(_: Request, error: Exception) -> Response:
+async def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101
+    if lack := disk_space.while_spooling(error.__cause__):
+        return _without_room(request, error.__cause__, lack)
     kind = KINDS.get(error.status_code) or HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
     return response(ProblemError(error.status_code, kind, str(error.detail)), error.headers)
 
@@ -121,14 +124,20 @@ async def _on_closed(_: Request, error: Exception) -> Response:
 async def _on_operational(request: Request, error: Exception) -> Response:
     if not is_full(error):
         return of_a_mistake(request, error)
-    LOG.error("%s %s: %s", request.method, request.url.path, error)
     detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
+    return _without_room(request, error, detail)
+
+
+def _without_room(request: Request, error: BaseException | None, detail: str) -> Response:
+    LOG.error("%s %a: %s", request.method, request.scope["path"], error)
     return response(ProblemError(507, "disk-full", detail))
 
 
 def of_a_mistake(request: Request, error: Exception) -> Response:
-    """The answer to an error that nobody foresaw; the log has what it was."""
-    LOG.error("%s %s failed", request.method, request.url.path, exc_info=error)
+    """The answer to an error that nothing else answers: a full disk, or a mistake of ours, which the log describes."""
+    if lack := disk_space.anywhere(error):
+        return _without_room(request, error, lack)
+    LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)
     return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
 
 

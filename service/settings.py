@@ -5,15 +5,18 @@ from __future__ import annotations
 import ipaddress
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Literal, get_args
+
+from service import environment
 
 LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 MOST_WORKERS = 256  # each takes some hundred megabytes
-YES = frozenset({"1", "true", "yes", "on"})
+YES = ("1", "true", "yes", "y", "on")
+NO = ("0", "false", "no", "n", "off")
 
 
 class SettingsError(ValueError):
@@ -33,6 +36,8 @@ class Settings:
         ray_address: address of a standing Ray cluster (``WINGFIT_RAY_ADDRESS``); None starts one of our own.
         max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
         max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
+        max_starts: starts without progress after which a job is given up, where each ended with the server
+            (``WINGFIT_MAX_STARTS``).
         max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
         max_stored_mb: MB of archives of one owner (``WINGFIT_MAX_STORED_MB``).
         keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
@@ -50,6 +55,7 @@ class Settings:
     ray_address: str | None = None
     max_runs: int = 2
     max_runs_per_owner: int | None = None
+    max_starts: int = 3
     max_active: int = 200
     max_stored_mb: int = 10_000
     keep_days: int | None = None
@@ -61,6 +67,7 @@ class Settings:
     def __post_init__(self) -> None:
         _in_range("WINGFIT_PORT", self.port, 0, 65535)
         _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
+        _in_range("WINGFIT_MAX_STARTS", self.max_starts, 1, 1_000_000)
         _in_range("WINGFIT_MAX_ACTIVE", self.max_active, 1, 100_000)
         _in_range("WINGFIT_MAX_STORED_MB", self.max_stored_mb, 1, 10**9)
         if self.max_runs_per_owner is not None:
@@ -82,9 +89,12 @@ class Settings:
 
     @classmethod
     def from_env(cls, env: Mapping[str, str] | None = None) -> Settings:
-        """Settings from ``env`` (default: the environment of the process)."""
-        given = os.environ if env is None else env
-        read = {key: value.strip() for key, value in given.items() if key.startswith("WINGFIT_") and value.strip()}
+        """Settings from ``env`` (default: the environment of the process); an empty value counts as unset.
+
+        Raises SettingsError for a value that cannot be, and for a ``WINGFIT_`` variable that nothing reads.
+        """
+        read = environment.given(os.environ if env is None else env)
+        _refuse_unknown(read)
         extra = tuple(name.strip().lower() for name in read.get("WINGFIT_ALLOWED_HOSTS", "").split(",") if name.strip())
         return cls(
             data=Path(read.get("WINGFIT_DATA", "wingfit-data")).expanduser(),
@@ -95,6 +105,7 @@ class Settings:
             ray_address=read.get("WINGFIT_RAY_ADDRESS"),
             max_runs=_integer(read, "WINGFIT_MAX_RUNS", cls.max_runs),
             max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
+            max_starts=_integer(read, "WINGFIT_MAX_STARTS", cls.max_starts),
             max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
             max_stored_mb=_integer(read, "WINGFIT_MAX_STORED_MB", cls.max_stored_mb),
             keep_days=_some(read, "WINGFIT_KEEP_DAYS"),
@@ -126,8 +137,23 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def _refuse_unknown(read: Mapping[str, str]) -> None:
+    """SettingsError for names that nothing reads: a misspelt setting would be ignored in silence."""
+    names = [f"{environment.PREFIX}{field.name.upper()}" for field in fields(Settings)]
+    unknown = environment.unknown(read, names)
+    if unknown:
+        raise SettingsError(
+            f"the environment has what is no setting of wingfit: {', '.join(unknown)}; correct or unset it"
+        )
+
+
 def _yes(read: Mapping[str, str], name: str) -> bool:
-    return read.get(name, "").lower() in YES
+    text = read.get(name)
+    if text is None or text.lower() in NO:
+        return False
+    if text.lower() in YES:
+        return True
+    raise SettingsError(f"{name} is {text!r}; it must be one of {', '.join(YES)} (yes) or {', '.join(NO)} (no)")
 
 
 def _some(read: Mapping[str, str], name: str) -> int | None:
@@ -141,7 +167,12 @@ def _integer(read: Mapping[str, str], name: str, default: int) -> int:
     try:
         return int(text)
     except ValueError:
-        raise SettingsError(f"{name} is {text!r}; it must be a whole number, for example {name}={default}") from None
+        remedy = ""
+        if "://" in text:
+            remedy = "; if Kubernetes set it for a Service of that name, set it yourself, or enableServiceLinks: false"
+        raise SettingsError(
+            f"{name} is {text!r}; it must be a whole number, for example {name}={default}{remedy}"
+        ) from None
 
 
 def _in_range(name: str, value: int, lower: int, upper: int) -> None:

@@ -72,7 +72,7 @@ class Service:
         self.changes = Changes()
         self.reading = Reading(database)
         self.shortcut = Shortcut(self.reading, self.keys, self.metrics)
-        self.events = Events(database, self.changes)
+        self.events = Events(database, self.changes, self.keys)
         self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
         self.exports = Turns("exports", EXPORTS_AT_ONCE)
         self.downloads, self.answers = Turns("downloads", DOWNLOADS_AT_ONCE), Turns("answers", ANSWERS_AT_ONCE)
@@ -81,7 +81,9 @@ class Service:
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
         kinds = (self.calibrating, self.diagnosing)
-        self.runner = Runner(database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner)
+        self.runner = Runner(
+            database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner, settings.max_starts
+        )
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
         self.health = Health(settings, database, self._pool, kinds)
@@ -102,9 +104,10 @@ class Service:
         self.runner.enqueue(work, job_id, owner)
 
     def load_keys(self) -> None:
-        """Take the keys that are good now."""
+        """Take the keys that are good now; streams that were opened with another one end."""
         with self.database.read() as session:
             self.keys.load(session)
+        self.changes.wake_all()
 
     def begin_stop(self) -> None:
         """Let go of whoever watches, start nothing more. Safe in a signal handler."""

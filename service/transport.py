@@ -18,6 +18,7 @@ from urllib.parse import quote
 import httpx
 
 from service import answers as a
+from service.permissions import open_new
 
 DEFAULT_URL = "http://127.0.0.1:8321"
 KEY_VARIABLE = "WINGFIT_API_KEY"
@@ -168,14 +169,19 @@ class Transport:
         finally:
             context.__exit__(None, None, None)
 
-    def _file(self, path: str, target: Path, name: str, on_bytes: OnBytes | None, **options: Any) -> Path:
-        """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it."""
+    def _file(
+        self, path: str, target: Path, name: str, on_bytes: OnBytes | None, *, private: bool = False, **options: Any
+    ) -> Path:
+        """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it.
+
+        Other users cannot read a ``private`` file.
+        """
         with self._stream("GET", path, **options) as response:
             if target.is_dir():
                 target = target / _attachment_name(response, name)
             partial = target.with_name(target.name + ".part")
             try:
-                with partial.open("wb") as stream:
+                with open_new(partial) if private else partial.open("wb") as stream:
                     for block in response.iter_bytes():
                         stream.write(block)
                         if on_bytes:

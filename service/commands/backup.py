@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 from typing import Annotated
 
@@ -63,7 +62,7 @@ def restore(
 
 def _copy_of(data: Path, file: Path) -> None:
     """Copy the database in the folder of a server that is not running."""
-    from service.backup import BackupError, snapshot
+    from service.backup import BackupError, move, snapshot
     from service.database import FILE_NAME, DataFolderError, FolderLock
 
     if not (data / FILE_NAME).is_file():
@@ -73,6 +72,6 @@ def _copy_of(data: Path, file: Path) -> None:
     except DataFolderError as error:
         raise BackupError(f"{error}; or ask that server: leave --data out") from None
     try:
-        shutil.move(snapshot(data), file)
+        move(snapshot(data), file)
     finally:
         lock.release()

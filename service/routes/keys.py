@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from service import http, keys
-from service.access import CALLER
+from service.access import CALLER, CALLER_OF
 from service.gate import COOKIE
 from service.key_schemas import KeyIn, KeyOut, KeysOut, NewKeyOut, SessionIn, SessionOut
 from service.problems import ProblemError
@@ -53,6 +53,7 @@ def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
     caller = service.keys.caller(body.key)
     if caller is None:
         raise ProblemError(401, "key", "this is not a key of this server, or one that was revoked")
+    request.scope[CALLER_OF] = caller
     answer = JSONResponse(SessionOut.of(caller, required=service.settings.keys).model_dump())
     secure = request.url.scheme == "https"
     answer.set_cookie(COOKIE, body.key, COOKIE_SECONDS, httponly=True, samesite="strict", secure=secure)

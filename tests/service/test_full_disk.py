@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
 
 import httpx
 import pytest
@@ -74,3 +79,73 @@ def test_a_run_waits_for_room_and_ends_as_if_undisturbed(app: FastAPI, api: Api,
         assert stalled["generations"] < 60
     assert api.finish(run)["state"] == "SUCCEEDED"
     assert numbers(api, run) == numbers(api, expected)
+
+
+LARGE = b"x" * (3 * 2**20)  # more than the framework keeps in memory
+
+
+def post(client: httpx.Client) -> httpx.Response:
+    return client.post("/v1/datasets", files={"file": ("large.zip", LARGE)})
+
+
+def full_file(*_: object, **__: object) -> BinaryIO:
+    return Path("/dev/full").open("r+b", buffering=0)  # every write to it fails as on a full disk
+
+
+def test_a_full_folder_for_temporary_files_is_told_in_words(
+    client: httpx.Client, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, "TemporaryFile", full_file)
+        answer = post(client)
+    assert (answer.status_code, answer.json()["type"]) == (507, "urn:wingfit:problem:disk-full")
+    assert answer.headers["Retry-After"] == "30"
+    detail = answer.json()["detail"]
+    assert f"the folder for temporary files of the server, {tempfile.gettempdir()}, is full" in detail
+    assert "No space left on device" in detail
+    assert "make room there, or set TMPDIR" in detail
+    assert "No space left on device" in caplog.text
+    assert post(client).status_code == 422  # it is no archive
+    assert client.post("/v1/datasets", content=b"no form").status_code == 422
+
+
+@pytest.mark.parametrize("gone", ["none", "removed"])
+def test_no_folder_for_temporary_files_is_told_in_words(
+    client: httpx.Client, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, gone: str
+) -> None:
+    with monkeypatch.context() as patch:
+        if gone == "none":
+            patch.setattr(tempfile, "tempdir", None)
+            patch.setattr(tempfile, "_candidate_tempdir_list", lambda: ["/proc/1/none"])
+        else:
+            patch.setattr(tempfile, "tempdir", str(tmp_path / "removed"))
+        answer = post(client)
+    assert (answer.status_code, answer.json()["type"]) == (507, "urn:wingfit:problem:disk-full")
+    detail = answer.json()["detail"]
+    assert "no folder for temporary files that it can use" in detail
+    assert ("/proc/1/none" if gone == "none" else str(tmp_path / "removed")) in detail
+    assert "set TMPDIR" in detail
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_anywhere_in_a_request_is_told_in_words(
+    app: FastAPI, api: Api, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, number: int
+) -> None:
+    def fails(*_: object) -> None:
+        raise OSError(number, os.strerror(number), str(tmp_path / "scratch" / "file"))
+
+    monkeypatch.setattr(app.state.service.engine, "load", fails)
+    answer = api.client.post("/v1/datasets", files={"file": ("toy.zip", toy.archive())})
+    assert (answer.status_code, answer.json()["type"]) == (507, "urn:wingfit:problem:disk-full")
+    assert f"({os.strerror(number)}), at {tmp_path / 'scratch'}: make room there" in answer.json()["detail"]
+    assert answer.headers["X-Frame-Options"] == "DENY"
+
+
+def test_other_errors_of_the_system_are_mistakes(app: FastAPI, api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> None:
+        raise FileNotFoundError(errno.ENOENT, "No such file or directory", "/some/secret")
+
+    monkeypatch.setattr(app.state.service.engine, "load", fails)
+    answer = api.client.post("/v1/datasets", files={"file": ("toy.zip", toy.archive())})
+    assert answer.status_code == 500
+    assert "secret" not in answer.text

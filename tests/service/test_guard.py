@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import time
 from pathlib import Path
 
 import httpx
@@ -19,13 +20,35 @@ def test_loopback_names_are_served(client: httpx.Client, host: str, status: int)
     assert client.get("/v1/health", headers={"Host": host}).status_code == status
 
 
-@pytest.mark.parametrize(
-    "host", ["evil.example", "evil.example:8321", "127.0.0.1.evil.example", "[", "192.168.0.1", ""]
-)
+OTHER_HOSTS = ["evil.example", "evil.example:8321", "127.0.0.1.evil.example", "[", "192.168.0.1", ""]
+
+
+@pytest.mark.parametrize("host", OTHER_HOSTS)
 def test_other_names_are_not(client: httpx.Client, host: str) -> None:
-    answer = client.get("/v1/health", headers={"Host": host})
-    assert (answer.status_code, answer.headers["Content-Type"]) == (400, "application/problem+json")
-    assert "WINGFIT_ALLOWED_HOSTS" in answer.json()["detail"]
+    for path in ("/v1/runs", "/", "/openapi.json", "/v1/session", "/v1/healthy", "/v1/health/", "/v1/metrics/x"):
+        answer = client.get(path, headers={"Host": host})
+        assert (answer.status_code, answer.headers["Content-Type"]) == (400, "application/problem+json"), path
+        assert "WINGFIT_ALLOWED_HOSTS" in answer.json()["detail"]
+    for path in ("/v1/health", "/v1/runs"):
+        assert client.post(path, headers={"Host": host}).json()["type"] == "urn:wingfit:problem:host"
+
+
+@pytest.mark.parametrize("host", OTHER_HOSTS)
+def test_probes_are_answered_by_any_name(client: httpx.Client, host: str) -> None:
+    while client.get("/v1/ready").status_code != 200:
+        time.sleep(0.01)
+    for path in ("/v1/health", "/v1/ready", "/v1/metrics"):
+        for method in ("GET", "HEAD"):
+            answer = client.request(method, path, headers={"Host": host})
+            assert answer.status_code == 200, path
+            assert answer.headers["X-Frame-Options"] == "DENY"
+
+
+def test_a_probe_without_a_host_is_answered(client: httpx.Client) -> None:
+    """As some load balancers send it."""
+    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=10.0) as plain:
+        plain.sendall(b"GET /v1/health HTTP/1.0\r\n\r\n")
+        assert plain.recv(1000).split(b"\r\n")[0] == b"HTTP/1.1 200 OK"
 
 
 def test_a_page_of_another_site_changes_nothing(api: Api) -> None:

@@ -79,6 +79,14 @@ def test_every_path_of_the_api_asks_for_a_key(client: httpx.Client) -> None:
     assert asked > 30
 
 
+def test_metrics_need_a_key_by_whatever_name_they_are_asked_for(client: httpx.Client, secrets: dict[str, str]) -> None:
+    by_address = {"Host": "10.0.0.7"}
+    assert client.get("/v1/metrics", headers=by_address).status_code == 401
+    assert client.get("/v1/metrics", headers=by_address | bearer(secrets["ann-reads"])).status_code == 200
+    assert client.get("/v1/runs", headers=by_address | bearer(secrets["ann-reads"])).status_code == 400
+    assert client.get("/v1/health", headers=by_address).status_code == 200
+
+
 def test_a_key_is_good_for_its_scopes_only(as_: As) -> None:
     dataset = as_("ann").upload()["id"]
     reader, writer = as_("ann-reads").client, as_("ann").client

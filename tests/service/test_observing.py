@@ -43,7 +43,7 @@ def test_metrics_count_what_happened(api: Api) -> None:
         api.run(run)
     api.client.get("/v1/runs/run_none")
     api.client.get("/v1/made-up-by-a-caller")
-    api.client.get("/v1/health", headers={"Host": "evil.example"})
+    api.client.get("/v1/session", headers={"Host": "evil.example"})
     found = samples(api.client)
     assert requests(found, "/v1/runs/{run_id}", 200) >= 4
     assert requests(found, "/v1/runs/{run_id}", 404) == 1

@@ -14,6 +14,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from service import quick, reading, store, views
+from service.access import KeyRing
 from service.changes import Changes
 from service.database import Database
 from service.events import Events, Told, Watched
@@ -170,7 +171,7 @@ def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
 
 def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Path) -> None:
     database, changes = Database(tmp_path), Changes()
-    events, looks = Events(database, changes), []
+    events, looks = Events(database, changes, KeyRing()), []
     states = ["QUEUED", "RUNNING", "SUCCEEDED"]
 
     def look(_session: Session, after: int, _limit: int) -> Told:
@@ -200,7 +201,7 @@ def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Pa
 
 def test_a_look_that_fails_is_done_anew(tmp_path: Path) -> None:
     database = Database(tmp_path)
-    events, looks = Events(database, Changes()), []
+    events, looks = Events(database, Changes(), KeyRing()), []
 
     def look(_session: Session, after: int, _limit: int) -> Told:
         looks.append(after)

@@ -1,0 +1,55 @@
+"""Errors of the operating system that mean: no room to write; in words, with the folder and the remedy."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from pathlib import Path
+
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+# Of a folder in which no file can be made.
+UNUSABLE = frozenset({errno.ENOENT, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS})
+REMEDY = "make room there, or set TMPDIR to a folder with room and restart the server; then repeat the request"
+
+
+def while_spooling(error: BaseException | None) -> str | None:
+    """What to say about an error of reading a request, whose large parts the framework puts into temporary files.
+
+    None where the error is another one.
+    """
+    if not isinstance(error, OSError):
+        return None
+    if error.errno in FULL:
+        return f"the folder for temporary files of the server, {_temporary()}, is full ({error.strerror}): {REMEDY}"
+    if error.errno in UNUSABLE:
+        return f"the server has no folder for temporary files that it can use ({_in_words(error)}): {REMEDY}"
+    return None
+
+
+def anywhere(error: BaseException) -> str | None:
+    """What to say about an error from anywhere in a request; None where it is no lack of room."""
+    if not isinstance(error, OSError):
+        return None
+    if _is_without_folder(error):
+        return while_spooling(error)
+    if error.errno not in FULL:
+        return None
+    place = Path(os.fsdecode(error.filename)).parent if isinstance(error.filename, str | bytes) else _temporary()
+    return f"the disk of the server is full ({error.strerror}), at {place}: {REMEDY}"
+
+
+def _is_without_folder(error: OSError) -> bool:
+    return isinstance(error, FileNotFoundError) and "temporary directory" in str(error.strerror)
+
+
+def _in_words(error: OSError) -> str:
+    place = f", {os.fsdecode(error.filename)}" if isinstance(error.filename, str | bytes) else ""
+    return f"{error.strerror}{place}"
+
+
+def _temporary() -> str:
+    try:
+        return tempfile.gettempdir()
+    except FileNotFoundError as error:
+        return str(error.strerror)

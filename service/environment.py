@@ -1,0 +1,34 @@
+"""Names of environment variables that begin with ``WINGFIT_``: which of them nothing reads."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+
+from records.errors import nearest
+
+PREFIX = "WINGFIT_"
+# Variables that other parts of wingfit read (the client, Compose, tests) and a server's environment may hold too.
+OF_OTHERS = frozenset(
+    f"{PREFIX}{name}" for name in ("URL", "API_KEY", "CPUS_PER_WORKER", "FAIL_POINT", "TEST_NODE", "FUZZ_GOOD")
+)
+# Kubernetes sets these in every container for each Service whose name begins with "wingfit".
+OF_KUBERNETES = re.compile(
+    rf"{PREFIX}(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(PROTO|PORT|ADDR))?)=.*"
+    rf"|{PREFIX}\w+_PORT=(tcp|udp|sctp)://.*"
+)
+
+
+def given(environment: Mapping[str, str]) -> dict[str, str]:
+    """The variables that begin with ``WINGFIT_``, stripped; an empty one counts as unset."""
+    return {key: value.strip() for key, value in environment.items() if key.startswith(PREFIX) and value.strip()}
+
+
+def unknown(read: Mapping[str, str], settings: Iterable[str]) -> list[str]:
+    """The names in ``read`` that nothing reads, each with the nearest known one; ``settings`` are those of a server."""
+    known = {*settings, *OF_OTHERS}
+    return [
+        f"{name} ({nearest(name, sorted(known))})"
+        for name, value in sorted(read.items())
+        if name not in known and not OF_KUBERNETES.fullmatch(f"{name}={value}")
+    ]
