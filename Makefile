@@ -15,8 +15,6 @@ proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a 
 serve: $(INSTALLED)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-# Libraries of linear algebra would start as many threads as there are cores in each of the two.
-test: export OMP_NUM_THREADS = 1
 test: $(INSTALLED)  ## every check and every test, two at a time
 	@$(MAKE) --no-print-directory -k -j2 test-rest test-service check
 

@@ -10,12 +10,8 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 from dataclasses import asdict, dataclass, replace
 from typing import Any
-
-if __name__ == "__main__":  # before numpy reads it: on matrices this small, threads take ten times as long
-    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1", MKL_NUM_THREADS="1")
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +21,7 @@ from benchmarks.beam_theory import Beam, Family, elastica, reference, torsion_co
 from benchmarks.machine import commit, cpu
 from benchmarks.spring_chain import cut_beam, genome, spring_chain
 from records import Wing
+from records.blas_threads import one_blas_thread
 from sim.flexible_wing import FlexibleWing
 from sim.numerics import Numerics
 from sim.rig import blank_recording, robird_wing, vacuum
@@ -328,6 +325,7 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+@one_blas_thread  # on matrices this small, more threads take ten times as long
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.beams", description=__doc__)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from benchmarks.machine import commit, cpu
 from calibration.evaluator import Evaluator
@@ -30,6 +31,16 @@ from workers.factory import EvaluatorKind
 EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")
 WITHIN = 0.15
+# Evaluators that must agree: kind, workers, and threads of linear algebra in this process (None: as it was started).
+RUNS: tuple[tuple[EvaluatorKind, int | None, int | None], ...] = (
+    ("in_process", None, None),
+    ("in_process", None, 1),
+    ("in_process", None, 2),
+    ("in_process", None, 4),
+    ("processes", 1, None),
+    ("processes", 2, None),
+    ("ray", 2, None),
+)
 
 
 @dataclass(frozen=True)
@@ -98,7 +109,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 
 
 def evaluators_are_identical(dataset: Dataset) -> bool:
-    """The same individuals in this process, on a pool of two and on Ray."""
+    """The same individuals in this process, with 1, 2 and 4 threads of linear algebra, on pools of 1 and 2, on Ray."""
     spec = CalibrationSpec(division="11")
     model, stage = model_for(dataset, spec), plan(spec, dataset)[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
@@ -106,10 +117,11 @@ def evaluators_are_identical(dataset: Dataset) -> bool:
     genes = [g for g in model.genes if g.name in stage.free]
     values = np.array([[float(g.from_unit(rng.uniform())) for g in genes] for _ in range(19)])
     seen = set()
-    for kind, workers in (("in_process", None), ("processes", 1), ("processes", 2), ("ray", 2)):
-        evaluator = make_evaluator(kind, workers)  # type: ignore[arg-type]
+    for kind, workers, threads in RUNS:
+        evaluator = make_evaluator(kind, workers)
         try:
-            found = evaluator.evaluate(problem, values, residuals=True)
+            with threadpool_limits(threads, user_api="blas"):
+                found = evaluator.evaluate(problem, values, residuals=True)
             seen.add(b"".join(p.squares.tobytes() + np.asarray(p.residuals).tobytes() for p in found.per_recording))
         finally:
             evaluator.close()

@@ -38,7 +38,6 @@ class Server:
             "WINGFIT_PORT": str(self.port),
             "WINGFIT_EVALUATOR": evaluator,
             "WINGFIT_WORKERS": str(WORKERS),
-            "OMP_NUM_THREADS": "1",
             **(settings or {}),
         }
         if ray_address:

@@ -33,6 +33,7 @@ from calibration.search import found as found_by_stage
 from calibration.spec import CalibrationSpec, resolved, vehicle_model
 from calibration.uncertainty import Uncertainty, uncertainty
 from records import Condition, Dataset, Genome, Recording
+from records.blas_threads import one_blas_thread
 from sim.blade_element_wing import BladeElementWing
 
 Array = npt.NDArray[np.float64]
@@ -76,6 +77,7 @@ class _Compared:
     scatter: float | None
 
 
+@one_blas_thread
 def summarise_forces(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> ForceResult:
@@ -119,6 +121,7 @@ def summarise_forces(
     )
 
 
+@one_blas_thread
 def compare_forces(
     spec: CalibrationSpec, dataset: Dataset, recording: str, source: Source, genome: Mapping[str, float]
 ) -> ForceComparison:
@@ -128,6 +131,7 @@ def compare_forces(
     return comparison(record, _observed(model, record, [base_genome(model, genome)])[0], source)
 
 
+@one_blas_thread
 def predict(
     spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
 ) -> Prediction:

@@ -20,6 +20,7 @@ from calibration.force_result import Agreement, ForceComparison, Quantity, Sourc
 from calibration.linearised import free_genes, linearise, unit_at
 from calibration.problem import Problem
 from records import Recording
+from records.blas_threads import one_blas_thread
 from sim.lift_drag import lift_drag
 
 Array = npt.NDArray[np.float64]
@@ -92,6 +93,7 @@ def whole_beats(recording: Recording, forces: Array | None = None, points: int =
     return Beats(phase, {name: value.reshape(instants.shape) for name, value in named.items()})
 
 
+@one_blas_thread
 def agreements(recording: Recording, modelled: Array, source: Source) -> tuple[Agreement, ...]:
     """How ``modelled`` [T, C], in N, agrees with the recording, one entry per quantity.
 
@@ -118,6 +120,7 @@ def agreements(recording: Recording, modelled: Array, source: Source) -> tuple[A
     )
 
 
+@one_blas_thread
 def comparison(recording: Recording, modelled: Array, source: Source) -> ForceComparison:
     """Lay ``modelled`` [T, C], in N, over the recording: mean beats and spectra."""
     recorded, model = whole_beats(recording), whole_beats(recording, modelled)
@@ -154,6 +157,7 @@ def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity,
     return frequency, density
 
 
+@one_blas_thread
 def located(
     recording: Recording, residual: Array, sensitivities: Array | None = None, quantity: Quantity = "x"
 ) -> tuple[float, float] | None:
@@ -179,6 +183,7 @@ def located(
     return _shortest(residual, slopes, noise)
 
 
+@one_blas_thread
 def lacking(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
     """Find where in the beat the model of ``problem`` lacks something, at the problem's base genome.
 

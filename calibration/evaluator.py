@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calibration.problem import Evaluation, Misfit, Problem, concatenate, misfit
+from records.blas_threads import one_blas_thread
 from sim.kernels import LANES
 
 
@@ -47,6 +48,7 @@ def units(problem: Problem, individuals: int) -> list[Unit]:
     ]
 
 
+@one_blas_thread
 def run_unit(problem: Problem, values: npt.NDArray[np.float64], unit: Unit, *, residuals: bool = False) -> Misfit:
     """Evaluate one unit of the batch ``values`` [B, F]."""
     return misfit(problem, values[unit.start : unit.stop], unit.recording, residuals=residuals)

@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 
 from calibration.force_result import GlobalGene, GlobalModel, LocalEstimate
 from records import Condition
+from records.blas_threads import one_blas_thread
 from sim.atmosphere import density
 
 Array = npt.NDArray[np.float64]
@@ -42,6 +43,7 @@ class _Fit:
     scatter: float | None
 
 
+@one_blas_thread
 def fit_global(
     estimates: Sequence[LocalEstimate],
     conditions: Sequence[Condition],
@@ -73,6 +75,7 @@ def fit_global(
     )
 
 
+@one_blas_thread
 def at(model: GlobalModel, condition: Condition) -> GlobalValues:
     """Evaluate the coefficients of ``model`` under ``condition``, with a warning where it extrapolates."""
     f, pitch = condition.flap_frequency, condition.angle_of_attack

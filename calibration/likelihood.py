@@ -23,6 +23,7 @@ from calibration.placing import placed
 from calibration.problem import Problem
 from calibration.uncertainty import Uncertainty, uncertainty
 from records import Gene
+from records.blas_threads import one_blas_thread
 
 Array = npt.NDArray[np.float64]
 
@@ -114,6 +115,7 @@ class _Move:
     reasons: tuple[str, ...]
 
 
+@one_blas_thread
 def iterate(
     problem: Problem,
     evaluator: Evaluator,
@@ -141,6 +143,7 @@ def iterate(
         before = 0
 
 
+@one_blas_thread
 def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float]) -> Estimate:
     """Iterate to the end and judge the estimate there."""
     evaluations, last = 0, None

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from records import Recording
+from records.blas_threads import one_blas_thread
 
 Array = npt.NDArray[np.float64]
 
@@ -15,6 +16,7 @@ HARMONICS = 8  # of the mean beat
 LONGEST_MEMORY = 0.97
 
 
+@one_blas_thread
 def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
     """Mean distance (m) that tracking noise alone leaves; None when no recording has frames enough.
 

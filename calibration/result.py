@@ -18,6 +18,7 @@ from calibration.search import found
 from calibration.spec import CalibrationSpec, wing_model
 from calibration.uncertainty import Standing, standing
 from records import Dataset, Gene, Genome
+from records.blas_threads import one_blas_thread
 from sim.alignment import recorded_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.model import Solution
@@ -97,6 +98,7 @@ class Comparison:
     solution: Solution
 
 
+@one_blas_thread
 def summarise(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> Result | ForceResult:
@@ -109,6 +111,7 @@ def summarise(
     return judge(spec, dataset, evaluator, genome)
 
 
+@one_blas_thread
 def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
     """Judge a wing's ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
     model = wing_model(dataset, spec)
@@ -158,6 +161,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
     )
 
 
+@one_blas_thread
 def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str) -> Comparison:
     """Tracks of ``genome`` over the recording called ``recording``; ValueError when the simulation fails."""
     model = wing_model(dataset, spec)

@@ -17,6 +17,7 @@ from calibration.plan import Stage, plan
 from calibration.problem import Problem, base_genome
 from calibration.spec import CalibrationSpec, model_for, resolved
 from records import Dataset, Gene
+from records.blas_threads import one_blas_thread
 from sim.model import Model
 
 __all__ = ["CalibrationSpec", "Generation", "Stage", "calibrate", "found", "model_for", "plan", "resolved"]
@@ -58,6 +59,7 @@ class Generation:
     checkpoint: dict[str, Any]
 
 
+@one_blas_thread
 def calibrate(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None = None
 ) -> Iterator[Generation]:

@@ -15,6 +15,7 @@ from calibration.linearised import Linearised, free_genes, linearise, stopped, u
 from calibration.problem import Problem
 from calibration.remarks import remarks
 from records import Gene, Genome, Recording
+from records.blas_threads import one_blas_thread
 
 Array = npt.NDArray[np.float64]
 
@@ -82,6 +83,7 @@ class Uncertainty:
         }
 
 
+@one_blas_thread
 def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
     """Standing of each free gene at the problem's base genome; infinite errors where that cannot be simulated.
 
@@ -94,6 +96,7 @@ def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
         return {name: Standing(np.inf, False, np.inf) for name in problem.free}
 
 
+@one_blas_thread
 def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     """Uncertainty of the free genes at the problem's base genome; ValueError when that cannot be simulated."""
     genes = free_genes(problem)

@@ -20,10 +20,12 @@ from diagnosis.spec import DiagnosisSpec, Progress
 from diagnosis.stack import Stack
 from diagnosis.subject import Subject
 from records import Dataset, Recording
+from records.blas_threads import one_blas_thread
 
 ASSESSED = 0.7  # of the work: after that there is a verdict, and its place and its proof are looked for
 
 
+@one_blas_thread
 def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
     """ValueError, for the user, where ``spec`` does not fit ``dataset``; nothing is simulated."""
     subject, fitted, held_out, _ = _prepared(dataset, spec)
@@ -37,6 +39,7 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
         raise ValueError(f"refits is {spec.refits}; at least 1 effect must be refitted: give 1 or more")
 
 
+@one_blas_thread
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
     """Diagnose ``dataset``; the last report has the finding. ValueError where ``spec`` does not fit."""
     subject, fitted, held_out, free = _prepared(dataset, spec)
@@ -45,6 +48,7 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     )
 
 
+@one_blas_thread
 def diagnose_subject(
     subject: Subject,
     name: str,

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Condition
+from records.blas_threads import one_blas_thread
 from service.load_schemas import OUTPUT_NAMES, ConditionIn, OutputName
 from service.units import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, mm
 from sim.outputs import ConnectorLoad, Outputs, Section, Strip
@@ -46,6 +47,7 @@ def condition(recorded: Condition, changes: ConditionIn) -> Condition:
     return replace(recorded, **{_TO_SI[name][0]: _TO_SI[name][1](value) for name, value in given.items()})
 
 
+@one_blas_thread
 def outputs(found: Outputs, names: Iterable[OutputName]) -> Json:
     """What was asked for, as plain JSON (`service.load_schemas.OutputsOut`)."""
     phase = (found.phase - found.crossing) % 1.0

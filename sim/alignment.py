@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Recording, Wing
+from records.blas_threads import one_blas_thread
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -43,6 +44,7 @@ def reference_columns(wing: Wing, recording: Recording) -> list[int]:
     return found
 
 
+@one_blas_thread
 def recorded_crossing(wing: Wing, recording: Recording) -> float:
     """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke.
 

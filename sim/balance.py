@@ -27,6 +27,7 @@ from records import (
     WingMotion,
     save_dataset,
 )
+from records.blas_threads import one_blas_thread
 from sim.blade_element_wing import BladeElementWing
 
 Array = npt.NDArray[np.float64]
@@ -154,6 +155,7 @@ def true_beat(vehicle: Vehicle, trial: Trial) -> Array:
     return np.asarray(model.beat([list(values.values())], blank_recording(trial.condition))[0])
 
 
+@one_blas_thread
 def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator) -> Recording:
     """Record the forces ``beat`` [n, 2], in N over one beat, on the balance."""
     frequency = trial.condition.flap_frequency

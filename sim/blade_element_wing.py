@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import EstimateError, Gene, Recording, Vehicle
+from records.blas_threads import one_blas_thread
 from sim.blades.elements import CURVE_ROWS, PEELED, ROWS, Constants, synthesise, synthesise_at, wing_forces
 from sim.blades.motion import motion_genes
 from sim.blades.rows import mirrored
@@ -102,6 +103,7 @@ class BladeElementWing:
         added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
 
+    @one_blas_thread
     def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
         """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
         batch = genome_batch(self.genes, genomes)
@@ -133,6 +135,7 @@ class BladeElementWing:
             parts[_ROWS[name]] = parts.get(_ROWS[name], 0.0) + weight * row.T
         return parts
 
+    @one_blas_thread
     def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
         """Forces [B, T, C] of ``genomes`` [B, G] at the recording's instants and along its axes, low-passed like it."""
         if recording.kind != "forces":

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Condition, Gene, Recording, Wing
+from records.blas_threads import one_blas_thread
 from sim.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from sim.division import Division
 from sim.effects.contract import Effect
@@ -133,6 +134,7 @@ class FlexibleWing:
         """The effects on the wing itself that are on in ``genome`` [G]."""
         return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
 
+    @one_blas_thread
     def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
         """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
 
@@ -205,6 +207,7 @@ class FlexibleWing:
         (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
         return found
 
+    @one_blas_thread
     def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
         """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
 

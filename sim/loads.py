@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Recording
+from records.blas_threads import one_blas_thread
 from sim.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
 from sim.flexible_wing import FlexibleWing
 from sim.model import Solution
@@ -22,6 +23,7 @@ LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
 CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro
 
 
+@one_blas_thread
 def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
     """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails.
 

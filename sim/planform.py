@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from records import Marker, Wing
+from records.blas_threads import one_blas_thread
 from sim.division import Division
 from sim.sections import round_area
 
@@ -94,6 +95,7 @@ def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> npt
     return np.asarray(first[strip] + along, np.int64)
 
 
+@one_blas_thread
 def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
     """Mass properties of every panel: foam and skin by quadrature, rods with their straw, markers as points."""
     lumps: list[list[tuple[float, Array]]] = [[] for _ in panels]

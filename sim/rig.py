@@ -30,6 +30,7 @@ from records import (
     Wing,
     save_dataset,
 )
+from records.blas_threads import one_blas_thread
 from records.dataset import Rig
 from sim.flexible_wing import FlexibleWing
 from sim.numerics import Numerics
@@ -171,6 +172,7 @@ def name_of(condition: Condition) -> str:
     return f"vac-{condition.pressure / _MBAR:04.0f}mbar-lag{lag}-{f:.1f}hz"
 
 
+@one_blas_thread
 def record(
     model: FlexibleWing, genome: Genome, condition: Condition, tracking: Tracking, rng: np.random.Generator
 ) -> Recording:

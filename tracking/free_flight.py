@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy import interpolate
 
 from records import Condition, LowPass, Recording
+from records.blas_threads import one_blas_thread
 from records.dataset import STANDARD_GRAVITY
 from records.limits import UNEVEN_STEPS
 from tracking.rigid_body import Poses, poses, quaternions, scale_remarks
@@ -83,6 +84,7 @@ class FreeFlight:
         return np.asarray(np.arcsin(np.clip(self.rotation[:, 2, 0], -1, 1)))
 
 
+@one_blas_thread
 def free_flight(
     times: Array, tracks: Array, body: Body, low_pass: LowPass, gravity: float = STANDARD_GRAVITY
 ) -> FreeFlight:
@@ -140,6 +142,7 @@ def free_flight(
     )  # fmt: skip
 
 
+@one_blas_thread
 def recording(
     flight: FreeFlight, name: str, flap_frequency: float, beat_start: float, pressure: float, temperature: float
 ) -> Recording:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from records.blas_threads import one_blas_thread
+
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 _FLAT = 0.02
@@ -99,6 +101,7 @@ def _scale(tracks: Array, shape: Array) -> float:
     return float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else float("nan")
 
 
+@one_blas_thread
 def poses(tracks: Array, shape: Array) -> Poses:
     """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3] in m, NaN for not seen.
 

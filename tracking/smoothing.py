@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special, stats
 
+from records.blas_threads import one_blas_thread
 from tracking.noise import LinearFit, Noise, least_squares, products
 
 Array = npt.NDArray[np.float64]
@@ -57,10 +58,12 @@ class PeriodicFit:
         """Number K of harmonics; the series passes up to K times the frequency and nothing beyond."""
         return len(self.coefficients) // 2
 
+    @one_blas_thread
     def at(self, phase: Array, derivative: int = 0) -> Array:
         """Value, or a derivative in time (unit / s^d), at ``phase`` t* [...]."""
         return basis(phase, self.harmonics, derivative, self.frequency) @ self.coefficients
 
+    @one_blas_thread
     def error_at(self, phase: Array, derivative: int = 0) -> Array:
         """Standard error of :meth:`at` from noise alone; see ``lost`` for what is cut off."""
         B = basis(phase, self.harmonics, derivative, self.frequency)
@@ -98,6 +101,7 @@ class PeriodicFit:
         )
 
 
+@one_blas_thread
 def fit_periodic(
     times: Array, values: Array, frequency: float, harmonics: int | None = None, start: float = 0.0
 ) -> PeriodicFit:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy import optimize, stats
 
 from records import FourierFlap, FourierPitch, PassivePitch, WingMotion
+from records.blas_threads import one_blas_thread
 from tracking.noise import least_squares, products
 from tracking.smoothing import PeriodicFit, basis, fit_periodic
 
@@ -90,6 +91,7 @@ class WingKinematics:
     remarks: tuple[str, ...]
 
 
+@one_blas_thread
 def from_markers(
     times: Array, leading_edge: Array, chord: Array | None, place: WingPlace, hinge: tuple[float, float] | None = None
 ) -> Angles:
@@ -125,6 +127,7 @@ def from_markers(
     return Angles(times, flap, pitch)
 
 
+@one_blas_thread
 def wing_motion(
     angles: Angles,
     frequency: float | None = None,
@@ -185,6 +188,7 @@ def wing_motion(
     return WingKinematics(motion, fitted, flap, twist, law, found, flap.start, error / found.hertz, tuple(remarks))
 
 
+@one_blas_thread
 def flap_frequency(times: Array, flap: Array) -> Frequency:
     """Flap frequency from the flap angle [N]: strongest period, then least squares of a series over the frequency.
 
@@ -292,6 +296,7 @@ def closest(flap: PeriodicFit) -> tuple[float, float]:
     return phase % 1.0, error * flap.frequency / max(bend, 1e-12)
 
 
+@one_blas_thread
 def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
     """Fit Eq. 17, theta_w = pi/2 + c + c_zeta zeta + c_rate zeta' + c_square zeta'^2, to ``pitch`` [N] in rad.
 

@@ -287,10 +287,10 @@ def at(frequency: float) -> Condition:
     return Condition(frequency, 0.0, 101_325.0, 293.15)
 
 
-def blank(condition: Condition) -> Recording:
+def blank(condition: Condition, frames: int = FRAMES) -> Recording:
     """A recording without data."""
-    times = np.arange(FRAMES) * PER_BEAT / ((PER_BEAT + 1) * condition.flap_frequency)
-    values = np.full((FRAMES, 3 * len(MARKERS)), np.nan)
+    times = np.arange(frames) * PER_BEAT / ((PER_BEAT + 1) * condition.flap_frequency)
+    values = np.full((frames, 3 * len(MARKERS)), np.nan)
     name = f"pendulum-{condition.flap_frequency:g}hz"
     return Recording(name, "vacuum_chamber", condition, times, tuple(MARKERS), values)
 
@@ -302,6 +302,7 @@ def recorded(
     memory: float = 0.5,
     seed: int = 1,
     frequencies: Sequence[float] = FREQUENCIES,
+    frames: int = FRAMES,
 ) -> tuple[Recording, ...]:
     """What a pendulum is recorded as with coloured ``noise`` (m); genes that ``truth`` does not name are nominal.
 
@@ -315,7 +316,7 @@ def recorded(
     rng = np.random.default_rng(seed)
     found = []
     for frequency in frequencies:
-        empty = blank(at(frequency))
+        empty = blank(at(frequency), frames)
         error = rng.standard_normal(empty.values.shape)
         for k in range(1, len(error)):
             error[k] = memory * error[k - 1] + np.sqrt(1 - memory**2) * error[k]

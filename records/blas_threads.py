@@ -1,0 +1,118 @@
+"""Linear algebra on one thread, so that results do not depend on the number of threads a machine offers.
+
+BLAS splits a product among its threads, and each split rounds differently: in the last bit, which a search or a test of
+significance can turn into another answer. What computes the numbers of a result therefore runs with one BLAS thread
+(docs/decisions/0012-threads.md), whatever the environment says, and its caller gets the former setting back.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+import itertools
+import os
+import sys
+import threading
+from collections.abc import Callable, Generator
+from functools import wraps
+from typing import Any, NamedTuple, TypeVar, cast
+
+from threadpoolctl import LibController, ThreadpoolController
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# Of OpenBLAS's functions: what builds put before and after their names.
+_BEFORE, _AFTER = ("scipy_", ""), ("64_", "_64", "")
+
+
+class _Library(NamedTuple):
+    """How the threads of a BLAS library are read and set."""
+
+    get: Callable[[], int]
+    set: Callable[[int], object]
+
+
+def _library(found: LibController) -> _Library:
+    """The functions of OpenBLAS itself: threadpoolctl 3.8 ignores all threads but the first that sets it."""
+    if found.internal_api == "openblas" and found.threading_layer != "openmp":
+        handle = ctypes.CDLL(found.filepath)
+        for before, after in itertools.product(_BEFORE, _AFTER):
+            name = f"{before}openblas_{{}}_num_threads{after}".format
+            if hasattr(handle, name("set")):
+                return _Library(getattr(handle, name("get")), getattr(handle, name("set")))
+    return _Library(found.get_num_threads, found.set_num_threads)
+
+
+class OneBlasThread:
+    """Limits every loaded BLAS library to one thread; a context manager and a decorator.
+
+    The setting belongs to the process. It holds while any thread is inside, and the last one to leave restores what
+    the first one found. Entering and leaving takes a few microseconds, and may be nested. A decorated generator is
+    inside only while it computes its next item: between items, and when abandoned, it holds nothing.
+    """
+
+    def __init__(self) -> None:
+        # Re-entrant: garbage collection may leave another block while this thread enters one.
+        self._lock = threading.RLock()
+        self._inside = 0
+        self._modules = 0
+        self._libraries: dict[str, _Library] = {}
+        self._former: dict[str, int] = {}
+        # A forked process has only the thread that forked: nobody else could release the lock in it.
+        os.register_at_fork(
+            before=self._lock.acquire, after_in_parent=self._lock.release, after_in_child=self._lock.release
+        )
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if len(sys.modules) != self._modules:  # an import may have loaded another library
+                self._scan()
+            self._inside += 1
+            for path, library in self._libraries.items():
+                if path not in self._former:
+                    self._former[path] = library.get()
+                # Always: somebody else may have raised it, and MKL has a setting for each thread.
+                library.set(1)
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                former, self._former = self._former, {}
+                for path, threads in former.items():
+                    self._libraries[path].set(threads)
+
+    def __call__(self, function: F) -> F:
+        """``function``, or each step of the generator that it makes, with one BLAS thread."""
+
+        @wraps(function)
+        def call(*args: Any, **kwargs: Any) -> Any:
+            with self:
+                return function(*args, **kwargs)
+
+        @wraps(function)
+        def steps(*args: Any, **kwargs: Any) -> Generator[Any, None, Any]:
+            return self._step_by_step(function(*args, **kwargs))
+
+        return cast(F, steps if inspect.isgeneratorfunction(function) else call)
+
+    def _step_by_step(self, generator: Generator[Any, None, Any]) -> Generator[Any, None, Any]:
+        try:
+            while True:
+                try:
+                    with self:
+                        item = next(generator)
+                except StopIteration as end:
+                    return end.value
+                yield item
+        finally:
+            generator.close()
+
+    def _scan(self) -> None:
+        """Find the BLAS libraries that are loaded; takes about a millisecond."""
+        self._modules = len(sys.modules)
+        found = ThreadpoolController().select(user_api="blas").lib_controllers
+        self._libraries |= {one.filepath: _library(one) for one in found if one.filepath not in self._libraries}
+
+
+one_blas_thread = OneBlasThread()

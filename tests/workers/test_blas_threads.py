@@ -1,0 +1,109 @@
+"""The same bits whatever number of threads BLAS has: forced, by the environment, and by default."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import diagnosis
+from calibration import estimation, evaluation, evaluator, global_model, likelihood, noise, result, search, uncertainty
+from records import blas_threads
+from service import load_views
+from sim import alignment, balance, loads, planform, rig
+from sim.blade_element_wing import BladeElementWing
+from sim.flexible_wing import FlexibleWing
+from tracking import free_flight, rigid_body, smoothing, wing_kinematics
+
+REPOSITORY = Path(__file__).parents[2]
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+GUARDED: tuple[Callable[..., object], ...] = (
+    alignment.recorded_crossing, balance.record, loads.simulate_outputs, planform.bodies, rig.record,
+    BladeElementWing.beat, BladeElementWing.observe, FlexibleWing.beats, FlexibleWing.observe,
+    estimation.summarise_forces, estimation.compare_forces, estimation.predict,
+    evaluation.agreements, evaluation.comparison, evaluation.located, evaluation.lacking,
+    evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
+    noise.noise_distance, result.summarise, result.judge, result.compare, search.calibrate,
+    uncertainty.standing, uncertainty.uncertainty,
+    diagnosis.check, diagnosis.diagnose, diagnosis.diagnose_subject,
+    free_flight.free_flight, free_flight.recording, rigid_body.poses,
+    smoothing.fit_periodic, smoothing.PeriodicFit.at, smoothing.PeriodicFit.error_at,
+    wing_kinematics.from_markers, wing_kinematics.wing_motion, wing_kinematics.flap_frequency,
+    wing_kinematics.pitch_law, load_views.outputs,
+)  # fmt: skip
+
+
+class Run(NamedTuple):
+    """How a process runs: BLAS kernels (None: those of the processor), OMP_NUM_THREADS, threads set within."""
+
+    kernels: str | None
+    variable: str | None = None
+    forced: str | None = None
+
+
+class Digests(NamedTuple):
+    """What a process prints."""
+
+    digests: dict[str, str]
+    threads: list[int]
+
+
+def _has_avx2() -> bool:
+    cpu = Path("/proc/cpuinfo")
+    return cpu.exists() and " avx2 " in cpu.read_text()
+
+
+# OpenBLAS's kernels for AVX2 round differently with every split, those for AVX-512 only where long sums are split.
+RUNS = [Run(None, "1"), Run(None, forced="4")]
+if _has_avx2():
+    RUNS += [Run("Haswell"), Run("Haswell", "1"), Run("Haswell", "2"), Run("Haswell", forced="4")]
+
+
+def _digests(run: Run) -> Digests:
+    environment = {name: value for name, value in os.environ.items() if name not in THREADS}
+    environment |= {"OPENBLAS_CORETYPE": run.kernels} if run.kernels else {}
+    environment |= {"OMP_NUM_THREADS": run.variable} if run.variable else {}
+    command = [sys.executable, "-m", "tests.workers.digests", *([run.forced] if run.forced else [])]
+    done = subprocess.run(command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return Digests(**json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[Run, Digests]:
+    with ThreadPoolExecutor(2) as threads:
+        return dict(zip(RUNS, threads.map(_digests, RUNS), strict=True))
+
+
+@pytest.mark.parametrize("kernels", sorted({run.kernels or "" for run in RUNS}))
+@pytest.mark.parametrize("computation", ["evaluation", "gauss_newton", "genetic", "diagnosis"])
+def test_threads_of_blas_change_no_bit(results: dict[Run, Digests], kernels: str, computation: str) -> None:
+    same = {run: found.digests[computation] for run, found in results.items() if run.kernels == (kernels or None)}
+    assert len(same) >= 2
+    assert len(set(same.values())) == 1, same
+
+
+def test_the_processes_had_the_threads_they_were_meant_to_have(results: dict[Run, Digests]) -> None:
+    """Also: what the guard found is restored after the last computation."""
+    for run, found in results.items():
+        wanted = int(run.forced or run.variable or os.cpu_count() or 1)
+        assert found.threads
+        if run.variable is None:
+            assert set(found.threads) == {wanted}
+        else:  # OpenBLAS starts no more threads than there are processors
+            assert set(found.threads) == {min(wanted, os.cpu_count() or 1)}
+
+
+@pytest.mark.parametrize("function", GUARDED, ids=lambda function: f"{function.__module__}.{function.__qualname__}")
+def test_what_computes_results_is_guarded(function: Callable[..., object]) -> None:
+    """By the guard's wrapper, which has the function that it calls."""
+    assert getattr(function, "__wrapped__", None) is not None
+    assert function.__code__.co_filename == blas_threads.__file__
