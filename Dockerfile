@@ -1,5 +1,8 @@
 # One image for the API and for Ray's nodes: Ray ships pickled work between them, so their code must be the same.
-FROM python:3.11-slim
+# Named by digest, so that the same commit gives the same image. `make pin-image` takes the newest, `make check-image`
+# fails where there is none.
+ARG PYTHON_IMAGE=python:3.11-slim@sha256:9c900dea9e8fb7e16277c179b555cc72d29a352dbc33cff48ad5a0412fd5bfc7
+FROM ${PYTHON_IMAGE}
 
 ENV PYTHONUNBUFFERED=1 \
     PIP_NO_CACHE_DIR=1 \
@@ -31,10 +34,14 @@ COPY --chown=wingfit:wingfit service service
 RUN pip install --no-deps --no-build-isolation --editable .
 
 USER wingfit
-# Compiled kernels are kept beside the code. On another kind of processor they are compiled again at the first use.
-RUN if [ -f sim/warm.py ]; then python -m sim.warm; fi
+# Compiled kernels are kept beside the code. Where that cannot be written, they are copied to HOME at the first use; on
+# another kind of processor they are compiled again, and kept there too.
+RUN python -m compileall -q records tracking sim calibration diagnosis report workers service \
+    && python -m sim.warm
 
-ENV WINGFIT_DATA=/data \
+# All that is written: /tmp and the data. The rest may be read-only.
+ENV HOME=/tmp \
+    WINGFIT_DATA=/data \
     WINGFIT_HOST=0.0.0.0 \
     WINGFIT_PORT=8321
 EXPOSE 8321

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-rest check serve format lock install clean
+.PHONY: demo proof test test-service test-rest check serve format lock install pin-image check-image clean
 
 demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m service.demo
@@ -24,7 +24,7 @@ test-service:  # servers and browsers: they wait more than they compute
 test-rest:
 	$(BIN)/python -m pytest --ignore tests/service
 
-check: $(INSTALLED)  ## every check, no test
+check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -57,6 +57,18 @@ lock: | $(BIN)/python  ## choose the newest versions that pyproject.toml admits,
 	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra dev --no-annotate \
 		--no-emit-index-url --no-emit-find-links --custom-compile-command "make lock" \
 		pyproject.toml --output-file requirements.lock
+
+# The digest of the index, which names the image of every processor.
+BASE_IMAGE := python:3.11-slim
+pin-image:  ## build on the newest Python image: needs docker with buildx, and the network
+	@digest=$$(docker buildx imagetools inspect $(BASE_IMAGE) --format '{{.Manifest.Digest}}') \
+		&& echo "$$digest" | grep -Eqx 'sha256:[0-9a-f]{64}' \
+		|| { echo "no digest of $(BASE_IMAGE) could be had; is docker buildx there, and the network?" >&2; exit 1; }; \
+	sed -i "s|^ARG PYTHON_IMAGE=.*|ARG PYTHON_IMAGE=$(BASE_IMAGE)@$$digest|" Dockerfile && grep '^ARG PYTHON_IMAGE' Dockerfile
+
+check-image:  ## fail unless the image is built on one that is named by digest
+	@grep -Eqx 'ARG PYTHON_IMAGE=$(BASE_IMAGE)@sha256:[0-9a-f]{64}' Dockerfile \
+		|| { echo "the Dockerfile does not name $(BASE_IMAGE) by digest; run: make pin-image" >&2; exit 1; }
 
 clean:  ## remove what was installed and cached here, but no data
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

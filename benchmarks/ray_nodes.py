@@ -64,6 +64,19 @@ def free_port() -> int:
         return port
 
 
+def marked(mark: str) -> dict[int, str]:
+    """Living processes that bear ``mark`` in their environment, and their descendants, with their names.
+
+    The mark alone would miss the processes that Ray renames, which writes over their environment.
+    """
+    wanted = f"{MARK}={mark}".encode()
+    everyone = _processes()
+    found = {pid for pid, process in everyone.items() if wanted in process.environment}
+    while more := {pid for pid, process in everyone.items() if process.parent in found} - found:
+        found |= more
+    return {pid: everyone[pid].name for pid in found if everyone[pid].state != "Z"}
+
+
 class Node:
     """One Ray node: ``ray start`` and everything that comes of it."""
 
@@ -88,16 +101,8 @@ class Node:
         return self._process.poll() is None
 
     def pids(self) -> dict[int, str]:
-        """Living processes of this node, with their names: those that bear its mark, and their descendants.
-
-        The mark alone would miss the processes that Ray renames, which writes over their environment.
-        """
-        wanted = f"{MARK}={self.mark}".encode()
-        everyone = _processes()
-        found = {pid for pid, process in everyone.items() if wanted in process.environment}
-        while more := {pid for pid, process in everyone.items() if process.parent in found} - found:
-            found |= more
-        return {pid: everyone[pid].name for pid in found if everyone[pid].state != "Z"}
+        """Living processes of this node, with their names."""
+        return marked(self.mark)
 
     def raylet(self) -> int | None:
         """Its scheduler."""

@@ -6,6 +6,7 @@ time. Therefore readers are opened read-only, and the folder is locked against a
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import sqlite3
@@ -74,7 +75,13 @@ class FolderLock:
             ) from None
         try:
             fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except OSError as error:
+            if error.errno not in (errno.EACCES, errno.EAGAIN):
+                self._file.close()
+                raise DataFolderError(
+                    f"the data folder {folder} cannot be locked ({error.strerror}), as on some network file systems; "
+                    "set WINGFIT_DATA to a folder on a disk of this machine"
+                ) from None
             self._file.seek(0)
             owner = self._file.read().strip() or "unknown"
             self._file.close()

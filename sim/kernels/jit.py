@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, TypeVar, cast
 
 import numba
@@ -83,24 +84,41 @@ def _cache_folder(source: Path) -> Path:
     own = {source, *source.parent.glob("_*.py")} if alone else set(source.glob("*.py"))
     for file in sorted({*own, *Path(__file__).resolve().parent.glob("*.py")}):
         digest.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
-    home = source.parent if alone else source
+    beside = (source.parent if alone else source) / "__pycache__"
     places = (
-        Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else home / "__pycache__",
+        Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else beside,
         Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wingfit",
     )
+    inner = Path(source.stem if alone else "", f"kernels-{digest.hexdigest()[:16]}")
     for base in places:
-        place = base / source.stem if alone else base
-        folder = place / f"kernels-{digest.hexdigest()[:16]}"
+        folder = base / inner
         with suppress(OSError):
+            _start_with(beside / inner, folder)
             folder.mkdir(parents=True, exist_ok=True)
             folder.touch()
             if os.access(folder, os.W_OK):
-                _forget_old(place)
+                _forget_old(folder.parent)
                 return folder
     raise OSError(
         f"compiled kernels cannot be kept in {' or '.join(map(str, places))}: "
         "set NUMBA_CACHE_DIR to a folder that can be written"
     )
+
+
+def _start_with(shipped: Path, folder: Path) -> None:
+    """Fill a ``folder`` that does not exist yet with the kernels that a read-only installation brings along.
+
+    They are copied under another name and renamed, because another process may look into the folder at any time.
+    """
+    if folder.exists() or not shipped.is_dir():
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    copy = Path(mkdtemp(prefix="copy-", dir=folder.parent))
+    try:
+        shutil.copytree(shipped, copy, dirs_exist_ok=True)
+        copy.rename(folder)
+    except OSError:  # the other process was first, or the disk is full: then they are compiled
+        shutil.rmtree(copy, ignore_errors=True)
 
 
 def _forget_old(place: Path) -> None:

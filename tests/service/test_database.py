@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sqlite3
 from pathlib import Path
 
@@ -61,6 +63,17 @@ def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(DataFolderError, match="cannot create the data folder"):
         Database(tmp_path / "file" / "data")
+
+
+def test_a_folder_that_cannot_be_locked_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on NFS without a lock manager; what another server holds is another error."""
+
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.lockf", no_locks)
+    with pytest.raises(DataFolderError, match=r"cannot be locked \(No locks available\).*disk of this machine"):
+        Database(tmp_path)
 
 
 def test_commits_are_durable_and_references_hold(tmp_path: Path) -> None:

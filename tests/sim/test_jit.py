@@ -19,9 +19,9 @@ KERNEL = "from tiny.helper import factor\nfrom tiny.jit import kernel\n\n@kernel
 RUN = "from tiny.kernel import f; print(f(3.0), sum(f.stats.cache_hits.values()))"
 
 
-def run(place: Path) -> list[str]:
+def run(place: Path, **more: str) -> list[str]:
     """What the kernel of the package in ``place`` gives in a process of its own, and how often it was in the cache."""
-    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")}
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")} | more
     found = subprocess.run(
         [sys.executable, "-c", RUN], cwd=place, capture_output=True, text=True, check=True,
         env={**environment, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"},
@@ -44,6 +44,40 @@ def test_a_changed_helper_is_compiled_into_its_callers(tmp_path: Path, how: str)
     assert run(tmp_path) == ["9.0", "0"]
     (package / "helper.py").write_text(HELPER.format(how=how, factor=2))
     assert run(tmp_path) == ["6.0", "1"], "a way back is in the cache too"
+
+
+def test_a_read_only_installation_brings_its_kernels_along(tmp_path: Path) -> None:
+    """Where nothing can be written beside the source, the cache elsewhere starts with what is there."""
+    package, cache = tmp_path / "tiny", tmp_path / "cache"
+    package.mkdir()
+    shutil.copy(jit.__file__, package / "jit.py")
+    (package / "__init__.py").touch()
+    (package / "kernel.py").write_text(KERNEL)
+    (package / "helper.py").write_text(HELPER.format(how="inlined", factor=2))
+    assert run(tmp_path) == ["6.0", "0"]
+    assert run(tmp_path, NUMBA_CACHE_DIR=str(cache)) == ["6.0", "1"]
+    (folder,) = cache.iterdir()
+    (package / "helper.py").write_text(HELPER.format(how="inlined", factor=3))
+    assert run(tmp_path, NUMBA_CACHE_DIR=str(cache)) == ["9.0", "0"], "what was compiled from other code is left behind"
+    assert len(list(cache.iterdir())) == 2
+    assert folder.is_dir()
+
+
+def test_of_two_processes_that_start_a_cache_one_is_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shipped, folder = tmp_path / "shipped", tmp_path / "cache" / "kernels-1"
+    shipped.mkdir()
+    (shipped / "code").write_text("ours")
+    copy_tree = shutil.copytree
+
+    def slow(source: Path, target: Path, *, dirs_exist_ok: bool) -> Path:
+        folder.mkdir()
+        (folder / "code").write_text("theirs")
+        return copy_tree(source, target, dirs_exist_ok=dirs_exist_ok)
+
+    monkeypatch.setattr(shutil, "copytree", slow)
+    jit._start_with(shipped, folder)
+    assert (folder / "code").read_text() == "theirs"
+    assert list(folder.parent.iterdir()) == [folder]
 
 
 def test_a_numba_that_caches_elsewhere_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import subprocess
 import tomllib
 from pathlib import Path
@@ -12,10 +14,12 @@ import pytest
 import yaml
 
 from benchmarks.ray_nodes import REPOSITORY
+from workers.node_alive import TIMEOUT_SECONDS
 
 # Head, object manager and node manager (by convention), client, dashboard, its agents, and the range of workers.
 RAY_PORTS = {6379, 8076, 8077, 8265, 10001, 52365, *range(10002, 20000)}
 RAY_SERVICES = ("ray-head", "ray-worker", "api")
+SERVICES = (*RAY_SERVICES, "ray-token", "front")
 
 
 @pytest.fixture(scope="module")
@@ -30,21 +34,35 @@ def services(compose: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def test_only_the_api_is_published_and_only_on_loopback(services: dict[str, dict[str, Any]]) -> None:
+def test_the_tests_know_all_services(services: dict[str, dict[str, Any]]) -> None:
+    assert set(services) == set(SERVICES)
+
+
+def test_only_the_front_is_published_and_only_on_loopback(services: dict[str, dict[str, Any]]) -> None:
     for name, service in services.items():
         assert "network_mode" not in service or service["network_mode"] == "none", name
-        if name != "api":
+        if name != "front":
             assert "ports" not in service, name
-    (port,) = services["api"]["ports"]
+    (port,) = services["front"]["ports"]
     address, outer, inner = re.fullmatch(r"([\d.]+):\$\{WINGFIT_PORT:-(\d+)\}:(\d+)", port).groups()  # type: ignore[union-attr]
     assert address == "127.0.0.1"
     assert not {int(outer), int(inner)} & RAY_PORTS
 
 
-def test_ray_lives_on_an_internal_network(compose: dict[str, Any], services: dict[str, dict[str, Any]]) -> None:
+def test_no_ray_node_is_on_the_published_network(compose: dict[str, Any], services: dict[str, dict[str, Any]]) -> None:
+    """Ray listens on every interface: see ``test_ray_listens_on_every_interface_whatever_its_address``."""
     assert compose["networks"]["cluster"]["internal"] is True
-    assert services["ray-head"]["networks"] == services["ray-worker"]["networks"] == ["cluster"]
-    assert sorted(services["api"]["networks"]) == ["cluster", "front"]
+    for name in RAY_SERVICES:
+        assert services[name]["networks"] == ["cluster"], name
+    assert sorted(services["front"]["networks"]) == ["cluster", "front"]
+    assert not {"RAY_AUTH_TOKEN_PATH", "RAY_AUTH_TOKEN"} & set(services["front"].get("environment", {}))
+    assert "volumes" not in services["front"]
+
+
+def test_the_front_passes_on_to_the_port_of_the_api_alone(services: dict[str, dict[str, Any]]) -> None:
+    assert services["front"]["command"] == ["python", "-m", "service.forward", "api:8321"]
+    assert "WINGFIT_PORT=8321" in (REPOSITORY / "Dockerfile").read_text()
+    assert services["front"]["depends_on"] == {"api": {"condition": "service_healthy"}}
 
 
 @pytest.mark.parametrize("name", RAY_SERVICES)
@@ -81,12 +99,99 @@ def test_every_member_is_restarted_and_has_shared_memory_for_its_objects(
     assert int(service["shm_size"].removesuffix("m")) * 2**20 > objects
 
 
-@pytest.mark.parametrize("name", [*RAY_SERVICES, "ray-token"])
+@pytest.mark.parametrize("name", SERVICES)
 def test_no_container_has_more_rights_than_it_needs(services: dict[str, dict[str, Any]], name: str) -> None:
     service = services[name]
     assert service["cap_drop"] == ["ALL"]
     assert "no-new-privileges:true" in service["security_opt"]
     assert not {"privileged", "cap_add", "pid", "user"} & set(service)
+
+
+def number_of_bytes(text: str) -> int:
+    number, unit = re.fullmatch(r"(\d+)([mg])", text).groups()  # type: ignore[union-attr]
+    return int(number) * {"m": 2**20, "g": 2**30}[unit]
+
+
+def default(value: object) -> str:
+    """What Compose takes where the variable is not set."""
+    return re.sub(r"\$\{\w+:?-(\w+)\}", r"\1", str(value))
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_every_file_system_is_read_only_but_memory_and_named_volumes(
+    compose: dict[str, Any], services: dict[str, dict[str, Any]], name: str
+) -> None:
+    """That the service runs so is shown by ``test_read_only.py``."""
+    service = services[name]
+    assert service["read_only"] is True
+    (mount,) = service["tmpfs"]
+    assert re.fullmatch(r"/tmp:mode=1777,size=\d+m", mount)  # noqa: S108
+    writable = {volume.split(":")[0] for volume in service.get("volumes", []) if not volume.endswith(":ro")}
+    assert writable == {"api": {"data"}, "ray-token": {"ray-token"}}.get(name, set())
+    assert writable <= set(compose["volumes"])
+
+
+def test_uploads_wait_on_the_disk_and_rays_sockets_do_not(services: dict[str, dict[str, Any]]) -> None:
+    environment = services["api"]["environment"]
+    assert (environment["TMPDIR"], environment["RAY_TMPDIR"]) == ("/data", "/tmp")  # noqa: S108
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_memory_and_processes_of_every_container_are_limited(services: dict[str, dict[str, Any]], name: str) -> None:
+    service = services[name]
+    memory, processes = number_of_bytes(default(service["mem_limit"])), int(default(service["pids_limit"]))
+    assert processes <= 4096
+    if name in RAY_SERVICES:
+        # What is in memory file systems counts as well.
+        shared = number_of_bytes(service["shm_size"]) + number_of_bytes(service["tmpfs"][0].split("size=")[1])
+        assert memory >= shared + 2**30
+    else:
+        assert memory <= 2**28
+
+
+def test_the_limits_are_documented(services: dict[str, dict[str, Any]]) -> None:
+    page = (REPOSITORY / "docs" / "deployment.md").read_text()
+    text = (REPOSITORY / "docker-compose.yml").read_text()
+    variables = dict(re.findall(r"\$\{(WINGFIT_\w+):-(\w+)\}", text))
+    assert {"WINGFIT_HEAD_MEMORY", "WINGFIT_WORKER_MEMORY", "WINGFIT_API_MEMORY", "WINGFIT_PIDS"} <= set(variables)
+    for name, value in variables.items():
+        assert f"| `{name}` | `{value}` |" in page, name
+    assert services
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_logs_do_not_fill_the_disk(services: dict[str, dict[str, Any]], name: str) -> None:
+    logging = services[name]["logging"]
+    assert logging["driver"] == "json-file"
+    assert number_of_bytes(logging["options"]["max-size"]) * int(logging["options"]["max-file"]) <= 2**26
+    if name in RAY_SERVICES:
+        environment = services[name]["environment"]
+        kept = int(environment["RAY_ROTATION_MAX_BYTES"]) * (1 + int(environment["RAY_ROTATION_BACKUP_COUNT"]))
+        room = number_of_bytes(services[name]["tmpfs"][0].split("size=")[1])
+        assert 20 * kept < room, "Ray writes about a dozen log files, and two for each worker"
+
+
+def test_every_long_lived_container_has_a_health_check(services: dict[str, dict[str, Any]]) -> None:
+    image = (REPOSITORY / "Dockerfile").read_text()
+    assert "http://127.0.0.1:8321/v1/health" in image.split("HEALTHCHECK", 1)[1]
+    for name in ("api", "front"):
+        assert "healthcheck" not in services[name], f"{name} has the image's, which asks port 8321"
+    assert "('ray-head', 6379)" in services["ray-head"]["healthcheck"]["test"][-1]
+    worker = services["ray-worker"]["healthcheck"]
+    assert worker["test"] == ["CMD", "python", "-m", "workers.node_alive", "ray-head:6379"]
+    assert int(worker["interval"].removesuffix("s")) >= 30, "each takes half a second of processor time"
+    assert int(worker["timeout"].removesuffix("s")) > 2 * TIMEOUT_SECONDS
+    assert services["ray-token"]["healthcheck"] == {"disable": True}
+
+
+@pytest.mark.parametrize("name", SERVICES)
+def test_the_image_can_be_named_by_its_digest(services: dict[str, dict[str, Any]], name: str) -> None:
+    assert services[name]["image"] == "${WINGFIT_IMAGE:-wingfit}"
+    assert services[name]["build"] == "."
+
+
+def test_threads_are_limited_by_the_evaluator_alone() -> None:
+    assert "OMP_NUM_THREADS" not in (REPOSITORY / "docker-compose.yml").read_text()
 
 
 def test_the_work_is_done_by_the_workers(services: dict[str, dict[str, Any]]) -> None:
@@ -102,6 +207,51 @@ def test_the_image_does_not_run_as_root() -> None:
     users = [line for line in lines if line.startswith("USER ")]
     assert users == ["USER wingfit"]
     assert lines.index("USER wingfit") < next(i for i, line in enumerate(lines) if line.startswith("CMD"))
+
+
+PINNED = re.compile(r"^ARG PYTHON_IMAGE=python:3\.11-slim@sha256:[0-9a-f]{64}$", re.MULTILINE)
+OTHER = "sha256:" + "5" * 64
+
+
+def test_the_base_image_is_named_by_digest() -> None:
+    text = (REPOSITORY / "Dockerfile").read_text()
+    assert PINNED.search(text)
+    assert re.findall(r"^FROM (.*)$", text, re.MULTILINE) == ["${PYTHON_IMAGE}"]
+
+
+def make(target: str, folder: Path, answer: str = "") -> subprocess.CompletedProcess[str]:
+    """``make target`` on a copy of the Dockerfile, with a ``docker`` that says ``answer``."""
+    for name in ("Makefile", "Dockerfile"):
+        if not (folder / name).exists():
+            shutil.copy(REPOSITORY / name, folder)
+    docker = folder / "docker"
+    docker.write_text(f'#!/bin/sh\necho "$@" >> "{folder}/calls"\n{answer or "exit 1"}\n')
+    docker.chmod(0o755)
+    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}"}
+    environment = {name: value for name, value in environment.items() if not name.startswith("MAKE")}
+    return subprocess.run(["make", target], cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_newest_base_image_is_pinned_by_one_command(tmp_path: Path) -> None:
+    assert make("pin-image", tmp_path, f"echo {OTHER}").returncode == 0
+    text = (tmp_path / "Dockerfile").read_text()
+    assert f"ARG PYTHON_IMAGE=python:3.11-slim@{OTHER}\n" in text
+    assert PINNED.sub("", text) == PINNED.sub("", (REPOSITORY / "Dockerfile").read_text())
+    assert (tmp_path / "calls").read_text().startswith("buildx imagetools inspect python:3.11-slim ")
+    assert make("check-image", tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize("answer", ["", "echo", "echo latest", "echo sha256:12"])
+def test_nothing_is_pinned_without_a_digest(tmp_path: Path, answer: str) -> None:
+    assert make("pin-image", tmp_path, answer).returncode != 0
+    assert (tmp_path / "Dockerfile").read_text() == (REPOSITORY / "Dockerfile").read_text()
+
+
+def test_a_base_image_without_a_digest_is_reported(tmp_path: Path) -> None:
+    (tmp_path / "Dockerfile").write_text("ARG PYTHON_IMAGE=python:3.11-slim\nFROM ${PYTHON_IMAGE}\n")
+    done = make("check-image", tmp_path)
+    assert done.returncode != 0
+    assert "make pin-image" in done.stderr
 
 
 def test_what_the_image_copies_is_what_the_build_may_see() -> None:

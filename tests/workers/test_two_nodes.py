@@ -7,12 +7,13 @@ import secrets
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from ray.util import get_node_ip_address
 
 from benchmarks.ray_nodes import REPOSITORY, Node, environment, free_port
 from tests.workers import pendulum
@@ -103,6 +104,53 @@ def nodes_seen(folder: Path) -> set[int]:
     return {int(note[2]) for note in notes if len(note) == 3}
 
 
+def node_alive(cluster: Cluster, *options: str, token: Path | None = None, head: str = "") -> tuple[int, str]:
+    done = subprocess.run(
+        [sys.executable, "-m", "workers.node_alive", head or cluster.address, *options], cwd=REPOSITORY,
+        env=environment(token or cluster.token), capture_output=True, text=True, check=False, timeout=60.0,
+    )  # fmt: skip
+    return done.returncode, done.stderr
+
+
+def test_a_node_knows_whether_it_is_alive(cluster: Cluster, tmp_path: Path) -> None:
+    # Ray gives the head, which was started on 127.0.0.1, the address of this machine.
+    address = get_node_ip_address()
+    assert node_alive(cluster, head=f"{address}:{cluster.address.split(':')[1]}") == (0, "")
+    assert node_alive(cluster, "--node=127.0.0.2") == (0, "")
+    code, why = node_alive(cluster, "--node=127.0.0.3")
+    living = ", ".join(sorted(["127.0.0.2", address]))
+    assert (code, f"has the address 127.0.0.3; living: {living}" in why) == (1, True), why
+    nobody = f"127.0.0.1:{free_port()}"
+    code, why = node_alive(cluster, head=nobody)
+    assert (code, f"no Ray head answers at {nobody}" in why) == (1, True), why
+    wrong_token = tmp_path / "wrong"
+    wrong_token.write_text(secrets.token_hex(32))
+    code, why = node_alive(cluster, token=wrong_token)
+    assert (code, "does not list its nodes" in why) == (1, True), why
+
+
+def listening_everywhere(pids: Iterable[int]) -> set[str]:
+    """Names of those of the processes that listen on every interface."""
+    wild = set()
+    for table, address in (("tcp", "0" * 8), ("tcp6", "0" * 32)):
+        for line in Path("/proc/net", table).read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[1].startswith(f"{address}:") and fields[3] == "0A":  # LISTEN
+                wild.add(f"socket:[{fields[9]}]")
+    found = set()
+    for pid in pids:
+        with suppress(OSError):
+            if wild & {str(file.readlink()) for file in Path(f"/proc/{pid}/fd").iterdir()}:
+                found.add(Path(f"/proc/{pid}/comm").read_text().strip())
+    return found
+
+
+def test_ray_listens_on_every_interface_whatever_its_address(cluster: Cluster) -> None:
+    """Why the API's container is not on the published network (docs/decisions/0011). If this fails, it could be."""
+    assert {"gcs_server", "raylet"} <= listening_everywhere(cluster.head.pids())
+    assert "raylet" in listening_everywhere(cluster.second.pids())
+
+
 def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path: Path) -> None:
     wanted = digest(make_evaluator("in_process").evaluate(pendulum.problem(), pendulum.population(96), residuals=True))
     first, second = tmp_path / "first", tmp_path / "second"
@@ -137,5 +185,6 @@ def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path
         assert wait_for(lambda: cluster.second.raylet() in nodes_seen(second), WORK_SECONDS)
         cluster.second.kill()
         assert driver.answer() == wanted
+        assert wait_for(lambda: node_alive(cluster, "--node=127.0.0.2")[0] == 1, WORK_SECONDS)
 
         assert intruder.answer().startswith("refused: cannot join the Ray cluster")

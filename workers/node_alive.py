@@ -1,0 +1,73 @@
+"""Whether the Ray node of this machine is alive in its cluster: ``python -m workers.node_alive ray-head:6379``.
+
+Exits with 0 if it is, else with 1 and the reason. The head is asked, because a node that lost its head, or that the
+head has given up, may still have all its processes. One call takes half a second of processor time, to import Ray.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+import sys
+from typing import Any
+
+TIMEOUT_SECONDS = 5
+
+
+class NodeNotAliveError(RuntimeError):
+    """The node is not a living member of the cluster; the message says why."""
+
+
+def main(words: list[str] | None = None) -> int:
+    """Check one node, by default that of this machine."""
+    parser = argparse.ArgumentParser(prog="python -m workers.node_alive", description=__doc__)
+    parser.add_argument("head", help="address of the cluster's head, as host:port")
+    parser.add_argument(
+        "--node", help="IP address of the node (default: the one from which this machine reaches the head)"
+    )
+    options = parser.parse_args(words)
+    host, _, port = options.head.rpartition(":")
+    if not host or not port.isdigit():
+        parser.error(f"the head is {options.head!r}; write host:port, for example ray-head:6379")
+    try:
+        check(host, int(port), options.node)
+    except NodeNotAliveError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+def check(host: str, port: int, node: str | None = None) -> None:
+    """NodeNotAliveError unless the head at ``host``:``port`` counts ``node`` among its living nodes."""
+    try:
+        head, own = _addresses(host, port)
+    except OSError as error:
+        raise NodeNotAliveError(f"no Ray head answers at {host}:{port}: {error}") from error
+    alive = _living_nodes(f"{head}:{port}")
+    if (node or own) not in alive:
+        raise NodeNotAliveError(
+            f"no living node of the cluster has the address {node or own}; living: {', '.join(sorted(alive)) or 'none'}"
+        )
+
+
+def _addresses(host: str, port: int) -> tuple[str, str]:
+    """IP addresses of the head and of this machine, as the two see each other."""
+    with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
+        return connection.getpeername()[0], connection.getsockname()[0]
+
+
+def _living_nodes(address: str) -> set[str]:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray reads it when it is imported
+    from ray._raylet import GcsClient  # type: ignore[attr-defined]  # compiled
+    from ray.core.generated.gcs_pb2 import GcsNodeInfo
+
+    try:
+        found: dict[Any, Any] = GcsClient(address=address).get_all_node_info(timeout=TIMEOUT_SECONDS)
+    except Exception as error:  # Ray's own errors share no base class
+        raise NodeNotAliveError(f"the Ray head at {address} does not list its nodes: {error}") from error
+    return {node.node_manager_address for node in found.values() if node.state == GcsNodeInfo.ALIVE}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
