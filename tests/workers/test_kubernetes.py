@@ -152,6 +152,7 @@ def test_the_servers_probes_are_answered_by_any_name() -> None:
     paths = {kind: api[f"{kind}Probe"]["httpGet"]["path"] for kind in ("startup", "liveness", "readiness")}
     assert paths == {"startup": "/v1/health", "liveness": "/v1/health", "readiness": "/v1/ready"}
     assert set(paths.values()) <= guard.PROBES
+    for kind in paths:
         assert api[f"{kind}Probe"]["httpGet"]["port"] == api["ports"][0]["name"]
     patience = api["startupProbe"]["periodSeconds"] * api["startupProbe"]["failureThreshold"]
     assert patience >= 120, "Ray and the migration of a large database take their time"
