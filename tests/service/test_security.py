@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.abuse import uploads
 from diagnosis import DiagnosisSpec
-from records import limits
+from records import confined, limits
 from records.schema import dataset_schema
 from service import diagnosis_schemas, events, guard, http, protocol, schemas, settings, spec_schemas, turns
 from service.app import create_app
@@ -236,6 +236,10 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "rows of a recording": limits.MAX_ROWS,
         "markers": limits.MAX_MARKERS,
         "numbers of a dataset": limits.MAX_VALUES,
+        "numbers of a NetCDF upload": limits.MAX_UPLOADED_NETCDF_VALUES,
+        "memory to read a NetCDF upload": confined.limits_of_upload(0).memory_mib,
+        "processor time to read a small NetCDF upload": confined.limits_of_upload(0).processor_s,
+        "time to read a NetCDF upload": confined.limits_of_upload(guard.UPLOAD_LIMIT).wall_s,
         "bodies of a division": division.MAX_BODIES,
         "genes named by a request": listed(run, "genes"),
         "recordings named by a request": listed(run, "recordings"),
