@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,6 @@ from service.client import Client, WingfitError
 from service.database import FILE_NAME, Database
 from service.housekeeping import Housekeeping
 from service.settings import Settings
-from service.store import timestamp
 from service.tables import GenerationRow, RunRow
 from tests.service import toy
 from tests.service.conftest import Api, Gate, serving
@@ -114,10 +113,10 @@ def test_jobs_that_ended_long_ago_are_forgotten_where_it_is_asked_for(tmp_path: 
         for run in (old, new):
             api.finish(run)
     database, told = Database(tmp_path), list[str]()
+    assert Housekeeping(database, None, told.append).tidy() == 0  # from which on it counts
     with database.write() as session:
-        ended = timestamp(datetime.now(UTC) - timedelta(days=30, minutes=1))
-        session.execute(text("update run set finished_at = :ended where id = :id"), {"ended": ended, "id": old})
-    assert Housekeeping(database, None, told.append).tidy() == 0
+        earlier = text("update run set ended_at_service_seconds = ended_at_service_seconds - :by where id = :id")
+        session.execute(earlier, {"by": timedelta(days=30, minutes=1).total_seconds(), "id": old})
     assert Housekeeping(database, 31, told.append).tidy() == 0
     assert Housekeeping(database, 30, told.append).tidy() == 1
     assert told == [old]
