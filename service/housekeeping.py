@@ -5,23 +5,38 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 
-from sqlalchemy import select
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
 
 from service import store
+from service.clock import DAY, ServiceClock
 from service.database import Database, DatabaseClosedError
 from service.tables import DiagnosisRow, RunRow
 
 LOG = logging.getLogger("wingfit")
 EVERY_SECONDS = 3600.0
 
+JobTable = type[RunRow] | type[DiagnosisRow]
+TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
+
 
 class Housekeeping:
-    """Tidies at the start and every hour; datasets are never forgotten."""
+    """Tidies at the start and every hour; datasets are never forgotten.
 
-    def __init__(self, database: Database, keep_days: int | None, on_deleted: Callable[[str], None]) -> None:
+    The service's own clock counts how long ago a job ended, from the first tidying that saw it ended. The wall time
+    of the end is not used: nobody knows whether the wall clock was right then.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        keep_days: int | None,
+        on_deleted: Callable[[str], None],
+        clock: ServiceClock | None = None,
+    ) -> None:
         self._database, self._keep_days, self._on_deleted = database, keep_days, on_deleted
+        self._clock = clock or ServiceClock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._go, name="housekeeping", daemon=True)
 
@@ -37,26 +52,29 @@ class Housekeeping:
         """Tidy once; the number of jobs forgotten."""
         with self._database.write() as session:
             store.forget_answers(session)
+            now = self._clock.advance(session)
+            _note_ends(session, now)  # also where nothing is deleted: later that may be asked for
         if self._keep_days is None:
             return 0
-        ended = self._ended_before(store.timestamp(datetime.now(UTC) - timedelta(days=self._keep_days)))
+        ended = self._ended_before(now - self._keep_days * DAY)
         for table, job_id in ended:  # one transaction each: nobody waits long for the one that writes
             if self._stop.is_set():
                 break
             with self._database.write() as session:
-                session.delete(session.scalars(select(table).where(table.id == job_id)).one())
+                row = session.scalar(select(table).where(table.id == job_id))
+                if row is not None:  # somebody else may have deleted it
+                    session.delete(row)
             self._on_deleted(job_id)
         if ended:
             LOG.info("%d jobs that ended more than %d days ago were deleted", len(ended), self._keep_days)
         return len(ended)
 
-    def _ended_before(self, moment: str) -> list[tuple[type[RunRow] | type[DiagnosisRow], str]]:
-        tables: tuple[type[RunRow] | type[DiagnosisRow], ...] = (DiagnosisRow, RunRow)
+    def _ended_before(self, seconds: float) -> list[tuple[JobTable, str]]:
         with self._database.read() as session:
             return [
                 (table, job_id)
-                for table in tables
-                for job_id in session.scalars(select(table.id).where(table.finished_at < moment))
+                for table in TABLES
+                for job_id in session.scalars(select(table.id).where(table.ended_at_service_seconds < seconds))
             ]
 
     def _go(self) -> None:
@@ -69,3 +87,10 @@ class Housekeeping:
                 LOG.exception("tidying failed; it is tried again in an hour")
             if self._stop.wait(EVERY_SECONDS):
                 return
+
+
+def _note_ends(session: Session, now: float) -> None:
+    """Store the service's time with the jobs that have ended since the last tidying."""
+    for table in TABLES:
+        new = table.finished_at.is_not(None), table.ended_at_service_seconds.is_(None)
+        session.execute(update(table).where(*new).values(ended_at_service_seconds=now))
