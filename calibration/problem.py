@@ -92,9 +92,10 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
     finite = [bool(np.isfinite(one).all()) for one in kept]
     reasons = tuple(reason or (None if fine else told) for reason, fine in zip(observed.reasons, finite, strict=True))
     failed = np.array([reason is not None for reason in reasons])
-    squares = np.where(failed, np.inf, kept.sum(axis=1))
-    mean = np.sqrt(kept.mean(axis=1)) if record.kind == "forces" else np.sqrt(kept).mean(axis=1)
-    distance = np.where(failed, np.inf, mean)
+    # One row after the other: the order in which numpy sums along an axis depends on the number of rows.
+    squares = np.where(failed, np.inf, [one.sum() for one in kept])
+    forces = record.kind == "forces"
+    distance = np.where(failed, np.inf, [np.sqrt(one.mean()) if forces else np.sqrt(one).mean() for one in kept])
     return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None, record.kind)
 
 

@@ -1,7 +1,7 @@
-"""``python -m tests.workers.digests [THREADS] [--unguarded]``: digests of all bits of small computations, as JSON.
+"""Digests of all bits of small computations, as JSON: ``python -m tests.workers.digests [THREADS] [NAME ...]``.
 
-BLAS has as many threads as the environment gives it, or THREADS. ``--unguarded`` switches the guard off, to see which
-digests depend on it.
+Of all computations, or of those named. BLAS has as many threads as the environment gives it, or THREADS.
+``--unguarded`` switches the guard off, to see which digests depend on it.
 """
 
 from __future__ import annotations
@@ -35,11 +35,12 @@ SMALL = CalibrationSpec(division="4", mode="joint", genes=("E_f", "E_r", "D_E"),
 def main(arguments: list[str]) -> None:
     """Print the digests."""
     if "--unguarded" in arguments:
-        arguments.remove("--unguarded")
         OneBlasThread.__enter__ = lambda _: None  # type: ignore[method-assign]
         OneBlasThread.__exit__ = lambda *_: None  # type: ignore[method-assign]
-    with threadpool_limits(int(arguments[0]) if arguments else None):
-        digests = {name: digest(compute()) for name, compute in COMPUTATIONS.items()}
+    forced = [int(argument) for argument in arguments if argument.isdigit()]
+    names = [name for name in COMPUTATIONS if name in arguments] or list(COMPUTATIONS)
+    with threadpool_limits(forced[0] if forced else None):
+        digests = {name: digest(COMPUTATIONS[name]()) for name in names}
         libraries = ThreadpoolController().select(user_api="blas").info()
     print(json.dumps({"digests": digests, "threads": [library["num_threads"] for library in libraries]}))
 
