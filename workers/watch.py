@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
+from statistics import median
 
-# A unit may take FACTOR times as long as the longest one of its problem that was done so far, and SLACK_SECONDS more:
-# individuals near divergence take more beats than others, and other programs take the processors.
-FACTOR, SLACK_SECONDS = 20.0, 10.0
-# The first of its problem may take as long as any other problem's, and NEW_SECONDS at least; the very first, for which
-# kernels may have to be compiled, FIRST_SECONDS.
-NEW_SECONDS, FIRST_SECONDS = 30.0, 120.0
-PROBLEMS_REMEMBERED = 256
+# A unit may take FACTOR times as long as those of its problem mostly do, and SLACK_SECONDS more: individuals near
+# divergence take many times the beats of others, and other programs take the processors.
+FACTOR, SLACK_SECONDS = 60.0, 10.0
+# Until ENOUGH of its problem were done a unit may take as long as one of any other problem, and NEW_SECONDS at least; as
+# long as there is no other either, FIRST_SECONDS: kernels may have to be compiled.
+ENOUGH, NEW_SECONDS, FIRST_SECONDS = 3, 30.0, 120.0
+UNITS_REMEMBERED, PROBLEMS_REMEMBERED = 32, 256
 
 
 class Expectation:
-    """How long units take, by their problem; safe to use from several threads."""
+    """How long units mostly take, by their problem: the median, which one that had to compile kernels does not move.
+
+    Safe to use from several threads.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._longest: OrderedDict[str, float] = OrderedDict()
+        self._seconds: OrderedDict[str, deque[float]] = OrderedDict()
 
     def limit(self, key: str, attempt: int = 0) -> float:
         """Seconds after which a unit of the problem ``key`` hangs; twice as many with each attempt at the same unit.
@@ -28,17 +32,23 @@ class Expectation:
         So a unit that is slow, but honest, is done in the end, and one that never ends is given up.
         """
         with self._lock:
-            longest = self._longest.get(key, max(self._longest.values(), default=None))
-            least = FIRST_SECONDS if longest is None else 0.0 if key in self._longest else NEW_SECONDS
-        return float(max(least, SLACK_SECONDS + FACTOR * (longest or 0.0)) * 2**attempt)
+            usual = self._usual(key)
+            longest = max(map(self._usual, self._seconds), default=0.0) if not usual else usual
+        least = 0.0 if usual else NEW_SECONDS if longest else FIRST_SECONDS
+        return float(max(least, SLACK_SECONDS + FACTOR * longest) * 2**attempt)
+
+    def _usual(self, key: str) -> float:
+        """The median of the problem's units; 0 where too few were done."""
+        known = self._seconds.get(key, ())
+        return median(known) if len(known) >= ENOUGH else 0.0
 
     def done(self, key: str, seconds: float) -> None:
         """One unit took ``seconds``."""
         with self._lock:
-            self._longest[key] = max(seconds, self._longest.get(key, 0.0))
-            self._longest.move_to_end(key)
-            while len(self._longest) > PROBLEMS_REMEMBERED:
-                self._longest.popitem(last=False)
+            self._seconds.setdefault(key, deque(maxlen=UNITS_REMEMBERED)).append(seconds)
+            self._seconds.move_to_end(key)
+            while len(self._seconds) > PROBLEMS_REMEMBERED:
+                self._seconds.popitem(last=False)
 
 
 @dataclass(frozen=True)

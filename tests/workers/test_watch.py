@@ -16,7 +16,7 @@ import pytest
 from tests.workers import pendulum
 from tests.workers.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
 from workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
-from workers.watch import FACTOR, FIRST_SECONDS, NEW_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
+from workers.watch import ENOUGH, FACTOR, FIRST_SECONDS, NEW_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
 
 
 @pytest.fixture(params=DISTRIBUTED, scope="module")
@@ -116,30 +116,41 @@ def test_a_worker_that_died_is_no_live_one(tmp_path: Path) -> None:
         evaluator.close()
 
 
-def test_how_long_a_unit_may_take_follows_from_those_done() -> None:
+def expecting(**seconds: list[float]) -> Expectation:
     expected = Expectation()
-    assert expected.limit("a") == FIRST_SECONDS
-    expected.done("a", 0.5)
-    expected.done("a", 2.0)
-    expected.done("a", 1.0)
-    assert expected.limit("a") == SLACK_SECONDS + FACTOR * 2.0
+    for key, each in seconds.items():
+        for one in each:
+            expected.done(key, one)
+    return expected
+
+
+def test_how_long_a_unit_may_take_follows_from_those_done() -> None:
+    expected = expecting(a=[0.5, 0.4, 200.0, 0.6, 0.5])  # one had to compile
+    assert expected.limit("a") == SLACK_SECONDS + FACTOR * 0.5
     assert expected.limit("a", 3) == 8 * expected.limit("a")
-    assert expected.limit("b") == SLACK_SECONDS + FACTOR * 2.0, "another problem may take as long"
+    for _ in range(watch.UNITS_REMEMBERED):
+        expected.done("a", 2.0)
+    assert expected.limit("a") == SLACK_SECONDS + FACTOR * 2.0, "the last ones count"
 
 
 def test_a_new_problem_gets_more_time_than_one_that_is_known() -> None:
-    expected = Expectation()
-    expected.done("a", 0.001)
-    assert expected.limit("a") < expected.limit("b") == NEW_SECONDS < FIRST_SECONDS
+    assert Expectation().limit("a") == FIRST_SECONDS
+    assert expecting(a=[0.001] * (ENOUGH - 1)).limit("a") == FIRST_SECONDS
+    quick = expecting(a=[0.001] * ENOUGH)
+    assert quick.limit("a") < quick.limit("b") == NEW_SECONDS < FIRST_SECONDS
+    slow = expecting(a=[0.001] * ENOUGH, c=[3.0] * ENOUGH)
+    assert slow.limit("b") == slow.limit("c") == SLACK_SECONDS + FACTOR * 3.0 > NEW_SECONDS
+    assert slow.limit("a") == quick.limit("a")
 
 
 def test_of_many_problems_the_last_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "PROBLEMS_REMEMBERED", 3)
     expected = Expectation()
     for key in "abcad":
-        expected.done(key, 1.0)
-    expected.done("a", 5.0)
-    assert [key for key in "abcd" if expected.limit(key) == SLACK_SECONDS + FACTOR] == ["c", "d"]
+        for _ in range(ENOUGH):
+            expected.done(key, 1e-3)
+    quick = SLACK_SECONDS + FACTOR * 1e-3
+    assert [key for key in "abcd" if expected.limit(key) == quick] == ["a", "c", "d"]
 
 
 def test_counts_add_up() -> None:
