@@ -10,8 +10,8 @@ from statistics import median
 # A unit may take FACTOR times as long as those of its problem mostly do, and SLACK_SECONDS more: individuals near
 # divergence take many times the beats of others, and other programs take the processors.
 FACTOR, SLACK_SECONDS = 60.0, 10.0
-# Until ENOUGH of its problem were done a unit may take as long as one of any other problem, and NEW_SECONDS at least; as
-# long as there is no other either, FIRST_SECONDS: kernels may have to be compiled.
+# Until ENOUGH of its problem were done a unit may take as long as one of any other problem, and NEW_SECONDS at least;
+# as long as there is no other either, FIRST_SECONDS: kernels may have to be compiled.
 ENOUGH, NEW_SECONDS, FIRST_SECONDS = 3, 30.0, 120.0
 UNITS_REMEMBERED, PROBLEMS_REMEMBERED = 32, 256
 
@@ -33,7 +33,7 @@ class Expectation:
         """
         with self._lock:
             usual = self._usual(key)
-            longest = max(map(self._usual, self._seconds), default=0.0) if not usual else usual
+            longest = usual or max(map(self._usual, self._seconds), default=0.0)
         least = 0.0 if usual else NEW_SECONDS if longest else FIRST_SECONDS
         return float(max(least, SLACK_SECONDS + FACTOR * longest) * 2**attempt)
 
