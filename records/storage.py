@@ -47,7 +47,7 @@ def label_of(filename: str) -> str:
 
 def is_netcdf(data: bytes) -> bool:
     """Whether ``data`` is of the kind that only the HDF5 library reads."""
-    return data.startswith(_HDF5)
+    return data[: len(_HDF5)] == _HDF5
 
 
 def load_archive(data: bytes, filename: str) -> Dataset:
