@@ -24,8 +24,8 @@ TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
 class Housekeeping:
     """Tidies at the start and every hour; datasets are never forgotten.
 
-    The service's own clock counts how long ago a job ended, from the first tidying that saw it ended. The wall time of the
-    end is not used: nobody knows whether the wall clock was right then.
+    The service's own clock counts how long ago a job ended, from the first tidying that saw it ended. The wall time of
+    the end is not used: nobody knows whether the wall clock was right then.
     """
 
     def __init__(
