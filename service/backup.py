@@ -101,7 +101,7 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
-    """Copy to ``target`` what is found good; it is looked at where nobody else can change it any more."""
+    """Copy ``backup`` to ``target`` if the copy passes the checks; others may change the original."""
     part = target.with_suffix(".part")
     try:
         _copied(backup, part)
@@ -116,7 +116,7 @@ def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
 
 
 def _examined(copy: Path, name: Path) -> Contents:
-    """What a ``copy`` of the file ``name`` would bring; BackupError where it is not exactly what wingfit writes."""
+    """Check a ``copy`` of the file ``name`` and return its keys and owners; BackupError if it is not ours."""
     with _opened(copy, name) as opened:
         try:
             check_schema(opened)  # before anything is read that could be made to run
@@ -128,7 +128,7 @@ def _examined(copy: Path, name: Path) -> Contents:
 
 @contextmanager
 def _opened(path: Path, name: Path, mode: str = "ro&immutable=1") -> Iterator[sqlite3.Connection]:
-    """A database that nobody vouches for, called ``name`` in a BackupError about what is wrong with it."""
+    """Open a database that is not trusted; SQLite's errors become a BackupError that calls the file ``name``."""
     try:
         with closing(sqlite3.connect(f"file:{quote(str(path))}?mode={mode}", uri=True)) as copy:
             copy.text_factory = lambda text: text.decode(errors="replace")
