@@ -22,6 +22,7 @@ from records.assemble import assemble
 from records.dataset import Dataset
 from records.errors import DatasetError, fail
 from records.folder import DESCRIPTION, RECORDINGS
+from records.limits import MAX_DESCRIPTION_BYTES
 from records.table import Samples, too_much
 from records.yaml_text import read_yaml
 
@@ -73,13 +74,20 @@ def load_parsed(data: bytes, label: str) -> Dataset:
 
 
 def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
-    document = read_yaml(archive.read(DESCRIPTION), f"{label}: {DESCRIPTION}")
-    layout = json.loads(archive.read(LAYOUT))
+    document = read_yaml(_text(archive, DESCRIPTION), f"{label}: {DESCRIPTION}")
+    layout = json.loads(_text(archive, LAYOUT))
 
     def read(name: str, room: int) -> Samples:
         return _samples(archive, name, layout[name], room)
 
     return assemble(document, read, lambda name: f"{label}: {name}", lambda name, _, row: f"{label}: {name}, {row}")
+
+
+def _text(archive: zipfile.ZipFile, name: str) -> bytes:
+    """An entry of at most ``MAX_DESCRIPTION_BYTES``: what wrote it read a stranger's file."""
+    if archive.getinfo(name).file_size > MAX_DESCRIPTION_BYTES:
+        raise ValueError(f"{name} is too large")
+    return archive.read(name)
 
 
 def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], room: int) -> Samples:

@@ -49,7 +49,7 @@ class Caller:
         return None if self.may("admin") else self.owner
 
 
-# Where the gate leaves the caller in the scope of a request, for the layers outside of it.
+# Name under which the gate puts the caller into the scope of a request, for the layers outside the gate.
 CALLER_OF = "wingfit.caller"
 # None where no key is asked for, and in the threads that compute.
 CALLER: ContextVar[Caller | None] = ContextVar("caller", default=None)
@@ -109,7 +109,7 @@ class KeyRing:
         return self._good.get(digest(secret))
 
     def admits(self, caller: Caller | None) -> bool:
-        """Whether who was let in before still is: the key was not revoked, or none was asked for."""
+        """Whether the key of ``caller`` is still good; True for None, where no key is needed."""
         return caller is None or caller.key in self._ids
 
     @property

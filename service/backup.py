@@ -6,11 +6,14 @@ import errno
 import os
 import shutil
 import sqlite3
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import mkstemp
 from urllib.parse import quote
 
+from service.backup_contents import Contents, ContentsError, contents, revoke_keys
+from service.backup_schema import SchemaError, check_schema
 from service.database import FILE_NAME, Database, DataFolderError, FolderLock, make_folder
 from service.permissions import FILE, open_new
 
@@ -56,24 +59,22 @@ def forget_snapshots(folder: Path) -> None:
 
 def check(path: Path) -> None:
     """BackupError unless ``path`` is a whole database of this service."""
-    try:
-        with closing(sqlite3.connect(f"file:{quote(str(path))}?mode=ro&immutable=1", uri=True)) as copy:
-            (found,) = copy.execute("PRAGMA integrity_check(1)").fetchone()
-            versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
-    except sqlite3.Error as error:
-        raise BackupError(f"{path} is no backup of wingfit, or is damaged: {error}; take another one") from None
-    if found != "ok" or len(versions) != 1:
-        raise BackupError(f"{path} is damaged: {found}; take another one")
+    with _opened(path, path) as copy:
+        versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
+        if len(versions) != 1:
+            raise BackupError(f"{path} is no backup of wingfit; take another one")
+        _check_pages(copy, path)
 
 
-def restore(backup: Path, folder: Path) -> None:
+def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
     """Put a copy into a data folder that has no database; BackupError says why not.
 
-    Jobs that were under way go on from their last stored step when a server starts there.
+    The copy may come from a stranger: it is put back only if it is whole and its schema is exactly ours. Its API keys
+    are revoked unless ``keep_keys``: whoever made the copy may have them. Returns the keys that are good in the copy
+    and the owners of its data. Jobs that were under way go on from their last stored step when a server starts there.
     """
     if not backup.is_file():
         raise BackupError(f"{backup} is no file; name what 'wingfit backup' wrote")
-    check(backup)
     target = folder / FILE_NAME
     try:
         make_folder(folder)
@@ -88,14 +89,60 @@ def restore(backup: Path, folder: Path) -> None:
             raise BackupError(
                 f"{folder} holds {', '.join(sorted(present))} already; move that away, or name another folder"
             )
-        _copied(backup, target)
+        brought = _put(backup, target, keep_keys)
     finally:
         lock.release()
     try:
-        Database(folder).close()  # to the newest schema, or a refusal of one that is newer
+        Database(folder).close()  # to the newest schema
     except DataFolderError as error:
         target.unlink(missing_ok=True)
         raise BackupError(str(error)) from None
+    return brought
+
+
+def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
+    """Copy ``backup`` to ``target`` if the copy passes the checks; others may change the original."""
+    part = target.with_suffix(".part")
+    try:
+        _copied(backup, part)
+        brought = _examined(part, backup)
+        if not keep_keys:
+            with _opened(part, backup, "rw") as copy, copy:
+                revoke_keys(copy)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+    return brought
+
+
+def _examined(copy: Path, name: Path) -> Contents:
+    """Check a ``copy`` of the file ``name`` and return its keys and owners; BackupError if it is not ours."""
+    with _opened(copy, name) as opened:
+        try:
+            check_schema(opened)  # before anything is read that could be made to run
+            _check_pages(opened, name)
+            return contents(opened)
+        except (SchemaError, ContentsError) as error:
+            raise BackupError(f"{name} is not put back: {error}") from None
+
+
+@contextmanager
+def _opened(path: Path, name: Path, mode: str = "ro&immutable=1") -> Iterator[sqlite3.Connection]:
+    """Open a database that is not trusted; SQLite's errors become a BackupError that calls the file ``name``."""
+    try:
+        with closing(sqlite3.connect(f"file:{quote(str(path))}?mode={mode}", uri=True)) as copy:
+            copy.text_factory = lambda text: text.decode(errors="replace")
+            copy.execute("PRAGMA trusted_schema=OFF")
+            copy.execute("PRAGMA cell_size_check=ON")
+            yield copy
+    except sqlite3.Error as error:
+        raise BackupError(f"{name} is no backup of wingfit, or is damaged: {error}; take another one") from None
+
+
+def _check_pages(copy: sqlite3.Connection, name: Path) -> None:
+    (found,) = copy.execute("PRAGMA integrity_check(1)").fetchone()
+    if found != "ok":
+        raise BackupError(f"{name} is damaged: {found}; take another one")
 
 
 def move(copy: Path, target: Path) -> None:
@@ -111,14 +158,12 @@ def move(copy: Path, target: Path) -> None:
 
 
 def _copied(backup: Path, target: Path) -> None:
-    """Copy whole or not at all."""
-    part = target.with_suffix(".part")
+    """Copy to a new file, whole or not at all."""
     try:
-        with backup.open("rb") as source, open_new(part) as into:
+        with backup.open("rb") as source, open_new(target) as into:
             shutil.copyfileobj(source, into)
             into.flush()
             os.fsync(into.fileno())
-        part.replace(target)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        target.unlink(missing_ok=True)
         raise BackupError(f"cannot write {target}: {error.strerror}") from error

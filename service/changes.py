@@ -49,7 +49,7 @@ class Changes:
         self.wake_all()
 
     def wake_all(self) -> None:
-        """Something changed that concerns every watcher, whatever he watches."""
+        """Wake every watcher, whatever it watches."""
         with self._lock:
             watchers = [watcher for group in self._watchers.values() for watcher in group]
         _wake(watchers)

@@ -211,10 +211,20 @@ def _close_to_others(path: Path) -> None:
             permissions.tighten(Path(name))
 
 
-def migrate(engine: Engine, revision: str = "head") -> None:
-    """Bring the schema to ``revision``, the newest."""
+def revisions() -> list[str]:
+    """The versions of the schema that this wingfit knows, oldest first."""
+    return [script.revision for script in ScriptDirectory.from_config(_migrations()).walk_revisions()][::-1]
+
+
+def _migrations() -> Config:
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    return config
+
+
+def migrate(engine: Engine, revision: str = "head") -> None:
+    """Bring the schema to ``revision``, the newest."""
+    config = _migrations()
     script = ScriptDirectory.from_config(config)
     with engine.connect() as connection:
         config.attributes["connection"] = connection

@@ -14,9 +14,9 @@ REMEDY = "make room there, or set TMPDIR to a folder with room and restart the s
 
 
 def while_spooling(error: BaseException | None) -> str | None:
-    """What to say about an error of reading a request, whose large parts the framework puts into temporary files.
+    """Detail of the answer to an error while a request was read; None for errors of another kind.
 
-    None where the error is another one.
+    The framework writes the large parts of a request to temporary files.
     """
     if not isinstance(error, OSError):
         return None
@@ -28,7 +28,7 @@ def while_spooling(error: BaseException | None) -> str | None:
 
 
 def anywhere(error: BaseException) -> str | None:
-    """What to say about an error from anywhere in a request; None where it is no lack of room."""
+    """Detail of the answer to an error from anywhere in a request; None unless room is missing."""
     if not isinstance(error, OSError):
         return None
     if _is_without_folder(error):

@@ -106,8 +106,8 @@ async def _on_problem(_: Request, error: Exception) -> Response:
 
 async def _on_http(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)  # noqa: S101
-    if lack := disk_space.while_spooling(error.__cause__):
-        return _without_room(request, error.__cause__, lack)
+    if detail := disk_space.while_spooling(error.__cause__):
+        return _without_room(request, error.__cause__, detail)
     kind = KINDS.get(error.status_code) or HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
     return response(ProblemError(error.status_code, kind, str(error.detail)), error.headers)
 
@@ -135,8 +135,8 @@ def _without_room(request: Request, error: BaseException | None, detail: str) ->
 
 def of_a_mistake(request: Request, error: Exception) -> Response:
     """The answer to an error that nothing else answers: a full disk, or a mistake of ours, which the log describes."""
-    if lack := disk_space.anywhere(error):
-        return _without_room(request, error, lack)
+    if detail := disk_space.anywhere(error):
+        return _without_room(request, error, detail)
     LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)
     return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from service.client import DEFAULT_URL, Client, WingfitError
 from service.commands.datasets import size
-from service.commands.output import Url, note, progress
+from service.commands.output import Url, moment, note, progress, say, table
+
+if TYPE_CHECKING:
+    from service.backup_contents import Contents
 
 
 def backup(
@@ -45,8 +48,13 @@ def backup(
 def restore(
     file: Annotated[Path, typer.Argument(help="What 'wingfit backup' wrote.")],
     data: Annotated[Path, typer.Option(help="Data folder without a database, which is created if missing.")],
+    keep_keys: Annotated[
+        bool, typer.Option("--keep-keys", help="Let the API keys of the backup in as before; else they are revoked.")
+    ] = False,
 ) -> None:
     """Put a backup into an empty data folder; jobs that were under way go on when a server starts there.
+
+    Prints the API keys that are good in the backup, and whose data it brings.
 
     Example: wingfit restore wings.sqlite3 --data wingfit-data
     """
@@ -54,10 +62,36 @@ def restore(
     from service.backup import restore as put_back
 
     try:
-        put_back(file, data)
+        brought = put_back(file, data, keep_keys=keep_keys)
     except BackupError as error:
         raise WingfitError("nothing was restored", str(error)) from None
+    _list(brought)
+    note(_about_keys(len(brought.keys), data, keep_keys))
     note(f"restored into {data}; start it: wingfit serve --data {data}")
+
+
+def _list(brought: Contents) -> None:
+    say("API keys that are good in the backup:")
+    keys = [[key.id, key.name, key.owner, ", ".join(key.scopes), moment(key.created_at)] for key in brought.keys]
+    table(["id", "name", "owner", "good for", "made"], keys)
+    say("owners of what is in it:")
+    owners = [
+        ["(no key)" if one.owner is None else one.owner, str(one.datasets), str(one.runs), str(one.diagnoses)]
+        for one in brought.owners
+    ]
+    table(["owner", ">datasets", ">runs", ">diagnoses"], owners, "nobody: there is no data")
+
+
+def _about_keys(count: int, data: Path, keep_keys: bool) -> str:
+    make = f"make a new one: wingfit keys create NAME --scope admin --data {data}"
+    if not count:
+        return f"the backup brings no good API key; where the server needs one, {make}"
+    if keep_keys:
+        return f"{count} API keys of the backup are good in {data} too: whoever has one gets in"
+    return (
+        f"{count} API keys of the backup are revoked in {data}: whoever made the backup may have them. "
+        f"If you trust it, restore with --keep-keys into another folder; else {make}"
+    )
 
 
 def _copy_of(data: Path, file: Path) -> None:

@@ -25,6 +25,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the server's answer 
 PIPE_WIDTH = 160
 PLAIN_EVERY_S = 5.0
 WHOLE_BELOW = 1e6
+REVERSING = ("LRE", "RLE", "PDF", "LRO", "RLO", "LRI", "RLI", "FSI", "PDI")
 
 Report = Callable[..., None]
 
@@ -40,9 +41,16 @@ def err() -> Console:
 
 
 def _shown(text: str, *, lines: bool = True) -> str:
-    """``text`` without characters that steer a terminal: a name may be somebody else's."""
+    """``text`` without characters that steer a terminal, reverse the text or cannot be printed.
+
+    A name may be somebody else's.
+    """
     kept = "\n\t" if lines else ""
-    return "".join(one if one in kept or unicodedata.category(one) != "Cc" else "\ufffd" for one in text)
+    return "".join(one if one in kept or not _steers(one) else "\ufffd" for one in text)
+
+
+def _steers(character: str) -> bool:
+    return unicodedata.category(character) in ("Cc", "Cs") or unicodedata.bidirectional(character) in REVERSING
 
 
 def say(text: str) -> None:

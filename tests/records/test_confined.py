@@ -6,6 +6,7 @@ import io
 import os
 import sys
 import time
+import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,9 +19,10 @@ import pytest
 
 from records import Dataset, DatasetError, load_archive
 from records.confined import STORED, Limits, convert_netcdf, limits_of_upload
+from records.folder import DESCRIPTION
 from records.limits import MIB
 from records.netcdf import write_netcdf
-from records.parsed import load_parsed
+from records.parsed import LAYOUT, load_parsed
 from tests.records.compare import assert_same
 from tests.records.samples import falcon_dataset
 from tests.records.vehicles import delfly_dataset
@@ -234,6 +236,19 @@ def test_a_stored_form_that_is_damaged_says_so(damage: Callable[[bytes], bytes])
     form = convert_netcdf(netcdf(), "wing.nc")
     with pytest.raises(DatasetError, match="stored form is damaged"):
         load_parsed(damage(form), "wing.nc")
+
+
+@pytest.mark.parametrize("name", [DESCRIPTION, LAYOUT])
+def test_a_stored_form_that_would_unpack_to_gigabytes_is_refused(name: str) -> None:
+    lie = io.BytesIO()
+    with (
+        zipfile.ZipFile(io.BytesIO(convert_netcdf(netcdf(), "wing.nc"))) as honest,
+        zipfile.ZipFile(lie, "w", zipfile.ZIP_DEFLATED) as made,
+    ):
+        for entry in honest.namelist():
+            made.writestr(entry, bytes(64 * MIB) if entry == name else honest.read(entry))
+    with pytest.raises(DatasetError, match=f"damaged \\({name} is too large\\)"):
+        load_parsed(lie.getvalue(), "wing.nc")
 
 
 def test_no_process_is_left() -> None:

@@ -1,7 +1,7 @@
 """What the API process does on a cluster, for the two-node test: joins, evaluates on command, tells what came out.
 
 Run as ``python -m tests.workers.driver ADDRESS``; each line on standard input is JSON [folder for notes, seconds per
-unit, individuals], answered by a line with the digest of the evaluation.
+unit, individuals], answered by a line with the digest of the evaluation; no individuals: with the number of workers.
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ def main(address: str) -> None:
     tell("joined")
     for line in sys.stdin:
         folder, seconds, individuals = json.loads(line)
+        if not individuals:
+            tell(str(evaluator.standing.workers))
+            continue
         problem = pendulum.problem(pendulum.Note(Path(folder), seconds))
         evaluation = evaluator.evaluate(problem, pendulum.population(individuals), residuals=True)
         tell(digest(evaluation))

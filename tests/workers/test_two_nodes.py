@@ -22,6 +22,7 @@ from workers import make_evaluator
 
 START_SECONDS = 90.0
 WORK_SECONDS = 120.0
+NOTICED_SECONDS = 30.0
 
 
 @dataclass
@@ -151,6 +152,12 @@ def test_ray_listens_on_every_interface_whatever_its_address(cluster: Cluster) -
     assert "raylet" in listening_everywhere(cluster.second.pids())
 
 
+def workers(driver: Driver) -> int:
+    """How many the evaluator says there are."""
+    driver.ask(Path(), 0.0, 0)
+    return int(driver.answer())
+
+
 def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path: Path) -> None:
     wanted = digest(make_evaluator("in_process").evaluate(pendulum.problem(), pendulum.population(96), residuals=True))
     first, second = tmp_path / "first", tmp_path / "second"
@@ -181,10 +188,12 @@ def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path
             shared.append(nodes_seen(generation) == raylets)
         assert sum(shared) >= 8, shared
 
+        assert workers(driver) == 2
         driver.ask(second, 0.3, 96)
         assert wait_for(lambda: cluster.second.raylet() in nodes_seen(second), WORK_SECONDS)
         cluster.second.kill()
         assert driver.answer() == wanted
+        assert wait_for(lambda: workers(driver) == 1, NOTICED_SECONDS), "a node that is gone is still counted"
         assert wait_for(lambda: node_alive(cluster, "--node=127.0.0.2")[0] == 1, WORK_SECONDS)
 
         assert intruder.answer().startswith("refused: cannot join the Ray cluster")
