@@ -8,10 +8,12 @@ from collections.abc import Iterable, Mapping
 from records.errors import nearest
 
 PREFIX = "WINGFIT_"
-# Variables that other parts of wingfit read (the client, Compose, tests) and a server's environment may hold too.
-OF_OTHERS = frozenset(
-    f"{PREFIX}{name}" for name in ("URL", "API_KEY", "CPUS_PER_WORKER", "FAIL_POINT", "TEST_NODE", "FUZZ_GOOD")
-)
+# Variables that other parts of wingfit read, and that may be in a server's environment too.
+OF_CLIENTS = ("URL", "API_KEY")
+OF_COMPOSE = ("CPUS_PER_WORKER", "WORKER_MEMORY", "API_MEMORY", "HEAD_MEMORY", "PIDS", "IMAGE")
+OF_SLURM = ("VENV", "STATE", "SCRATCH", "BACKUP_SECONDS", "RAY_PORT", "RAY_OPTIONS", "HEAD_CPUS")
+OF_TESTS = ("FAIL_POINT", "TEST_NODE", "FUZZ_GOOD")
+OF_OTHERS = frozenset(f"{PREFIX}{name}" for name in (*OF_CLIENTS, *OF_COMPOSE, *OF_SLURM, *OF_TESTS))
 # Kubernetes sets these in every container for each Service whose name begins with "wingfit".
 OF_KUBERNETES = re.compile(
     rf"{PREFIX}(\w+_)?(SERVICE_HOST|SERVICE_PORT(_\w+)?|PORT_\d+_(TCP|UDP|SCTP)(_(PROTO|PORT|ADDR))?)=.*"

@@ -57,6 +57,7 @@ def test_every_variable_of_the_project_is_known() -> None:
     files = [path for path in ROOT.iterdir() if path.suffix in (".yml", ".md") or path.name == "Dockerfile"]
     for folder in ("service", "workers", "benchmarks", "docs"):
         files += [path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".md")]
+    files += [path for path in (ROOT / "deploy").rglob("*") if path.is_file()]
     text = "\n".join(path.read_text() for path in files)
     names = set(re.findall(r"\bWINGFIT_[A-Z_]*[A-Z]\b", text))
     assert {"WINGFIT_URL", "WINGFIT_KEEP_DAYS", "WINGFIT_CPUS_PER_WORKER", "WINGFIT_TEST_NODE"} <= names
