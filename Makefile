@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-rest check serve format lock install pin-image check-image clean
+.PHONY: demo proof test test-service test-pages test-rest check serve format lock install pin-image check-image clean
 
 demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m service.demo
@@ -15,11 +15,15 @@ proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a 
 serve: $(INSTALLED)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: $(INSTALLED)  ## every check and every test, two at a time
-	@$(MAKE) --no-print-directory -k -j2 test-rest test-service check
+test: $(INSTALLED)  ## every check and every test, three at a time: servers and browsers wait more than they compute
+	@$(MAKE) --no-print-directory -k -j3 test-rest test-service test-pages check
 
-test-service:  # servers and browsers: they wait more than they compute
-	$(BIN)/python -m pytest tests/service
+PAGES := $(wildcard tests/service/test_page*.py tests/service/test_*_page.py)
+test-service:
+	$(BIN)/python -m pytest tests/service $(PAGES:%=--ignore %)
+
+test-pages:
+	$(BIN)/python -m pytest $(PAGES)
 
 test-rest:
 	$(BIN)/python -m pytest --ignore tests/service
