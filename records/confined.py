@@ -33,6 +33,7 @@ FILES_OPEN = 64
 FAULTS = 3
 # Exit statuses that are error numbers: there is no room for the answer.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
+PASSED_ON = ("PATH", "LANG", "LC_ALL", "TMPDIR", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 LONGEST_FAULTS, LONGEST_TRACE = 64 * 2**10, 4000
 
 AGAIN = "the file may be damaged: write it again, or upload a zip"
@@ -49,6 +50,7 @@ class Limits:
         processor_s: processor time, s.
         wall_s: time, s; more than that of the processor, for which others wait too.
         output_mib: size of the project's own form, MiB.
+        storage: whether chunks, filters and texts of fixed length are limited (:mod:`records.netcdf`).
     """
 
     values: int
@@ -56,6 +58,7 @@ class Limits:
     processor_s: int
     wall_s: int
     output_mib: int
+    storage: bool = True
 
 
 def limits_of_upload(size: int) -> Limits:
@@ -74,7 +77,7 @@ def limits_of_upload(size: int) -> Limits:
 
 
 # For files that earlier versions read and stored, some of them larger than what is taken now.
-STORED = Limits(values=MAX_VALUES, memory_mib=3072, processor_s=300, wall_s=900, output_mib=1024)
+STORED = Limits(values=MAX_VALUES, memory_mib=3072, processor_s=300, wall_s=900, output_mib=1024, storage=False)
 
 
 def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> bytes:
@@ -100,8 +103,9 @@ def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> byt
 
 def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Limits) -> int:
     """Exit status of the child over its standard streams; below 0 the signal that ended it."""
-    command = [sys.executable, "-m", "records.confined", json.dumps({"label": label, "limits": asdict(limits)})]
-    environment = os.environ | {
+    command = [sys.executable, "-P", "-m", "records.confined", json.dumps({"label": label, "limits": asdict(limits)})]
+    # No more of the server's environment than is needed: it may hold keys and tokens.
+    environment = {name: os.environ[name] for name in PASSED_ON if name in os.environ} | {
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
         "OPENBLAS_NUM_THREADS": "1",
         "HDF5_PLUGIN_PATH": os.devnull,  # filters are code: none but the library's own
@@ -144,7 +148,7 @@ def _refusal(answer: bytes, label: str) -> DatasetError:
         said = json.loads(answer)
         faults = [Fault(str(where), value and str(value), str(message)) for where, value, message in said["faults"]]
         return DatasetError(faults, int(said["found"]))
-    except (ValueError, KeyError, TypeError):
+    except Exception:  # whatever it is that a hostile file made it say
         return fail(label, None, f"the HDF5 library fails on it; {AGAIN}")
 
 
@@ -167,7 +171,7 @@ def main(arguments: Sequence[str]) -> None:
     if sys.platform == "linux":  # elsewhere there is no such limit, or no way to tell what is taken already
         _limit(resource.RLIMIT_AS, _address_space() + limits.memory_mib * MIB)
     try:
-        _, parsed = parse_netcdf(sys.stdin.buffer, label, limits.values)
+        _, parsed = parse_netcdf(sys.stdin.buffer, label, limits.values, storage=limits.storage)
         pack(parsed, sys.stdout.buffer)
     except DatasetError as error:
         _refuse([[fault.where, fault.value, fault.message] for fault in error.errors], error.found)

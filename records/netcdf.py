@@ -51,10 +51,11 @@ _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeErro
 
 
 class Limit(NamedTuple):
-    """Numbers that may be read: ``left`` of ``most``."""
+    """Numbers that may be read: ``left`` of ``most``; and whether it matters how they are stored."""
 
     left: int
     most: int
+    storage: bool
 
 
 def write_netcdf(dataset: Dataset) -> bytes:
@@ -92,8 +93,13 @@ def read_netcdf(data: bytes, label: str) -> Dataset:
     return parse_netcdf(io.BytesIO(data), label)[0]
 
 
-def parse_netcdf(opened: BinaryIO, label: str, most: int = MAX_VALUES) -> tuple[Dataset, Parsed]:
-    """Read a NetCDF-4 file of at most ``most`` numbers: the dataset, and what it was built from."""
+def parse_netcdf(
+    opened: BinaryIO, label: str, most: int = MAX_VALUES, *, storage: bool = True
+) -> tuple[Dataset, Parsed]:
+    """Read a NetCDF-4 file of at most ``most`` numbers: the dataset, and what it was built from.
+
+    ``storage``: refuse chunks, filters and texts of fixed length by which a small file takes much memory.
+    """
     with _damage(label), h5py.File(opened, "r") as file:
         text, samples = _attribute(file, "dataset_yaml", label), dict[str, Samples]()
         document = read_yaml(text, f"{label}: dataset_yaml")
@@ -109,7 +115,7 @@ def parse_netcdf(opened: BinaryIO, label: str, most: int = MAX_VALUES) -> tuple[
             with _damage(where):
                 group = _group(listed, name, where)
                 forces = model_of(document.data) is VehicleDatasetFile
-                limit = Limit(room, most)
+                limit = Limit(room, most, storage)
                 samples[name] = _forces(group, where, limit) if forces else _tracks(group, where, markers, limit)
                 return samples[name]
 
@@ -192,7 +198,7 @@ def _tracks(group: Any, where: str, known: list[str], limit: Limit) -> Samples:
     if count > MAX_MARKERS:
         raise fail(where, count, f"{count} markers; at most {MAX_MARKERS} are read: remove some")
     _check_size(times, positions, where, limit)
-    markers = _names(names, "marker", where)
+    markers = _names(names, "marker", where, limit)
     _check_names(markers, known, where)
     values = _numbers(positions).reshape(frames, 3 * count)
     return Samples(_numbers(times), values, np.arange(frames), markers=markers)
@@ -208,7 +214,7 @@ def _forces(group: Any, where: str, limit: Limit) -> Samples:
         )
         raise fail(where, list(forces.shape), message)
     _check_size(times, forces, where, limit)
-    found = _names(names, "axis", where)
+    found = _names(names, "axis", where, limit)
     axes = tuple(axis for axis in AXES if axis in found)
     if len(axes) != len(found):
         raise fail(where, ", ".join(found), f"axis is {', '.join(found)}; it must hold x, z, or both")
@@ -236,7 +242,8 @@ def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
         if variable.dtype.kind != "f" or variable.dtype.itemsize > 8:
             message = f"{variable.name} is of type {variable.dtype}; write 32- or 64-bit floating-point numbers"
             raise fail(where, str(variable.dtype), message)
-        _check_storage(variable, where)
+        if limit.storage:
+            _check_storage(variable, where)
 
 
 def _check_storage(variable: Any, where: str) -> None:
@@ -256,15 +263,16 @@ def _check_storage(variable: Any, where: str) -> None:
         raise fail(where, str(filters), message)
 
 
-def _names(variable: Any, name: str, where: str) -> tuple[str, ...]:
+def _names(variable: Any, name: str, where: str, limit: Limit) -> tuple[str, ...]:
     if h5py.check_string_dtype(variable.dtype) is None:
         raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
-    if variable.dtype.itemsize > MAX_NAME_BYTES:
+    if limit.storage and variable.dtype.itemsize > MAX_NAME_BYTES:
         message = (
             f"each {name} takes {variable.dtype.itemsize} bytes; at most {MAX_NAME_BYTES} are read: shorten the type"
         )
         raise fail(where, str(variable.dtype), message)
-    _check_storage(variable, where)
+    if limit.storage:
+        _check_storage(variable, where)
     return tuple(str(text) for text in variable.asstr()[:])
 
 

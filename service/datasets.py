@@ -6,10 +6,12 @@ its own, and stored in the project's own form beside the archive; later only thi
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import OrderedDict
 from typing import NamedTuple
 
+from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from records import Dataset
@@ -17,9 +19,10 @@ from records.confined import STORED, Limits, convert_netcdf
 from records.parsed import load_parsed
 from records.storage import is_netcdf, label_of
 from service import store
-from service.database import Database
+from service.database import Database, is_full
 from service.engine import Engine
 
+LOG = logging.getLogger("wingfit")
 KEPT, KEPT_BYTES = 8, 2**28
 
 
@@ -69,9 +72,18 @@ class Datasets:
             return load_parsed(parsed, filename)
         opened = self.open(archive, filename, STORED)
         if opened.parsed is not None:  # stored by an earlier version
-            with self._database.write() as session:
-                store.keep_parsed(session, dataset_id, opened.parsed)
+            self._keep_parsed(dataset_id, opened.parsed)
         return opened.dataset
+
+    def _keep_parsed(self, dataset_id: str, parsed: bytes) -> None:
+        """Store what only saves time later, if there is room."""
+        try:
+            with self._database.write() as session:
+                store.keep_parsed(session, dataset_id, parsed)
+        except OperationalError as error:
+            if not is_full(error):
+                raise
+            LOG.warning("the stored form of %s is not kept: the disk is full or fails (%s)", dataset_id, error.orig)
 
     def _known(self, dataset_id: str) -> Dataset | None:
         with self._lock:

@@ -50,7 +50,8 @@ class Pool:
     @property
     def workers(self) -> int | None:
         """Number of workers that live, where the evaluator knows it."""
-        return self.standing.workers if self.standing else None
+        standing = self.standing
+        return standing.workers if standing else None
 
     @property
     def standing(self) -> Standing | None:

@@ -139,10 +139,11 @@ class Protocol(HttpToolsProtocol):
         metrics: Metrics | None = self.app_state.get(METRICS)
         if metrics is not None:
             metrics.slow_clients.inc()
-        line = "hung up on %s, which took %.1f KiB/s of %s; at least %g KiB/s are needed"
-        LOG.info(line, self.client, rate / 2**10, self.scope["path"], SLOWEST_BYTES_PER_SECOND / 2**10)
         self._forget_untaken()
         self.transport.abort()
+        path = self.scope["path"] if self.scope else "a read"  # one that came by the short way was not parsed
+        line = "hung up on %s, which took %.1f KiB/s of %s; at least %g KiB/s are needed"
+        LOG.info(line, self.client, rate / 2**10, path, SLOWEST_BYTES_PER_SECOND / 2**10)
 
     def _forget_untaken(self) -> None:
         """Let the operating system drop what waits when the connection is closed; it would keep it for minutes."""

@@ -266,6 +266,8 @@ class Runner:
     def _start(self, job: Known) -> tuple[JobRow, Points]:
         def write() -> tuple[JobRow, Points, tuple[Instruction, ...]]:
             with self._database.write() as session:
+                if self._stopping:  # what starts after the stop has taken note of what runs would count as a death
+                    raise InterruptedStepError
                 row = job.work.row(session, job.id)
                 instructions = _step(row, jobs.Start())
                 return row, job.work.begin(session, row), instructions

@@ -60,7 +60,7 @@ class _Server(uvicorn.Server):
         self._deadline.begin()
         # Not uvicorn's own, which ends the process by raising the signal again: a clean stop is no death by signal.
         first, self.should_exit = not self.should_exit, True
-        self.force_exit = not first and sig == signal.SIGINT
+        self.force_exit |= not first and sig == signal.SIGINT
         service = getattr(self._app.state, "service", None)
         if service is not None and first:  # a second signal may interrupt the handler of the first
             service.begin_stop()

@@ -129,7 +129,8 @@ class RayEvaluator:
     def _look(self) -> None:
         """Count the processors of nodes that live, again and again; a head that is gone holds up this thread alone."""
         while not self._over.wait(LOOK_SECONDS):
-            with suppress(EvaluatorClosedError), self._call():
+            # Without a head Ray raises what it happens to; the count is old then, and so counts as none.
+            with suppress(Exception), self._call():
                 count = _count_workers()
                 if not count and self._workers:
                     LOG.warning("the Ray cluster has no worker any more; evaluations wait until one joins")

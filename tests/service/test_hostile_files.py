@@ -71,7 +71,7 @@ def test_what_an_earlier_version_stored_is_read_the_same_way_and_once(
 def test_one_that_makes_the_library_loop_hurts_nobody_else(
     api: Api, netcdf: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    short = replace(limits_of_upload(0), processor_s=2)
+    short = replace(limits_of_upload(0), processor_s=4)
     monkeypatch.setattr(confined, "limits_of_upload", lambda _: short)
     dataset = _upload(api, netcdf).json()["id"]
     with ThreadPoolExecutor(1) as other:
@@ -83,7 +83,7 @@ def test_one_that_makes_the_library_loop_hurts_nobody_else(
             assert api.client.get(f"/v1/datasets/{dataset}").status_code == 200
             assert api.upload()["id"]
             assert _upload(api, netcdf).status_code == 201
-            assert time.monotonic() - before < 5
+            assert time.monotonic() - before < 15
         refused = hostile.result()
         assert time.monotonic() - began < 20
     assert refused.status_code == 422
