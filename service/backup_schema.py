@@ -40,8 +40,8 @@ def check_schema(database: sqlite3.Connection) -> None:
         raise SchemaError("it has no table alembic_version as wingfit makes it")
     expected = _expected(_version(database))
     for kind, name in sorted(present.keys() ^ expected.keys(), key=repr):
-        said = "has" if (kind, name) in present else "lacks"
-        raise SchemaError(f"it {said} the {kind} {name!a}, unlike what wingfit makes")
+        verb = "has" if (kind, name) in present else "does not have"
+        raise SchemaError(f"it {verb} the {kind} {name!a}, unlike what wingfit makes")
     for kind, name in sorted(expected):
         if present[kind, name] != expected[kind, name]:
             raise SchemaError(f"its {kind} {name!a} is not as wingfit makes it")

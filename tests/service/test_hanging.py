@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import httpx
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -60,12 +61,18 @@ def hanging() -> Iterator[Hanging]:
     evaluator.over.set()
 
 
+def _hung(client: httpx.Client, hanging: Hanging) -> tuple[Api, str]:
+    """The API, and a run whose worker hangs."""
+    api = Api(client)
+    run: str = api.submit(api.upload()["id"])["id"]
+    assert hanging.called.wait(10)
+    return api, run
+
+
 def test_a_cancelled_run_ends_though_its_worker_hangs(settings: Settings, hanging: Hanging) -> None:
     app = create_app(settings, engine=Evaluating(), make_evaluator=lambda: hanging)
     with serving(app) as client:
-        api = Api(client)
-        run = api.submit(api.upload()["id"])["id"]
-        assert hanging.called.wait(10)
+        api, run = _hung(client, hanging)
         began = time.monotonic()
         api.control(run, "cancel")
         assert api.finish(run, 5.0)["state"] == "CANCELLED"
@@ -76,9 +83,7 @@ def test_a_cancelled_run_ends_though_its_worker_hangs(settings: Settings, hangin
 def test_the_service_stops_at_once_though_a_worker_hangs(settings: Settings, hanging: Hanging) -> None:
     app = create_app(settings, engine=Evaluating(), make_evaluator=lambda: hanging)
     with serving(app) as client:
-        api = Api(client)
-        run = api.submit(api.upload()["id"])["id"]
-        assert hanging.called.wait(10)
+        _, run = _hung(client, hanging)
         began = time.monotonic()
     assert time.monotonic() - began < 3
     with serving(create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)) as client:
