@@ -5,7 +5,8 @@ that ends this process alone. Each file gets a new one, so that none can change 
 the project's own form (:mod:`records.parsed`), which the caller checks again: nothing that it says is trusted.
 
 ``python -m records.confined JSON`` (label and limits) reads the file from standard input and writes its own form to
-standard output; where the exit status is ``FAULTS``, JSON that says what is wrong with the file.
+standard output; where the exit status is ``FAULTS``, JSON that says what is wrong with the file. Any other status but 0
+is a failure: ``BROKE``, or a signal, while it read; 1, the interpreter's own, before it began.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import traceback
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -30,7 +32,8 @@ from records.limits import MAX_UPLOADED_NETCDF_VALUES, MAX_VALUES, MIB
 # Whoever uploads waits, but whoever only looks must not wait for him.
 NICENESS = 5
 FILES_OPEN = 64
-FAULTS = 3
+FAULTS, BROKE = 3, 4
+NOT_BEGUN = 1
 # Exit statuses that are error numbers: there is no room for the answer.
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT)
 PASSED_ON = ("PATH", "LANG", "LC_ALL", "TMPDIR", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
@@ -38,6 +41,10 @@ LONGEST_FAULTS, LONGEST_TRACE = 64 * 2**10, 4000
 
 AGAIN = "the file may be damaged: write it again, or upload a zip"
 LOG = logging.getLogger("wingfit")
+
+
+class ReaderError(RuntimeError):
+    """The process that reads files did not do so, and not for the file's sake."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +92,7 @@ def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> byt
     """The dataset in ``data`` in the project's own form; DatasetError says what is wrong with it.
 
     ``label`` is what messages call the file. Without ``limits`` they are those of an upload of this size. OSError where
-    the temporary folder is full or no process can be started.
+    the temporary folder is full or no process can be started; ReaderError where it ended before it read the file.
     """
     limits = limits or limits_of_upload(len(data))
     with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as made, tempfile.TemporaryFile() as said:
@@ -128,6 +135,10 @@ def _failure(status: int, label: str, limits: Limits) -> Exception:
     """Why a child ended without an answer."""
     if status in NO_ROOM:
         return OSError(status, os.strerror(status))
+    if status == NOT_BEGUN:
+        return ReaderError("the process that reads NetCDF files cannot start; the log of the server says why")
+    if status == -signal.SIGKILL:
+        return ReaderError("the system ended the process that read the file, most likely for lack of memory; try later")
     return fail(label, None, _why(status, limits))
 
 
@@ -181,7 +192,11 @@ def main(arguments: Sequence[str]) -> None:
         )
         _refuse([[label, None, message]], 1)
     except OSError as error:  # of the answer: those of the file are faults
-        sys.exit(error.errno)
+        traceback.print_exc()
+        sys.exit(error.errno if error.errno in NO_ROOM else BROKE)
+    except Exception:  # whatever it is that a hostile file makes the library do
+        traceback.print_exc()
+        sys.exit(BROKE)
 
 
 def _limit(which: int, most: int, slack: int = 0) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import struct
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from records.assemble import assemble
 from records.dataset import Dataset
 from records.errors import DatasetError, fail
 from records.folder import DESCRIPTION, RECORDINGS
-from records.limits import MAX_DESCRIPTION_BYTES
+from records.limits import MAX_DESCRIPTION_BYTES, MAX_RECORDINGS
 from records.table import Samples, too_much
 from records.yaml_text import read_yaml
 
@@ -30,6 +31,9 @@ NUMBER = "<f8"
 # Recorded numbers end in noise: packing them harder takes many times as long and saves a few percent.
 DEFLATE_LEVEL = 1
 BLOCK = 2**17  # numbers that are packed at a time
+# The end of a zip that is smaller than 2 GiB and has no comment; of a larger one, 20 bytes in front of it begin so.
+_END, _END_OF_LARGE = struct.Struct("<4s4H2LH"), b"PK\6\7"
+LONGEST_ENTRY = 1024  # bytes of an entry in the directory: its name, and 46
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 Array = npt.NDArray[np.float64]
@@ -63,6 +67,7 @@ def pack(parsed: Parsed, into: IO[bytes]) -> None:
 def load_parsed(data: bytes, label: str) -> Dataset:
     """The dataset that was packed; ``label`` is what messages call it. DatasetError where ``data`` is damaged."""
     try:
+        _check_directory(data)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _dataset(archive, label)
     except DatasetError:
@@ -71,7 +76,19 @@ def load_parsed(data: bytes, label: str) -> Dataset:
         raise fail(label, None, f"its stored form is damaged ({error}); upload the file again") from None
 
 
+def _check_directory(data: bytes) -> None:
+    """A directory that lists more than we ever write would take memory before anything of it is looked at."""
+    end = data[-_END.size :]
+    if len(end) < _END.size or data[-_END.size - 20 :].startswith(_END_OF_LARGE):
+        raise ValueError("it does not end as it was written")
+    signature, _, _, _, entries, size, _, _ = _END.unpack(end)
+    if signature != b"PK\5\6" or entries > MAX_RECORDINGS + 2 or size > entries * LONGEST_ENTRY:
+        raise ValueError(f"it lists {entries} entries over {size} bytes; at most {MAX_RECORDINGS + 2} were written")
+
+
 def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
+    if any(entry.compress_type != zipfile.ZIP_DEFLATED or entry.flag_bits & 1 for entry in archive.infolist()):
+        raise ValueError("it is packed as none was written")
     document = read_yaml(_text(archive, DESCRIPTION), f"{label}: {DESCRIPTION}")
     layout = json.loads(_text(archive, LAYOUT))
 

@@ -29,6 +29,7 @@ from sqlalchemy.pool import QueuePool, StaticPool
 
 from service import fail_points, permissions
 from service.access import OwnSession
+from service.disk_space import FULL
 
 FILE_NAME = "wingfit.sqlite3"
 LOCK_NAME = "wingfit.lock"
@@ -46,6 +47,8 @@ class DatabaseClosedError(RuntimeError):
 
 def is_full(error: Exception) -> bool:
     """Whether a write failed for lack of space, or because the disk does not take it: later it may."""
+    if isinstance(error, OSError):
+        return error.errno in FULL
     text = str(getattr(error, "orig", error))
     return isinstance(error, OperationalError | sqlite3.OperationalError) and any(
         sign in text for sign in ("is full", "disk I/O error")

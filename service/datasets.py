@@ -14,7 +14,7 @@ from typing import NamedTuple
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
-from records import Dataset
+from records import Dataset, DatasetError
 from records.confined import STORED, Limits, convert_netcdf
 from records.parsed import load_parsed
 from records.storage import is_netcdf, label_of
@@ -38,8 +38,10 @@ class Datasets:
 
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
-        self._lock, self._loading = threading.Lock(), threading.Lock()
+        self._lock, self._loading, self._converting = threading.Lock(), threading.Lock(), threading.Lock()
         self._kept: OrderedDict[str, Dataset] = OrderedDict()
+        # Files of earlier versions that could not be read: found out once, it may have taken a quarter of an hour.
+        self._damaged: dict[str, DatasetError] = {}
 
     def get(self, dataset_id: str) -> Dataset:
         """The dataset, or a 404."""
@@ -47,11 +49,12 @@ class Datasets:
             row = store.dataset(session, dataset_id)
         if (known := self._known(dataset_id)) is not None:
             return known
-        # One at a time, and once: a large one takes a minute, and gigabytes.
-        with self._loading:
+        old = self._is_old(dataset_id)
+        # One at a time, and once: a large one takes a minute, and gigabytes. A conversion holds up conversions alone.
+        with self._converting if old else self._loading:
             if (known := self._known(dataset_id)) is not None:
                 return known
-            loaded = self._load(dataset_id, row.filename)
+            loaded = self._convert(dataset_id, row.filename) if old else self._load(dataset_id, row.filename)
             self.keep(dataset_id, loaded)
         return loaded
 
@@ -65,13 +68,28 @@ class Datasets:
 
     def _load(self, dataset_id: str, filename: str) -> Dataset:
         with self._database.read() as session:
-            parsed, archive = store.parsed(session, dataset_id), b""
-            if parsed is None:
-                archive = store.archive(session, dataset_id)
-        if parsed is not None:
-            return load_parsed(parsed, filename)
-        opened = self.open(archive, filename, STORED)
-        if opened.parsed is not None:  # stored by an earlier version
+            parsed = store.parsed(session, dataset_id)
+            archive = store.archive(session, dataset_id) if parsed is None else b""
+        return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
+
+    def _is_old(self, dataset_id: str) -> bool:
+        """Whether it is a NetCDF file that an earlier version stored, which is opened once more."""
+        with self._database.look() as connection:
+            return is_netcdf(store.archive_piece(connection, dataset_id, 0, 8)) and not store.has_parsed(
+                connection, dataset_id
+            )
+
+    def _convert(self, dataset_id: str, filename: str) -> Dataset:
+        if dataset_id in self._damaged:
+            raise self._damaged[dataset_id].with_traceback(None)
+        with self._database.read() as session:
+            archive = store.archive(session, dataset_id)
+        try:
+            opened = self.open(archive, filename, STORED)
+        except DatasetError as error:
+            self._damaged[dataset_id] = error
+            raise
+        if opened.parsed is not None:
             self._keep_parsed(dataset_id, opened.parsed)
         return opened.dataset
 
@@ -107,3 +125,4 @@ class Datasets:
         store.delete_dataset(session, dataset_id)
         with self._lock:
             self._kept.pop(dataset_id, None)
+            self._damaged.pop(dataset_id, None)

@@ -8,26 +8,32 @@ from collections.abc import Callable
 
 import numpy.typing as npt
 
-from calibration.evaluator import Evaluator
 from calibration.problem import Evaluation, Problem
 from service.work import InterruptedStepError
+from workers import RunningEvaluator
 
 LOOK_SECONDS = 0.2
 
 
 class InterruptibleEvaluator:
-    """Evaluates in a thread of its own, and leaves that alone once ``interrupted`` says so."""
+    """Evaluates in a thread of its own, and leaves that alone once ``interrupted`` says so.
 
-    def __init__(self, evaluator: Evaluator, interrupted: Callable[[], bool]) -> None:
+    The evaluator is told as well: it drops what no worker has begun. But it may hang itself, and is not waited for.
+    """
+
+    def __init__(self, evaluator: RunningEvaluator, interrupted: Callable[[], bool]) -> None:
         self._evaluator, self._interrupted = evaluator, interrupted
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F]; InterruptedStepError once interrupted, whatever the evaluator does."""
         answers: queue.SimpleQueue[Evaluation | BaseException] = queue.SimpleQueue()
+        # Remembered for the thread that is left alone: whoever interrupts may forget it.
+        left = threading.Event()
 
         def work() -> None:
             try:
-                answers.put(self._evaluator.evaluate(problem, values, residuals=residuals))
+                evaluate = self._evaluator.evaluate
+                answers.put(evaluate(problem, values, residuals=residuals, interrupted=left.is_set))
             except BaseException as error:
                 answers.put(error)
 
@@ -39,6 +45,7 @@ class InterruptibleEvaluator:
                 answer = answers.get(timeout=LOOK_SECONDS)
             except queue.Empty:
                 if self._interrupted():
+                    left.set()
                     raise InterruptedStepError from None
                 continue
             if isinstance(answer, BaseException):

@@ -7,8 +7,8 @@ import threading
 from collections.abc import Callable
 from typing import Literal
 
-from calibration.evaluator import Evaluator
 from service.runner import lower_priority, message
+from workers import RunningEvaluator
 from workers.watch import Standing
 
 LOG = logging.getLogger("wingfit.evaluator")
@@ -23,11 +23,11 @@ NO_WORKER = (
 class Pool:
     """The evaluator that all runs share. ``error`` says why there is none yet."""
 
-    def __init__(self, make: Callable[[], Evaluator], on_ready: Callable[[Evaluator], None]) -> None:
+    def __init__(self, make: Callable[[], RunningEvaluator], on_ready: Callable[[RunningEvaluator], None]) -> None:
         self._make, self._on_ready = make, on_ready
         self._stop = threading.Event()
         self._lock = threading.Lock()
-        self._evaluator: Evaluator | None = None
+        self._evaluator: RunningEvaluator | None = None
         self.error: str | None = None
         self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
 
@@ -56,8 +56,8 @@ class Pool:
     @property
     def standing(self) -> Standing | None:
         """The workers that live, and what became of others; None before there are any."""
-        standing = getattr(self._evaluator, "standing", None)
-        return standing if isinstance(standing, Standing) else None
+        evaluator = self._evaluator
+        return evaluator.standing if evaluator else None
 
     def close(self, seconds: float = CLOSE_SECONDS) -> bool:
         """Close the evaluator, or abandon it after ``seconds``; whether it closed."""
@@ -65,6 +65,8 @@ class Pool:
         with self._lock:
             evaluator, self._evaluator = self._evaluator, None
         if evaluator is None:
+            if self._thread.ident:  # it closes what it is starting
+                self._thread.join(seconds)
             return not self._thread.is_alive()
         closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)
         closing.start()
@@ -85,7 +87,7 @@ class Pool:
             self._stop.wait(RETRY_SECONDS[min(attempt, len(RETRY_SECONDS) - 1)])
             attempt += 1
 
-    def _adopt(self, evaluator: Evaluator) -> None:
+    def _adopt(self, evaluator: RunningEvaluator) -> None:
         with self._lock:
             if not self._stop.is_set():
                 self._evaluator, self.error = evaluator, None

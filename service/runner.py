@@ -12,13 +12,13 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple, TypeVar
 
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
-from calibration.evaluator import Evaluator
 from service import store
 from service.changes import Changes
 from service.database import Database, DatabaseClosedError, is_full
@@ -27,7 +27,7 @@ from service.problems import conflict
 from service.remedies import with_remedy
 from service.tables import JobRow
 from service.work import InterruptedStepError, Points, Step, Work
-from workers import jobs
+from workers import RunningEvaluator, jobs
 from workers.jobs import Instruction
 
 LOG = logging.getLogger("wingfit.runs")
@@ -84,7 +84,7 @@ class Runner:
         # Jobs that had better be alone, lest others are given up for what one of them does.
         self._suspects: set[Known] = set()
         self._threads: dict[Known, threading.Thread] = {}
-        self._evaluator: Evaluator | None = None
+        self._evaluator: RunningEvaluator | None = None
         self._stopping = False
 
     # -- from outside ----------------------------------------------------------------------------------------
@@ -99,11 +99,11 @@ class Runner:
                     for row, work in self._unfinished(session, state)
                 ]
                 todo = [(job, _step(row, jobs.Restart(self._most_starts))) for row, job in left]
-                self._suspects = {job for row, job in left if row.starts >= max(1, self._most_starts - 1)}
+                self._suspects = {job for row, job in left if self._is_suspect(row)}
             for job, instructions in todo:
                 self._obey(job, instructions)
 
-    def attach(self, evaluator: Evaluator) -> None:
+    def attach(self, evaluator: RunningEvaluator) -> None:
         """Begin to compute with ``evaluator``."""
         with self._lock:
             self._evaluator = evaluator
@@ -119,12 +119,16 @@ class Runner:
             with self._database.write() as session:
                 row = work.row(session, job_id)
                 job = Known(work, job_id, row.owner)
+                if row.state == jobs.State.RUNNING and job not in self._threads and not self._stopping:
+                    _step(row, jobs.Restart(self._most_starts))  # its end could not be stored
                 try:
                     instructions = _step(row, event)
                 except jobs.IllegalTransition as error:
                     raise conflict(f"{job}: {error}", state=row.state) from None
             if row.wish == jobs.Wish.CANCEL:
                 self._cancelled.add(job)
+            if Instruction.ENQUEUE in instructions and self._is_suspect(row):
+                self._suspects.add(job)
             self._obey(job, (*instructions, Instruction.PUBLISH))
         return row
 
@@ -166,6 +170,10 @@ class Runner:
         return list(self._threads)
 
     # -- the waiting line ------------------------------------------------------------------------------------
+
+    def _is_suspect(self, row: JobRow) -> bool:
+        """Whether one more end of the server would count as this job's fault."""
+        return row.starts >= max(1, self._most_starts - 1)
 
     def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, Work]]:
         found = [(row, work) for work in self._kinds for row in store.jobs_in(session, work.table, state)]
@@ -219,7 +227,7 @@ class Runner:
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
-    def _work(self, job: Known, evaluator: Evaluator) -> None:
+    def _work(self, job: Known, evaluator: RunningEvaluator) -> None:
         lower_priority()
         try:
             self._compute(job, evaluator)
@@ -235,15 +243,22 @@ class Runner:
                 self._threads.pop(job, None)
                 self._progressed.pop(job, None)
                 self._cancelled.discard(job)
-                self._suspects.discard(job)
+                if job not in self._waiting:  # it was paused and resumed
+                    self._suspects.discard(job)
             self._dispatch()
 
-    def _compute(self, job: Known, evaluator: Evaluator) -> None:
+    def _compute(self, job: Known, evaluator: RunningEvaluator) -> None:
         row, points = self._start(job)
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("%s: starts after step %d", job, row.generations)
         interruptible = InterruptibleEvaluator(evaluator, lambda: self._stopping or job in self._cancelled)
-        for step in job.work.steps(row, interruptible):
+
+        def begun() -> Iterator[Step]:
+            steps = job.work.steps(row, interruptible)
+            return chain([next(steps)], steps)
+
+        # What is prepared before the first step may need room, too.
+        for step in self._patiently(job, begun):
             points.append((earlier + time.monotonic() - began, step.progress))
             goes_on = self._store(job, step, points)
             if self._stopping or not goes_on:
@@ -255,10 +270,10 @@ class Runner:
         while True:
             try:
                 return write()
-            except OperationalError as error:
+            except (OperationalError, OSError) as error:
                 if not is_full(error) or self._stopping:
                     raise
-                LOG.error("%s waits: the disk is full or fails (%s)", job, error.orig)
+                LOG.error("%s waits: the disk is full or fails (%s)", job, getattr(error, "orig", error))
             pause = min(ROOM_SECONDS[0] + waited, ROOM_SECONDS[1])
             waited += pause
             time.sleep(pause)
@@ -273,6 +288,9 @@ class Runner:
                 return row, job.work.begin(session, row), instructions
 
         row, points, instructions = self._patiently(job, write)
+        with self._lock:
+            if job in self._waiting:  # paused and resumed since it was taken out of the line
+                self._take(job)
         self._obey(job, instructions)
         return row, points
 

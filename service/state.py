@@ -10,7 +10,6 @@ from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
 
-from calibration.evaluator import Evaluator
 from service import threads
 from service.access import KeyRing
 from service.backup import forget_snapshots
@@ -42,13 +41,14 @@ from service.turns import (
     Turns,
 )
 from service.work import Work
+from workers import RunningEvaluator
 from workers.jobs import State
 from workers.watch import Standing
 
 LOG = logging.getLogger("wingfit")
 LOOK_SECONDS = 1.0
 
-MakeEvaluator = Callable[[], Evaluator]
+MakeEvaluator = Callable[[], RunningEvaluator]
 
 
 class Service:
@@ -191,7 +191,7 @@ class Service:
 
 
 def _maker(settings: Settings) -> MakeEvaluator:
-    def make() -> Evaluator:
+    def make() -> RunningEvaluator:
         from workers import make_evaluator
 
         return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)

@@ -118,6 +118,11 @@ def parsed(session: Session, dataset_id: str) -> bytes | None:
     return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
 
 
+def has_parsed(connection: sqlite3.Connection, dataset_id: str) -> bool:
+    """Whether the dataset is stored in the project's own form."""
+    return connection.execute("SELECT 1 FROM parsed WHERE dataset_id = ?", (dataset_id,)).fetchone() is not None
+
+
 def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
     """Store a dataset in the project's own form, unless it was deleted meanwhile."""
     if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):

@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Protocol, get_args
 
+import numpy.typing as npt
+
 from calibration.evaluator import Evaluator
-from workers.watch import Standing
+from calibration.problem import Evaluation, Problem
+from workers.watch import Standing, never
 
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 
 
 class RunningEvaluator(Evaluator, Protocol):
-    """An evaluator that also says what it is, for the health page."""
+    """An evaluator that also says what it is, for the health page, and whose calls can be given up."""
+
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
+        """Misfits of ``values`` [B, F]; EvaluationInterruptedError soon after ``interrupted`` turns true.
+
+        Units that no worker has begun by then are dropped.
+        """
+        ...
 
     @property
     def kind(self) -> EvaluatorKind:

@@ -68,11 +68,14 @@ class Guardian:
 
     def _say(self, line: bytes) -> None:
         """Say it, to a new process where there is none or it ended; without one the work goes on unwatched."""
-        with self._lock, suppress(OSError):
-            if self._process is None or self._process.poll() is not None:
-                self._process = self._started()
-            assert self._process.stdin is not None  # noqa: S101  # a pipe
-            self._process.stdin.write(line + b"\n")
+        with self._lock:
+            for _ in range(2):  # it may end between the look and the word
+                with suppress(OSError):
+                    if self._process is None or self._process.poll() is not None:
+                        self._process = self._started()
+                    assert self._process.stdin is not None  # noqa: S101  # a pipe
+                    self._process.stdin.write(line + b"\n")
+                    return
 
     def _started(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-I", "-S", "-c", _SCRIPT, str(self._silence)]

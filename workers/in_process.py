@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy.typing as npt
 
 from calibration.evaluator import as_batch, gather, run_unit, units
 from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluatorClosedError
-from workers.watch import Standing
+from workers.errors import EvaluationInterruptedError, EvaluatorClosedError
+from workers.watch import Standing, never
 
 
 class InProcessEvaluator:
@@ -26,13 +27,22 @@ class InProcessEvaluator:
         """One, that cannot be lost without this process."""
         return Standing(self.workers)
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem."""
         batch = as_batch(values)
         done: list[Misfit] = []
         for unit in units(problem, len(batch)):
             if self._closed:
                 raise EvaluatorClosedError(self.kind)
+            if interrupted():
+                raise EvaluationInterruptedError
             done.append(run_unit(problem, batch, unit, residuals=residuals))
         return gather(problem, done)
 

@@ -16,6 +16,7 @@ import signal
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
@@ -26,14 +27,12 @@ import numpy.typing as npt
 
 from calibration.evaluator import as_batch, gather, units
 from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluatorClosedError, WorkerLostError
+from workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
 from workers.share import ProblemMemory, Task, child_environment, lower_priority
-from workers.watch import Expectation, Standing, Tally
+from workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally, never
 
 LOG = logging.getLogger("wingfit.workers")
 LOOK_SECONDS = 0.5
-# Deaths in a row after which a unit is given up: of processes that had begun it, as with Ray, and of any.
-ATTEMPTS, STARTS = 6, 60
 Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
@@ -65,7 +64,14 @@ class ProcessPoolEvaluator:
         """The processes that live, and what became of others."""
         return self._tally.standing(sum(worker.alive for worker in self._pool))
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem; several threads may call."""
         batch = as_batch(values)
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
@@ -74,7 +80,7 @@ class ProcessPoolEvaluator:
             with self._lock:
                 self._check_open()
                 futures += [self._threads.submit(self._run, problem, task, residuals) for task in tasks]
-            return gather(problem, [future.result() for future in futures])
+            return gather(problem, [_result(future, interrupted) for future in futures])
         except CancelledError:
             raise EvaluatorClosedError(self.kind) from None
         finally:
@@ -113,7 +119,7 @@ class ProcessPoolEvaluator:
                     misfit, seconds = worker.run(problem, task, residuals, limit)
                 except _Died as death:
                     # One that dies while it starts has not seen the unit yet.
-                    blamed, died = blamed + (death.begun or death.hung), died + 1
+                    blamed, died = blamed + death.begun, died + 1
                     self._restart(worker, death, what, limit)
                 else:
                     self._expectation.done(problem.key, seconds)
@@ -133,10 +139,22 @@ class ProcessPoolEvaluator:
             worker.release()
             worker.start()
         self._tally.count(died=not death.hung, hung=death.hung, restarts=1)
-        if death.hung:
+        if death.hung and death.begun:
             LOG.warning("worker process %s hung: %s took more than %.0f s; it was replaced", pid, what, limit)
+        elif death.hung:
+            LOG.warning("worker process %s hung before it had begun %s; it was replaced", pid, what)
         else:
             LOG.warning("worker process %s died (%s) with %s; it was replaced", pid, worker.last_exit, what)
+
+
+def _result(future: Future[Misfit], interrupted: Callable[[], bool]) -> Misfit:
+    while not interrupted():
+        try:
+            return future.result(LOOK_SECONDS)
+        except TimeoutError:
+            if future.done():  # it is the model's own
+                return future.result()
+    raise EvaluationInterruptedError
 
 
 class _Died(Exception):  # noqa: N818  internal
@@ -158,6 +176,8 @@ class _Worker:
         # When the unit under way is overdue; under the lock, so that no process is killed for a unit that is done.
         self._deadline: float | None = None
         self._hung = False
+        # Whether the process has done a unit: one that still starts gets more time.
+        self._proven = False
         self._watching = threading.Lock()
         self._process: SpawnProcess | None = None
         self._connection: Connection | None = None
@@ -172,6 +192,7 @@ class _Worker:
         # The process has its own copy now; ours must go, or its death would not end the pipe.
         theirs.close()
         self._process, self._connection = process, ours
+        self._proven = self._hung = False
 
     @property
     def pid(self) -> int | None:
@@ -188,13 +209,13 @@ class _Worker:
             return False
 
     def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
-        """Have ``task`` done within ``limit`` s, and how long it took; _Died when the process is dead.
+        """Have ``task`` done within ``limit`` s of its beginning, and how long it took; _Died when the process is dead.
 
         Raises what the model raised.
         """
-        self._expect(time.monotonic() + limit)
+        self._expect(limit if self._proven else max(limit, START_SECONDS))
         try:
-            return self._done(problem, task, residuals)
+            return self._done(problem, task, residuals, limit)
         finally:
             self._expect(None)
 
@@ -205,12 +226,12 @@ class _Worker:
                 self._deadline, self._hung = None, True
                 self.kill()
 
-    def _expect(self, deadline: float | None) -> None:
+    def _expect(self, seconds: float | None) -> None:
+        """Something is to happen within ``seconds``, or nothing is expected any more."""
         with self._watching:
-            self._deadline = deadline
-            self._hung = self._hung and deadline is None
+            self._deadline = None if seconds is None else time.monotonic() + seconds
 
-    def _done(self, problem: Problem, task: Task, residuals: bool) -> tuple[Misfit, float]:
+    def _done(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
         if self._connection is None:
             raise _Died(begun=False)
         kind: str = "not yet"
@@ -221,9 +242,11 @@ class _Worker:
                 kind, content = answer
                 if kind == "need problem":
                     self._connection.send(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
+                if kind == "begun":
+                    self._expect(limit)
         except (EOFError, OSError) as error:
-            hung, self._hung = self._hung, False
-            raise _Died(begun=kind == "begun", hung=hung) from error
+            raise _Died(begun=kind == "begun", hung=self._hung) from error
+        self._proven = True
         if kind == "raised":
             raise content
         misfit, seconds = content

@@ -3,9 +3,6 @@
 Arrays that come out of Ray's shared memory are read-only, and compiled kernels take those for another type:
 a problem travels as bytes. One call costs milliseconds: units travel in batches, a few per processor.
 Ray's default strategy leaves whole generations to the node that had the last one: batches are spread.
-Nothing is ever cancelled: in Ray 2.60 a cancellation that meets the end of its task aborts this process.
-A worker that hangs ends itself (:mod:`workers.guardian`). A batch whose worker or node is lost is done again from
-here and not by Ray, which would say nothing of it.
 """
 
 from __future__ import annotations
@@ -17,41 +14,24 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy.typing as npt
 
 from calibration.evaluator import as_batch, gather, units
 from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluatorClosedError, WorkerLostError
+from workers.errors import EvaluationInterruptedError, EvaluatorClosedError
 from workers.guardian import Guardian
-from workers.ray_connection import Connection, ray, ray_errors
+from workers.ray_batches import Batch, Batches, Cluster
+from workers.ray_connection import Connection, ray
 from workers.share import PROBLEMS_KEPT, ProblemMemory, Task, lower_priority
-from workers.watch import Expectation, Standing, Tally
+from workers.watch import START_SECONDS, Expectation, Standing, Tally, never
 
 LOG = logging.getLogger("wingfit.workers")
-BATCHES_PER_WORKER = 3
-# Losses in a row after which a batch is given up, as with the pool of processes.
-ATTEMPTS = 6
-POLL_SECONDS = 0.2
 STOP_SECONDS = 30.0
 LOOK_SECONDS = 2.0
 # A head that has not answered for so long is gone, and so are all workers.
 STALE_SECONDS = 20.0
-
-Done = list[tuple[Misfit, float]]
-Submit = Callable[[tuple[int, ...], int], "tuple[Any, _Batch]"]
-
-
-@dataclass(frozen=True)
-class _Batch:
-    """Tasks that travel together, by their numbers; ``attempt`` counts the workers that were lost with it."""
-
-    numbers: tuple[int, ...]
-    attempt: int
-    limit: float
-    began: float
 
 
 class RayEvaluator:
@@ -82,24 +62,32 @@ class RayEvaluator:
         """The processors that there are, and what became of workers."""
         return self._tally.standing(self.workers)
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem; several threads may call."""
         batch = as_batch(values)
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
+
+        def submit(batch: Batch, limit: float) -> Any:
+            mine = [tasks[number] for number in batch.numbers]
+            return self._run_tasks.remote(problem.key, [self._put(problem)], mine, limit, residuals)
+
+        def check() -> None:
+            if self._closed:
+                raise EvaluatorClosedError(self.kind)
+            if interrupted():
+                raise EvaluationInterruptedError
+
+        cluster = Cluster(lambda: self.workers, submit, lambda: self._forget(problem), check)
         with self._call():
-            # Dealt out like cards, so that recordings that cost more are spread over all batches.
-            count = min(len(tasks), max(1, self.workers) * BATCHES_PER_WORKER)
-            hands = [tuple(range(first, len(tasks), count)) for first in range(count)]
-            reference = self._put(problem)
-
-            def submit(numbers: tuple[int, ...], attempt: int) -> tuple[Any, _Batch]:
-                limit = self._expectation.limit(problem.key, attempt)
-                mine = [tasks[number] for number in numbers]
-                batch = _Batch(numbers, attempt, limit, time.monotonic())
-                return self._run_tasks.remote(problem.key, [reference], mine, limit, residuals), batch
-
-            done = self._collect(problem, dict(submit(hand, 0) for hand in hands), submit)
-        return gather(problem, [done[number] for number in range(len(tasks))])
+            batches = Batches(problem, len(tasks), cluster, self._expectation, self._tally)
+            return gather(problem, batches.collect())
 
     def close(self) -> None:
         """Leave the cluster, and stop it if it is our own; calls under way raise EvaluatorClosedError."""
@@ -146,44 +134,10 @@ class RayEvaluator:
             self._references.move_to_end(problem.key)
             return self._references[problem.key]
 
-    def _collect(self, problem: Problem, pending: dict[Any, _Batch], submit: Submit) -> dict[int, Misfit]:
-        """What became of all tasks, by their numbers; batches whose worker was lost are submitted again."""
-        done: dict[int, Misfit] = {}
-        while pending:
-            if self._closed:
-                raise EvaluatorClosedError(self.kind)
-            ready, _ = ray.wait(list(pending), num_returns=len(pending), timeout=POLL_SECONDS)
-            for reference in ready:
-                batch = pending.pop(reference)
-                try:
-                    answers: Done = ray.get(reference)
-                except ray_errors.RayTaskError as error:
-                    raise (error.cause if isinstance(error.cause, Exception) else RuntimeError(str(error))) from error
-                except ray_errors.RayError as error:
-                    self._lost(problem, batch, error)
-                    again, later = submit(batch.numbers, batch.attempt + 1)
-                    pending[again] = later
-                    continue
-                for number, (misfit, seconds) in zip(batch.numbers, answers, strict=True):
-                    done[number] = misfit
-                    self._expectation.done(problem.key, seconds)
-        return done
-
-    def _lost(self, problem: Problem, batch: _Batch, error: Exception) -> None:
-        """Count and log the loss of a worker; WorkerLostError where it was one too many."""
-        if self._closed:
-            raise EvaluatorClosedError(self.kind) from error
-        seconds = time.monotonic() - batch.began
-        hung = isinstance(error, ray_errors.WorkerCrashedError) and seconds >= batch.limit
-        self._tally.count(died=not hung, hung=hung, restarts=1)
-        what = f"{len(batch.numbers)} units of {problem.key[:8]} over {len(problem.recordings)} recordings"
-        reason = f"took more than {batch.limit:.0f} s for one" if hung else f"{type(error).__name__}: {error}"
-        LOG.warning("a Ray worker was lost after %.1f s with %s (%s); they are done again", seconds, what, reason)
-        if batch.attempt + 1 >= ATTEMPTS:
-            raise WorkerLostError(
-                f"{ATTEMPTS} Ray workers were lost one after the other with the same {what}, the last because: "
-                f"{reason}; if memory ran out, use fewer workers than {self.workers}"
-            ) from error
+    def _forget(self, problem: Problem) -> None:
+        """The cluster's memory lost the problem: it is put there anew when it is needed next."""
+        with self._condition:
+            self._references.pop(problem.key, None)
 
 
 def _count_workers() -> int:
@@ -194,7 +148,9 @@ _problems = ProblemMemory()
 _guardian: list[Guardian] = []
 
 
-def _run_tasks(key: str, reference: list[Any], tasks: list[Task], limit: float, residuals: bool) -> Done:
+def _run_tasks(
+    key: str, reference: list[Any], tasks: list[Task], limit: float, residuals: bool
+) -> list[tuple[Misfit, float]]:
     """Do some tasks in a Ray worker, each within ``limit`` s; with the seconds that each took.
 
     As an item of a list, the reference is not fetched at every call.
@@ -202,8 +158,10 @@ def _run_tasks(key: str, reference: list[Any], tasks: list[Task], limit: float, 
     if not _guardian:
         lower_priority()
         _guardian.append(Guardian())
-    problem = _problems.get(key, lambda: ray.get(reference[0]))
-    done: Done = []
+    # The inner limit says what was waited for; the outer is for a worker that hangs.
+    with _guardian[0].watching(2 * START_SECONDS):
+        problem = _problems.get(key, lambda: ray.get(reference[0], timeout=START_SECONDS))
+    done: list[tuple[Misfit, float]] = []
     for task in tasks:
         began = time.monotonic()
         with _guardian[0].watching(limit):

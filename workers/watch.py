@@ -14,6 +14,15 @@ FACTOR, SLACK_SECONDS = 60.0, 10.0
 # as long as there is no other either, FIRST_SECONDS: kernels may have to be compiled.
 ENOUGH, NEW_SECONDS, FIRST_SECONDS = 3, 30.0, 120.0
 UNITS_REMEMBERED, PROBLEMS_REMEMBERED = 32, 256
+# Losses in a row after which a unit is given up: of workers that had begun it, and of any.
+ATTEMPTS, STARTS = 6, 60
+# How long a worker may take to start, to load its libraries and to fetch the problem.
+START_SECONDS = 120.0
+
+
+def never() -> bool:
+    """No call is given up."""
+    return False
 
 
 class Expectation:
@@ -36,6 +45,11 @@ class Expectation:
             longest = usual or max(map(self._usual, self._seconds), default=0.0)
         least = 0.0 if usual else NEW_SECONDS if longest else FIRST_SECONDS
         return float(max(least, SLACK_SECONDS + FACTOR * longest) * 2**attempt)
+
+    def usual(self, key: str) -> float:
+        """Seconds that a unit of the problem ``key`` mostly takes; 0 while that is not known."""
+        with self._lock:
+            return self._usual(key)
 
     def _usual(self, key: str) -> float:
         """The median of the problem's units; 0 where too few were done."""

@@ -13,6 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
 from records import Dataset
+from records.confined import ReaderError
 from service import http, store, views
 from service.access import owner_of_new
 from service.database import Database
@@ -137,6 +138,8 @@ def delete(service: ServiceDep, dataset_id: str) -> None:
 def _open(service: Service, data: bytes, filename: str) -> Opened:
     try:
         return service.datasets.open(data, filename)
+    except ReaderError as error:
+        raise ProblemError(503, "unavailable", str(error)) from None
     except ValueError as error:
         faults = getattr(error, "errors", None) or []
         listed = [error_item(fault.where, fault.value, fault.message) for fault in faults]

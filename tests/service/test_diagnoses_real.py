@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from service.settings import Settings
 from tests.service import force_data
 from tests.service.conftest import Api, serving
 from workers.in_process import InProcessEvaluator
+from workers.watch import never
 
 ASKED: dict[str, Any] = {"without": ["clap_and_peel"], "suspects": ["clap_and_peel", "balance_offset"], "seed": 2}
 LEFT_OUT = 2
@@ -74,8 +76,15 @@ class SlowEvaluator(InProcessEvaluator):
         super().__init__()
         self.asked, self.go_on, self.batches = threading.Event(), threading.Event(), 0
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
         self.batches += 1
         self.asked.set()
         assert self.go_on.wait(30)
-        return super().evaluate(problem, values, residuals=residuals)
+        return super().evaluate(problem, values, residuals=residuals, interrupted=interrupted)

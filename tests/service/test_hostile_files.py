@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import h5py
 import httpx
 import pytest
 from sqlalchemy import delete, select
 
-from records import confined, load_archive
-from records.confined import limits_of_upload
+from records import DatasetError, confined, load_archive
+from records.confined import convert_netcdf, limits_of_upload
+from records.errors import fail
 from records.netcdf import write_netcdf
 from service.settings import Settings
 from service.tables import ParsedRow
@@ -118,3 +122,63 @@ def test_a_repeated_upload_is_answered_as_the_first(api: Api, netcdf: bytes, rep
     first = _upload(api, netcdf, **{"Idempotency-Key": "k"})
     for _ in range(repeat):
         assert _upload(api, netcdf, **{"Idempotency-Key": "k"}).json() == first.json()
+
+
+def test_a_reader_that_cannot_start_is_the_servers_fault(
+    api: Api, netcdf: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    refused = _upload(api, netcdf)
+    assert refused.status_code == 503
+    assert "cannot start" in refused.json()["detail"]
+
+
+def test_an_old_file_that_takes_long_holds_up_no_other_dataset_and_is_given_up_once(
+    settings: Settings, netcdf: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    began, go_on, tried = threading.Event(), threading.Event(), []
+
+    def slow(_: bytes, label: str, __: object) -> NoReturn:
+        tried.append(label)
+        began.set()
+        assert go_on.wait(20)
+        raise fail(label, None, "it is damaged")
+
+    with toy_service(settings.data) as (service, api):
+        old, new = (_upload(api, netcdf).json()["id"] for _ in range(2))
+        with service.database.write() as session:
+            session.execute(delete(ParsedRow).where(ParsedRow.dataset_id == old))
+    monkeypatch.setattr("service.datasets.convert_netcdf", slow)
+    with toy_service(settings.data) as (service, _), ThreadPoolExecutor(1) as other:
+        waiting = other.submit(service.datasets.get, old)
+        assert began.wait(20)
+        assert service.datasets.get(new).name == falcon_dataset(12).name
+        go_on.set()
+        with pytest.raises(DatasetError, match="it is damaged"):
+            waiting.result()
+        with pytest.raises(DatasetError, match="it is damaged"):
+            service.datasets.get(old)
+    assert tried == ["wing.nc"]
+
+
+def test_a_job_waits_for_room_to_read_an_old_file(
+    settings: Settings, netcdf: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried = []
+
+    def full(*given: Any) -> bytes:
+        tried.append(given)
+        if len(tried) == 1:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return convert_netcdf(*given)
+
+    with toy_service(settings.data) as (service, api):
+        run = api.submit(_upload(api, netcdf).json()["id"], max_generations=10_000)["id"]
+        api.until(run, lambda one: one["state"] == "RUNNING")
+        with service.database.write() as session:
+            session.execute(delete(ParsedRow))
+    monkeypatch.setattr("service.datasets.convert_netcdf", full)
+    with toy_service(settings.data) as (_, api):
+        before = api.run(run)["generations"]
+        api.until(run, lambda one: one["generations"] > before)
+    assert len(tried) == 2

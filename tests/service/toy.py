@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +27,7 @@ from calibration.search import CalibrationSpec, Generation, resolved
 from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
 from sim.model import Solution
 from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
-from workers.watch import Standing
+from workers.watch import Standing, never
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
 NOMINAL = {"stiffness": 1.0, "damping": 0.1}
@@ -40,9 +40,18 @@ STUCK_SEED = 14  # of runs whose check hangs in `stuck_server`
 class NoEvaluator:
     """Evaluates nothing: the toy search does without."""
 
+    kind: Literal["in_process"] = "in_process"
+    workers = 1
     standing = Standing(1)
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(
+        self,
+        problem: Problem,
+        values: npt.ArrayLike,
+        *,
+        residuals: bool = False,
+        interrupted: Callable[[], bool] = never,
+    ) -> Evaluation:
         raise AssertionError("the toy search evaluates nothing")
 
     def close(self) -> None:

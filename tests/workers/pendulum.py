@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -116,6 +117,34 @@ class HangOnce:
         while self.how != "sleep":
             pass
         time.sleep(3600)
+
+
+@dataclass(frozen=True)
+class Count:
+    """Leaves a file in ``folder`` for each call, and takes its time."""
+
+    folder: Path
+    seconds: float
+
+    def __call__(self, _batch: Array, _recording: Recording) -> None:
+        os.close(tempfile.mkstemp(dir=self.folder)[0])
+        time.sleep(self.seconds)
+
+
+@dataclass(frozen=True)
+class LoseOnce:
+    """Fails the first time it is called anywhere, as when Ray's memory has lost what a task asks for."""
+
+    flag: Path
+
+    def __call__(self, _batch: Array, _recording: Recording) -> None:
+        from ray.exceptions import GetTimeoutError
+
+        try:
+            self.flag.touch(exist_ok=False)
+        except FileExistsError:
+            return
+        raise GetTimeoutError("the problem did not come")
 
 
 def hang_always(_batch: Array, _recording: Recording) -> None:

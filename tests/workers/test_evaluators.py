@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -20,8 +21,16 @@ import pytest
 from calibration.evaluator import gather, run_unit, units
 from calibration.problem import Evaluation, Problem
 from tests.workers import pendulum
-from workers import EvaluatorClosedError, EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator
-from workers.processes import ATTEMPTS
+from workers import (
+    EvaluationInterruptedError,
+    EvaluatorClosedError,
+    EvaluatorKind,
+    RunningEvaluator,
+    WorkerLostError,
+    make_evaluator,
+)
+from workers.ray_batches import UNDER_WAY, UNKNOWN_TASKS
+from workers.watch import ATTEMPTS
 
 KINDS: tuple[EvaluatorKind, ...] = ("in_process", "processes", "ray")
 DISTRIBUTED: tuple[EvaluatorKind, ...] = ("processes", "ray")
@@ -139,6 +148,37 @@ def test_survives_the_death_of_a_worker(distributed: RunningEvaluator, tmp_path:
     got = distributed.evaluate(problem, values, residuals=True)
     assert (tmp_path / "died").exists()
     assert_same_bits(got, reference(pendulum.problem(), values))
+
+
+def test_a_call_that_is_given_up_drops_what_no_worker_has_begun(
+    any_evaluator: RunningEvaluator, tmp_path: Path
+) -> None:
+    problem, values = pendulum.problem(pendulum.Count(tmp_path, 0.2)), pendulum.population(400)  # 150 units
+
+    def begun() -> int:
+        return sum(1 for _ in tmp_path.iterdir())
+
+    with pytest.raises(EvaluationInterruptedError):
+        any_evaluator.evaluate(problem, values, interrupted=lambda: begun() > 0)
+    before = -1
+    while before != (before := begun()):
+        time.sleep(1.0)
+    assert 0 < before <= 2 * UNDER_WAY * UNKNOWN_TASKS + 2
+    other, values = pendulum.problem(), pendulum.population(3)
+    assert_same_bits(any_evaluator.evaluate(other, values, residuals=True), reference(other, values))
+
+
+def test_trouble_of_rays_memory_is_no_error_of_the_model(
+    distributed: RunningEvaluator, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    if distributed.kind != "ray":
+        pytest.skip("a pool of processes has no such memory")
+    problem, values = pendulum.problem(pendulum.LoseOnce(tmp_path / "lost")), pendulum.population(20)
+    with caplog.at_level(logging.WARNING, logger="wingfit.workers"):
+        got = distributed.evaluate(problem, values, residuals=True)
+    assert_same_bits(got, reference(pendulum.problem(), values))
+    (record,) = caplog.records
+    assert "GetTimeoutError: the problem did not come" in record.getMessage()
 
 
 def test_gives_up_on_what_always_kills_its_worker(distributed: RunningEvaluator) -> None:

@@ -48,17 +48,17 @@ def test_a_worker_that_hangs_is_replaced(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     warmed(distributed)
-    short(monkeypatch, 1.0)
+    short(monkeypatch, 2.0)
     before, began = distributed.standing, time.monotonic()
     problem, values = pendulum.problem(pendulum.HangOnce(tmp_path / "hung", how)), pendulum.population(50)
     with caplog.at_level(logging.WARNING, logger="wingfit.workers"):
         got = distributed.evaluate(problem, values, residuals=True)
-    assert time.monotonic() - began < 15
+    assert time.monotonic() - began < 60
     assert_same_bits(got, reference(pendulum.problem(), values))
     after = distributed.standing
     assert (after.hung - before.hung, after.restarts - before.restarts) == (1, 1)
     (record,) = caplog.records
-    assert "took more than 1 s" in record.getMessage()
+    assert "took more than 2 s" in record.getMessage()
     assert "against recording" in record.getMessage() or "recordings" in record.getMessage()
     warmed(distributed)
     assert distributed.standing.workers == 2
@@ -84,17 +84,21 @@ def test_a_slow_unit_is_done_in_the_end(
     assert_same_bits(got, reference(pendulum.problem(None, (9.81,)), values))
 
 
-def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     evaluator = make_evaluator("processes", 1)
     try:
         evaluator.evaluate(pendulum.problem(pendulum.Note(tmp_path)), pendulum.population(3))
         (pid,) = [int(note.name) for note in tmp_path.iterdir()]
         os.kill(pid, signal.SIGSTOP)
-        short(monkeypatch, 1.0)
+        short(monkeypatch, 2.0)
         values = pendulum.population(9)
-        got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
+        with caplog.at_level(logging.WARNING, logger="wingfit.workers"):
+            got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
         assert_same_bits(got, reference(pendulum.problem(), values))
         assert evaluator.standing == Standing(1, 0, 1, 1)
+        assert f"worker process {pid} hung before it had begun 8 individuals" in caplog.text
     finally:
         evaluator.close()
 
