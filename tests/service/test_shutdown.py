@@ -112,10 +112,10 @@ def test_an_ordinary_stop_is_quick_and_the_watchdog_ends_with_the_server(
         server.api.finish(server.api.submit(server.api.upload()["id"])["id"])
         assert watchdog_of(server) == watchdog
         began = time.monotonic()
-        assert stopped(server, 5, number) == (0 if number == signal.SIGTERM else -number)
-        assert time.monotonic() - began < 3
+        assert stopped(server, 15, number) == (0 if number == signal.SIGTERM else -number)
+        assert time.monotonic() - began < 10
         assert "WARNING" not in server.log
-        deadline = time.monotonic() + 2
+        deadline = time.monotonic() + 10
         while Path(f"/proc/{watchdog}").exists():
             assert time.monotonic() < deadline
             time.sleep(0.01)

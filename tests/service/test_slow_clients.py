@@ -59,7 +59,7 @@ def eventually(condition: Callable[[], bool], seconds: float) -> None:
 def quick(client: httpx.Client, path: str) -> None:
     began = time.monotonic()
     assert client.get(path, timeout=10).status_code == 200
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0
 
 
 # -- backups ---------------------------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ def test_backups_that_nobody_takes_are_few_and_go_with_their_clients(tmp_path: P
         assert len(copies_held(server.process.pid)) == BACKUPS_AT_ONCE
         quick(server.client, "/v1/health")
         crowd.close()
-        eventually(lambda: not copies_held(server.process.pid), 2.0)
+        eventually(lambda: not copies_held(server.process.pid), 10.0)
         assert server.client.get("/v1/backup").status_code == 200
 
 
@@ -168,8 +168,8 @@ def read_at(one: socket.socket, bytes_per_second: float, seconds: float) -> int:
 
 @pytest.fixture
 def large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Service, Api, str]]:
-    """The limits for slow clients a sixtieth of a second for a second, and an archive of 12 MiB."""
-    monkeypatch.setattr(protocol, "SLOW_SECONDS", 0.5)
+    """The limits for slow clients a fifteenth, and an archive of 12 MiB."""
+    monkeypatch.setattr(protocol, "SLOW_SECONDS", 1.0)
     monkeypatch.setattr(protocol, "SLOWEST_BYTES_PER_SECOND", MIB)
     with toy_service(tmp_path) as (service, api):
         yield service, api, f"/v1/datasets/{api.upload(pad='x' * 12 * MIB)['id']}/archive"
@@ -185,14 +185,14 @@ def test_a_client_that_reads_too_slowly_is_hung_up_on(large: tuple[Service, Api,
     with reader(port_of(api.client), path, 2**18) as one:
         with pytest.raises(ConnectionError):
             read_at(one, 0.3 * MIB, 10.0)
-        eventually(lambda: hung_up(api) == 1, 1.0)
-        eventually(lambda: service.downloads._free._value == 8, 1.0)
+        eventually(lambda: hung_up(api) == 1, 10.0)
+        eventually(lambda: service.downloads._free._value == 8, 10.0)
 
 
 def test_a_slow_client_that_reads_fast_enough_gets_all(large: tuple[Service, Api, str]) -> None:
     _, api, path = large
     with reader(port_of(api.client), path, 2**18) as one:
-        assert read_at(one, 1.7 * MIB, 15.0) > 12 * MIB
+        assert read_at(one, 3.0 * MIB, 30.0) > 12 * MIB
     assert hung_up(api) == 0
 
 
