@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import logging
 import os
 import socket
 import time
@@ -187,6 +188,27 @@ def test_a_client_that_reads_too_slowly_is_hung_up_on(large: tuple[Service, Api,
             read_at(one, 0.3 * MIB, 10.0)
         eventually(lambda: hung_up(api) == 1, 10.0)
         eventually(lambda: service.downloads._free._value == 8, 10.0)
+
+
+def ask_again_and_again(one: socket.socket, path: str, seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        one.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
+        time.sleep(0.0005)
+
+
+def test_a_client_that_asks_and_never_reads_is_hung_up_on(
+    large: tuple[Service, Api, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """Short reads are answered before they are parsed: then there is no request to name."""
+    _, api, path = large
+    path = path.removesuffix("/archive")
+    with reader(port_of(api.client), path) as one:
+        one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with caplog.at_level(logging.INFO, logger=protocol.LOG.name), pytest.raises(ConnectionError):
+            ask_again_and_again(one, path, 60)
+        eventually(lambda: "at least 1024 KiB/s are needed" in caplog.text, 10.0)
+    assert hung_up(api) == 1
 
 
 def test_a_slow_client_that_reads_fast_enough_gets_all(large: tuple[Service, Api, str]) -> None:
