@@ -23,6 +23,9 @@ MAX_ENTRIES = 5000
 MAX_DESCRIPTION_BYTES = 16 * MIB
 """Size of dataset.yaml."""
 
+MAX_ITEMS = 250_000
+"""Keys, items of lists and values in dataset.yaml: each takes hundreds of bytes in memory, however short it is."""
+
 MAX_DEPTH = 12
 """Nesting of dataset.yaml; the format itself needs 6."""
 

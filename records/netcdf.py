@@ -225,7 +225,7 @@ def _forces(group: Any, where: str, limit: Limit) -> Samples:
 def _numbers(variable: Any) -> Array:
     """All of a variable, some whole chunks at a time: in one go the library would hold it twice."""
     made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
-    rows = max(1, BLOCK // math.prod((chunk, *variable.shape[1:]))) * chunk
+    rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
     for start in range(0, len(made), rows):
         block = np.s_[start : start + rows]
         variable.read_direct(made, block, block)

@@ -15,7 +15,7 @@ from typing import Any
 import yaml
 
 from records.errors import DatasetError, decode, fail
-from records.limits import MAX_DEPTH, MAX_DESCRIPTION_BYTES, MIB
+from records.limits import MAX_DEPTH, MAX_DESCRIPTION_BYTES, MAX_ITEMS, MIB
 from records.units import number_text
 
 Path = tuple[str | int, ...]
@@ -85,7 +85,9 @@ class _Builder:
 
     def __init__(self, file: str, events: Iterator[Any]) -> None:
         self.file = file
-        self.events = (e for e in events if not isinstance(e, (yaml.StreamStartEvent, yaml.DocumentStartEvent)))
+        self.events = self._counted(
+            e for e in events if not isinstance(e, (yaml.StreamStartEvent, yaml.DocumentStartEvent))
+        )
         self.places: dict[Path, tuple[int, int]] = {}
 
     def document(self) -> Document:
@@ -99,6 +101,13 @@ class _Builder:
         if not isinstance(extra, yaml.StreamEndEvent):
             raise self._error(extra, "a second YAML document starts here; keep one, without '---' lines")
         return Document(self.file, data, self.places)
+
+    def _counted(self, events: Iterator[Any]) -> Iterator[Any]:
+        """The events, as long as they are not too many: what is built of them takes far more memory than the text."""
+        for number, event in enumerate(events):
+            if number > MAX_ITEMS:
+                raise self._error(event, f"more than {MAX_ITEMS} keys, items and values; put samples in CSV")
+            yield event
 
     def _error(self, event: Any, message: str, value: object = None) -> DatasetError:
         line, column = _place(event)

@@ -80,6 +80,11 @@ class Settings:
             raise SettingsError(
                 f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"
             )
+        if self.ray_address is not None and self.evaluator != "ray":
+            raise SettingsError(
+                f"WINGFIT_RAY_ADDRESS is {self.ray_address!r}, but WINGFIT_EVALUATOR is {self.evaluator!r}: "
+                "set that to ray, or unset the address"
+            )
         if self.log not in get_args(LogFormat):
             raise SettingsError(f"WINGFIT_LOG is {self.log!r}; it must be one of {', '.join(get_args(LogFormat))}")
         if self.allow_remote and self.require_keys:
@@ -97,7 +102,7 @@ class Settings:
         _refuse_unknown(read)
         extra = tuple(name.strip().lower() for name in read.get("WINGFIT_ALLOWED_HOSTS", "").split(",") if name.strip())
         return cls(
-            data=Path(read.get("WINGFIT_DATA", "wingfit-data")).expanduser(),
+            data=_folder(read.get("WINGFIT_DATA", "wingfit-data")),
             host=read.get("WINGFIT_HOST", cls.host),
             port=_integer(read, "WINGFIT_PORT", cls.port),
             evaluator=read.get("WINGFIT_EVALUATOR", cls.evaluator),  # type: ignore[arg-type]  # checked above
@@ -145,6 +150,16 @@ def _refuse_unknown(read: Mapping[str, str]) -> None:
         raise SettingsError(
             f"the environment has what is no setting of wingfit: {', '.join(unknown)}; correct or unset it"
         )
+
+
+def _folder(text: str) -> Path:
+    try:
+        text.encode()
+        return Path(text).expanduser()
+    except (UnicodeEncodeError, RuntimeError) as error:
+        raise SettingsError(
+            f"WINGFIT_DATA is {text!a}, which names no folder ({error}); write its whole path"
+        ) from None
 
 
 def _yes(read: Mapping[str, str], name: str) -> bool:

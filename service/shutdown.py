@@ -30,6 +30,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 REPORT_SECONDS = 2.0  # for which the log may take a report of what is given up
 LEAVE_SECONDS = 1.0  # for which threads that were let go may take to end
 FRAMES = 3
+DEADLINE = "stop-deadline"
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Deadline:
         self._unfinished, self._seconds = unfinished, seconds
         # Its put may interrupt itself, as a second signal does; that of other ways to wake a thread may not.
         self._signals: queue.SimpleQueue[None] = queue.SimpleQueue()
-        threading.Thread(target=self._wait, name="stop-deadline", daemon=True).start()
+        threading.Thread(target=self._wait, name=DEADLINE, daemon=True).start()
 
     def begin(self) -> None:
         """A signal has arrived. Safe in a signal handler."""
@@ -106,7 +107,7 @@ def _threads() -> Iterator[str]:
     frames, own = sys._current_frames(), threading.get_ident()
     for thread in threading.enumerate():
         frame = frames.get(thread.ident or 0)
-        if frame is not None and thread.ident != own:
+        if frame is not None and thread.ident != own and thread.name != DEADLINE:
             yield f"thread {thread.name!r} at {' < '.join(_places(frame))}"
 
 

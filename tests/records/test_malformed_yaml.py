@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from records import DatasetError
-from records.limits import MAX_DESCRIPTION_BYTES, MAX_ERRORS
+from records.limits import MAX_DESCRIPTION_BYTES, MAX_ERRORS, MIB
+from records.yaml_text import read_yaml
 from tests.records.malformed import YAML, error_of, error_of_zip, good_files, with_yaml, zipped
 
 FREQUENCY = "flap_frequency_hz: 2.0"
@@ -192,3 +193,9 @@ def test_the_error_survives_a_process_boundary() -> None:
     again = pickle.loads(pickle.dumps(error))  # noqa: S301
     assert isinstance(again, DatasetError)
     assert (again.errors, str(again)) == (error.errors, str(error))
+
+
+def test_very_many_items_are_refused_before_they_take_memory() -> None:
+    raw = b"a: [" + b"1," * (7 * MIB) + b"]"
+    with pytest.raises(DatasetError, match="more than 250000 keys, items and values; put samples in CSV"):
+        read_yaml(raw, YAML)

@@ -195,6 +195,17 @@ def test_a_setting_that_cannot_be_names_itself(name: str, value: str) -> None:
         Settings.from_env({name: value})
 
 
+def test_an_address_of_ray_is_for_ray() -> None:
+    with pytest.raises(SettingsError, match="WINGFIT_EVALUATOR is 'processes': set that to ray"):
+        Settings.from_env({"WINGFIT_RAY_ADDRESS": "h:1", "WINGFIT_EVALUATOR": "processes"})
+
+
+@pytest.mark.parametrize("folder", ["~no-such-user/x", "a-\udcff"])
+def test_a_folder_that_cannot_be_is_refused_in_words(folder: str) -> None:
+    with pytest.raises(SettingsError, match=r"WINGFIT_DATA is .*write its whole path"):
+        Settings.from_env({"WINGFIT_DATA": folder})
+
+
 def test_settings_come_from_the_environment() -> None:
     read = Settings.from_env({"WINGFIT_DATA": "/d", "WINGFIT_WORKERS": "3", "WINGFIT_RAY_ADDRESS": "h:1"})
     assert (read.data, read.port, read.workers, read.ray_address, read.evaluator) == (Path("/d"), 8321, 3, "h:1", "ray")

@@ -232,6 +232,7 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "entries of an archive": limits.MAX_ENTRIES,
         "`dataset.yaml`": limits.MAX_DESCRIPTION_BYTES // 2**20,
         "levels of `dataset.yaml`": limits.MAX_DEPTH,
+        "keys, items and values of `dataset.yaml`": limits.MAX_ITEMS,
         "recordings": limits.MAX_RECORDINGS,
         "rows of a recording": limits.MAX_ROWS,
         "markers": limits.MAX_MARKERS,
