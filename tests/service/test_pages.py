@@ -296,7 +296,7 @@ def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path
     seen.wait(TEXT.format("submit-said") + ".includes('first try')")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
-    seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 30)
+    seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 90)
     seen.wait(f"{ROWS.format('misfit')} > 0")
     seen.page.click("#diagnose-run")
     seen.wait("location.hash.startsWith('#diagnosis=')")
