@@ -206,7 +206,7 @@ def test_a_client_that_asks_and_never_reads_is_hung_up_on(
     with reader(port_of(api.client), path) as one:
         one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         with caplog.at_level(logging.INFO, logger=protocol.LOG.name), pytest.raises(ConnectionError):
-            ask_again_and_again(one, path, 60)
+            ask_again_and_again(one, path, 150)
         eventually(lambda: "at least 1024 KiB/s are needed" in caplog.text, 10.0)
     assert hung_up(api) == 1
 
