@@ -200,7 +200,6 @@ def ask_again_and_again(one: socket.socket, path: str, seconds: float) -> None:
 def test_a_client_that_asks_and_never_reads_is_hung_up_on(
     large: tuple[Service, Api, str], caplog: pytest.LogCaptureFixture
 ) -> None:
-    """Short reads are answered before they are parsed: then there is no request to name."""
     _, api, path = large
     path = path.removesuffix("/archive")
     with reader(port_of(api.client), path) as one:

@@ -86,6 +86,15 @@ def population(individuals: int, seed: int = 7) -> Array:
     return values
 
 
+def _first(flag: Path) -> bool:
+    """Whether nobody has asked this before, in any process."""
+    try:
+        flag.touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True
+
+
 @dataclass(frozen=True)
 class DieOnce:
     """Kills its process the first time it is called anywhere, as the kernel does when memory runs out."""
@@ -93,11 +102,8 @@ class DieOnce:
     flag: Path
 
     def __call__(self, _batch: Array, _recording: Recording) -> None:
-        try:
-            self.flag.touch(exist_ok=False)
-        except FileExistsError:
-            return
-        os.kill(os.getpid(), 9)
+        if _first(self.flag):
+            os.kill(os.getpid(), 9)
 
 
 @dataclass(frozen=True)
@@ -108,9 +114,7 @@ class HangOnce:
     how: str
 
     def __call__(self, _batch: Array, _recording: Recording) -> None:
-        try:
-            self.flag.touch(exist_ok=False)
-        except FileExistsError:
+        if not _first(self.flag):
             return
         if self.how == "stop":
             os.kill(os.getpid(), signal.SIGSTOP)
@@ -140,11 +144,8 @@ class LoseOnce:
     def __call__(self, _batch: Array, _recording: Recording) -> None:
         from ray.exceptions import GetTimeoutError
 
-        try:
-            self.flag.touch(exist_ok=False)
-        except FileExistsError:
-            return
-        raise GetTimeoutError("the problem did not come")
+        if _first(self.flag):
+            raise GetTimeoutError("the problem did not come")
 
 
 def hang_always(_batch: Array, _recording: Recording) -> None:
