@@ -45,7 +45,7 @@ MAX_ROWS = 200_000
 MAX_VALUES = 64_000_000
 """Numbers in one dataset, 8 bytes each in memory."""
 
-MAX_UPLOADED_NETCDF_VALUES = 16_000_000
+MAX_UPLOADED_NETCDF_VALUES = 8_000_000
 """Numbers in a NetCDF file from a stranger, which is read within limits of memory (:mod:`records.confined`)."""
 
 MAX_NAME_BYTES = 1024

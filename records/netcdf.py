@@ -182,6 +182,8 @@ def _variable(group: Any, name: str, where: str) -> Any:
     variable = _child(group, name, where, h5py.Dataset)
     if variable.is_virtual or variable.external:
         raise fail(where, name, f"{name!r} keeps its data in other files; copy them into this one")
+    if variable.shape is None:
+        raise fail(where, name, f"{name!r} has no dimensions and no data; see docs/formats.md for its shape")
     return variable
 
 

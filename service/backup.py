@@ -13,6 +13,7 @@ from tempfile import mkstemp
 from urllib.parse import quote
 
 from service.backup_contents import Contents, ContentsError, contents, revoke_keys
+from service.backup_rows import RowError, check_rows
 from service.backup_schema import SchemaError, check_schema
 from service.database import FILE_NAME, Database, DataFolderError, FolderLock, make_folder
 from service.permissions import FILE, open_new
@@ -93,11 +94,21 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
     finally:
         lock.release()
     try:
-        Database(folder).close()  # to the newest schema
-    except DataFolderError as error:
-        target.unlink(missing_ok=True)
-        raise BackupError(str(error)) from None
+        _check_opens(folder)
+    except (DataFolderError, RowError) as error:
+        for left in folder.glob(f"{FILE_NAME}*"):
+            left.unlink()
+        raise BackupError(f"{backup} is not put back: {error}") from None
     return brought
+
+
+def _check_opens(folder: Path) -> None:
+    """Bring the database to the newest schema, and read every row; DataFolderError or RowError where that fails."""
+    database = Database(folder)
+    try:
+        check_rows(database)
+    finally:
+        database.close()
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:

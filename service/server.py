@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import logging
 import signal
@@ -29,6 +30,7 @@ LOG = logging.getLogger("wingfit")
 # For which a thread that computes may keep others from running Python. Reading gives its turn away at every row, so
 # that with the usual 5 ms a page of some rows could wait for longer than it takes.
 SWITCH_SECONDS = 0.0005
+PORT_TAKEN = (errno.EADDRINUSE, errno.EACCES)
 
 
 class ServeError(RuntimeError):
@@ -155,8 +157,11 @@ def _listen(settings: Settings) -> socket.socket:
         listening.listen(128)
     except OSError as error:
         listening.close()
+        remedy = (
+            "WINGFIT_PORT to a free port" if error.errno in PORT_TAKEN else "WINGFIT_HOST to an address of this machine"
+        )
         raise ServeError(
-            f"cannot listen on {settings.host}, port {settings.port}: {error.strerror}; set WINGFIT_PORT to a free port"
+            f"cannot listen on {settings.host}, port {settings.port}: {error.strerror}; set {remedy}"
         ) from None
     return listening
 

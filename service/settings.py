@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -16,6 +17,9 @@ EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 MOST_WORKERS = 256  # each takes some hundred megabytes
 YES = ("1", "true", "yes", "y", "on")
+# In ASCII: int() also takes the digits of other scripts, underscores, and texts of any length.
+WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,18}")
+HOST_NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
 NO = ("0", "false", "no", "n", "off")
 
 
@@ -100,7 +104,6 @@ class Settings:
         """
         read = environment.given(os.environ if env is None else env)
         _refuse_unknown(read)
-        extra = tuple(name.strip().lower() for name in read.get("WINGFIT_ALLOWED_HOSTS", "").split(",") if name.strip())
         return cls(
             data=_folder(read.get("WINGFIT_DATA", "wingfit-data")),
             host=read.get("WINGFIT_HOST", cls.host),
@@ -117,7 +120,7 @@ class Settings:
             log=read.get("WINGFIT_LOG", cls.log),  # type: ignore[arg-type]  # checked above
             require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),
             allow_remote=_yes(read, "WINGFIT_ALLOW_REMOTE"),
-            allowed_hosts=LOOPBACK_NAMES + extra,
+            allowed_hosts=LOOPBACK_NAMES + _hosts(read.get("WINGFIT_ALLOWED_HOSTS", "")),
         )
 
     @property
@@ -152,6 +155,25 @@ def _refuse_unknown(read: Mapping[str, str]) -> None:
         )
 
 
+def _hosts(text: str) -> tuple[str, ...]:
+    """Host names with commas between; SettingsError for one that no request can match."""
+    names = tuple(name.strip().lower() for name in text.split(",") if name.strip())
+    for name in names:
+        if not (HOST_NAME.fullmatch(name) or _is_address(name)):
+            raise SettingsError(
+                f"WINGFIT_ALLOWED_HOSTS names {name!r}, which no request can match; write host names or IP addresses "
+                "without scheme, port, path, brackets or wildcard, with commas between"
+            )
+    return names
+
+
+def _is_address(text: str) -> bool:
+    try:
+        return bool(ipaddress.ip_address(text))
+    except ValueError:
+        return False
+
+
 def _folder(text: str) -> Path:
     try:
         text.encode()
@@ -179,15 +201,12 @@ def _integer(read: Mapping[str, str], name: str, default: int) -> int:
     text = read.get(name)
     if text is None:
         return default
-    try:
+    if WHOLE_NUMBER.fullmatch(text):
         return int(text)
-    except ValueError:
-        remedy = ""
-        if "://" in text:
-            remedy = "; if Kubernetes set it for a Service of that name, set it yourself, or enableServiceLinks: false"
-        raise SettingsError(
-            f"{name} is {text!r}; it must be a whole number, for example {name}={default}{remedy}"
-        ) from None
+    remedy = ""
+    if "://" in text:
+        remedy = "; if Kubernetes set it for a Service of that name, set it yourself, or enableServiceLinks: false"
+    raise SettingsError(f"{name} is {text!r}; it must be a whole number, for example {name}={default}{remedy}")
 
 
 def _in_range(name: str, value: int, lower: int, upper: int) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import logging
 import secrets
 import sqlite3
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
@@ -33,6 +33,7 @@ from service.tables import (
 )
 from workers.jobs import Job, State, Wish
 
+LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
 # What specifications meant that were stored before there was a choice.
@@ -248,9 +249,20 @@ def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
     return table.owner.is_(None) if owner is None else table.owner == owner
 
 
-def jobs_in(session: Session, table: type[JobRow], state: State) -> Sequence[JobRow]:
-    """Jobs in ``state``, oldest first."""
-    return session.scalars(select(table).where(table.state == state.value).order_by(table.number)).all()
+def jobs_in(session: Session, table: type[JobRow], state: State) -> list[JobRow]:
+    """Jobs in ``state``, oldest first; one whose row cannot be read is logged and passed over."""
+    numbers = session.scalars(select(table.number).where(table.state == state.value).order_by(table.number)).all()
+    return [row for number in numbers if (row := _readable(session, table, number))]
+
+
+def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | None:
+    try:
+        row = session.get_one(table, number)
+        job(row)
+    except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a state
+        LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
+        return None
+    return row
 
 
 def _delete_ended(session: Session, row: JobRow, what: str) -> None:

@@ -175,6 +175,7 @@ NETCDF: dict[str, tuple[Callable[[h5py.File], None], str, str]] = {
     "no positions": (_replace("position_m", None), f"a.nc: {GROUP}", "'position_m' is missing"),
     "shape": (_replace("position_m", np.zeros((12, 36))), f"a.nc: {GROUP}", "[T, M, 3]"),
     "text": (_replace("position_m", np.full((12, 12, 3), b"a")), f"a.nc: {GROUP}", "floating-point"),
+    "nothing": (_replace("time_s", h5py.Empty("f8")), f"a.nc: {GROUP}", "no dimensions and no data"),
     "integers": (_replace("time_s", np.arange(12)), f"a.nc: {GROUP}", "floating-point"),
     "infinite": (_replace("position_m", np.full((12, 12, 3), np.inf)), "time index 0", "infinite"),
     "markers as numbers": (_replace("marker", np.arange(12.0)), f"a.nc: {GROUP}", "must hold text"),

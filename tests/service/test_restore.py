@@ -265,6 +265,43 @@ def test_keys_that_wingfit_did_not_make_are_refused(copy: Path, tmp_path: Path, 
     assert "is none that wingfit made" in refuse(copy, tmp_path / "new")
 
 
+BAD_ROWS = {
+    "run spec": ("run", "update run set spec = 'no JSON'"),
+    "run spec without end": ("run", "update run set spec = '" + "[" * 100_000 + "'"),
+    "run spec that is a number": ("run", "update run set spec = 5"),
+    "run spec of something else": ("run", "update run set spec = '{\"fitness\": 3}'"),
+    "run state": ("run", "update run set state = 'DREAMING'"),
+    "run wish": ("run", "update run set wish = 'fame'"),
+    "run times": ("run", "update run set created_at = x'ff'"),
+    "run genome": ("run", "update run set genome = '['"),
+    "dataset recordings": ("dataset", "update dataset set recordings = '[7]'"),
+    "dataset kind": ("dataset", "update dataset set kind = 'poems'"),
+}
+
+
+@pytest.mark.parametrize(("table", "statement"), BAD_ROWS.values(), ids=BAD_ROWS.keys())
+def test_rows_that_the_server_cannot_read_are_refused(copy: Path, tmp_path: Path, table: str, statement: str) -> None:
+    edit(copy, statement)
+    assert f"row 1 of its table '{table}' cannot be read" in refuse(copy, tmp_path / "new")
+    edit(copy, "delete from run", "delete from dataset")
+    restore(copy, tmp_path / "new")  # what was refused does not stand in the way
+
+
+def test_a_server_starts_though_a_waiting_job_cannot_be_read(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with toy_service(tmp_path / "data") as (_, api):
+        first, second = (api.submit(api.upload()["id"])["id"] for _ in range(2))
+        for run in (first, second):
+            api.finish(run)
+    edit(
+        tmp_path / "data" / "wingfit.sqlite3",
+        "update run set state = 'QUEUED'",
+        "update run set spec = 'x' where number = 1",
+    )
+    with toy_service(tmp_path / "data") as (_, api):
+        assert api.finish(second)["state"] == "SUCCEEDED"
+    assert "row 1 of RunRow cannot be read and is left alone" in caplog.text
+
+
 def test_a_backup_is_opened_without_trust(copy: Path) -> None:
     with backups._opened(copy, copy) as opened:
         assert [opened.execute(f"PRAGMA {name}").fetchone()[0] for name in ("trusted_schema", "cell_size_check")] == [

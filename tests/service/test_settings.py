@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from service.cli import app as commands
+from service.server import ServeError, serve
 from service.settings import Settings, SettingsError
 from workers.jobs import MOST_STARTS
 
@@ -111,3 +114,36 @@ def test_jobs_are_given_up_after_as_many_starts_as_their_state_machine_says() ->
     assert Settings.from_env({"WINGFIT_MAX_STARTS": "7"}).max_starts == 7
     with pytest.raises(SettingsError, match=r"WINGFIT_MAX_STARTS is 0; it must lie in \[1, 1000000\]"):
         Settings.from_env({"WINGFIT_MAX_STARTS": "0"})
+
+
+@pytest.mark.parametrize("text", ["\uff18\uff10", "8_0", "0x50", "8.0", "1e3", "9" * 5000, "\u0668"], ids=ascii)
+def test_numbers_are_written_in_ascii_digits(text: str) -> None:
+    with pytest.raises(SettingsError, match="must be a whole number, for example WINGFIT_PORT=8321"):
+        Settings.from_env({"WINGFIT_PORT": text})
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["http://wings.lab", "wings.lab:80", "*.lab", "*", "[::1]", "wings lab", "a/b", "-", "\uff41.lab"],
+    ids=ascii,
+)
+def test_host_names_that_no_request_can_match_are_refused(text: str) -> None:
+    with pytest.raises(SettingsError, match="which no request can match"):
+        Settings.from_env({"WINGFIT_ALLOWED_HOSTS": f"wings.lab,{text}"})
+
+
+def test_host_names_and_addresses_are_allowed() -> None:
+    names = Settings.from_env(
+        {"WINGFIT_ALLOWED_HOSTS": "Wings.lab, 10.0.0.7,fe80::1, my_rig,xn--flgel-kva.de"}
+    ).allowed_hosts
+    assert names[3:] == ("wings.lab", "10.0.0.7", "fe80::1", "my_rig", "xn--flgel-kva.de")
+
+
+def test_an_address_that_is_not_of_this_machine_is_the_fault_of_the_host(tmp_path: Path) -> None:
+    for host in ("192.0.2.1", "no-such-host.invalid"):
+        with pytest.raises(ServeError, match=f"cannot listen on {host}.*set WINGFIT_HOST to an address"):
+            serve(Settings(data=tmp_path, host=host))
+    with closing(socket.create_server(("127.0.0.1", 0))) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(ServeError, match="set WINGFIT_PORT to a free port"):
+            serve(Settings(data=tmp_path, port=port))
