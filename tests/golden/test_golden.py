@@ -1,0 +1,22 @@
+"""No change of structure moves a number: to the bit where the golden file knows the machine, else to 1e-7."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.golden.numbers import CASES, FILE, entry, machine
+
+GOLDEN = json.loads(FILE.read_text())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_numbers_are_those_of_the_golden_file(name: str) -> None:
+    now = entry(CASES[name]())
+    for known, cases in GOLDEN.items():
+        assert now["count"] == cases[name]["count"]
+        np.testing.assert_allclose(now["values"], cases[name]["values"], rtol=1e-7, atol=1e-12, err_msg=known)
+    if machine() in GOLDEN:
+        assert now["sha256"] == GOLDEN[machine()][name]["sha256"]
