@@ -31,13 +31,16 @@ COPY --chown=wingfit:wingfit diagnosis diagnosis
 COPY --chown=wingfit:wingfit report report
 COPY --chown=wingfit:wingfit workers workers
 COPY --chown=wingfit:wingfit service service
+COPY --chown=wingfit:wingfit client client
+COPY --chown=wingfit:wingfit cli cli
+COPY --chown=wingfit:wingfit wingfit wingfit
 RUN pip install --no-deps --no-build-isolation --editable .
 
 USER wingfit
 # Compiled kernels are kept beside the code. Where that cannot be written, they are copied to HOME at the first use; on
 # another kind of processor they are compiled again, and kept there too.
-RUN python -m compileall -q records tracking sim calibration diagnosis report workers service \
-    && python -m sim.warm
+RUN python -m compileall -q records tracking sim calibration diagnosis report workers service client cli \
+    && python -m wingfit.sim.warm
 
 # All that is written: /tmp and the data. The rest may be read-only.
 ENV HOME=/tmp \

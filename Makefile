@@ -4,10 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-pages test-rest check serve format lock install pin-image check-image clean
+.PHONY: demo proof test test-service test-pages test-rest check check-wheel serve format lock install pin-image check-image clean
 
 demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
-	@$(BIN)/python -m service.demo
+	@$(BIN)/python -m examples.demo
 
 proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a report; under 15 minutes
 	@$(BIN)/python -m benchmarks.proof --json
@@ -32,7 +32,17 @@ check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	@$(MAKE) --no-print-directory check-wheel
+
+# What is installed is the package wingfit and nothing beside it; import-linter, which follows no links, reads it there.
+WHEEL := build/wheel
+check-wheel: $(INSTALLED)  ## build the wheel, and check its imports
+	@rm -rf $(WHEEL) build/lib build/bdist.*
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation --wheel-dir $(WHEEL) .
+	@$(BIN)/python -m zipfile --extract $(WHEEL)/wingfit-*.whl $(WHEEL)/tree
+	@test "$$(ls $(WHEEL)/tree | grep -v dist-info)" = wingfit || { echo "the wheel installs more than wingfit"; exit 1; }
+	@ln -s ../../../benchmarks $(WHEEL)/tree/benchmarks
+	cd $(WHEEL)/tree && $(CURDIR)/$(BIN)/lint-imports --config $(CURDIR)/pyproject.toml --no-cache
 
 format: $(INSTALLED)  ## rewrite the code in the house format
 	$(BIN)/ruff check --fix .
@@ -45,7 +55,7 @@ install: $(INSTALLED)  ## only install
 $(INSTALLED): pyproject.toml requirements.lock | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	@if [ -f sim/warm.py ]; then echo "compiling the simulator once ..." && $(BIN)/python -m sim.warm; fi
+	@if [ -f sim/warm.py ]; then echo "compiling the simulator once ..." && $(BIN)/python -m wingfit.sim.warm; fi
 	@touch $@
 
 $(BIN)/python:

@@ -17,16 +17,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from benchmarks.beam_theory import Beam, Family, elastica, reference, torsion_constant
-from benchmarks.machine import commit, cpu
-from benchmarks.spring_chain import cut_beam, genome, spring_chain
-from records import Wing
-from records.blas_threads import one_blas_thread
-from sim.flexible_wing import FlexibleWing
-from sim.numerics import Numerics
-from sim.rig import blank_recording, robird_wing, vacuum
-from sim.structure import Structure
-from tests.sim.plates import displacement, stiffness_matrix
+from benchmarks.common.machine import commit, cpu
+from benchmarks.physics.beam_theory import Beam, Family, elastica, reference, torsion_constant
+from benchmarks.physics.spring_chain import cut_beam, genome, spring_chain
+from tests.sim.wing.plates import displacement, stiffness_matrix
+from wingfit.records import Wing
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 

@@ -17,16 +17,25 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.machine import commit, cpu
-from calibration.evaluator import Evaluator
-from calibration.problem import Problem, base_genome
-from calibration.result import Result, judge
-from calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
-from records import Dataset, Genome, load_dataset
-from sim.flexible_wing import FlexibleWing
-from sim.rig import REFERENCE, Tracking, read_truth, record, robird_wing, true_genome, tunnel, vacuum
-from workers import make_evaluator
-from workers.factory import EvaluatorKind
+from benchmarks.common.machine import commit, cpu
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.result import Result, judge
+from wingfit.calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
+from wingfit.records import Dataset, Genome, load_dataset
+from wingfit.sim.virtual_rigs.campaign import (
+    REFERENCE,
+    Tracking,
+    read_truth,
+    record,
+    robird_wing,
+    true_genome,
+    tunnel,
+    vacuum,
+)
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.workers import make_evaluator
+from wingfit.workers.factory import EvaluatorKind
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")

@@ -18,23 +18,33 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.delfly_tables import closest_law_percent, fling_ends, lift_by_root_pitch, tables_law
+from benchmarks.common.machine import commit, cpu
 from benchmarks.estimators import estimators
-from benchmarks.machine import commit, cpu
-from calibration.evaluation import agreements, lacking
-from calibration.evaluator import Evaluator
-from calibration.force_result import Agreement, GlobalModel, LocalEstimate, Quantity
-from calibration.global_model import at, fit_global
-from calibration.likelihood import Estimate, estimate, iterate
-from calibration.problem import Problem, base_genome
-from records import LowPass, Recording
-from records.dataset import STANDARD_GRAVITY
-from sim.balance import DRAG, TRIALS, Balance, Trial, blank_recording, delfly, record, true_beat, write_campaign
-from sim.blade_element_wing import BladeElementWing
-from sim.blades.motion import motion_genes
-from sim.blades.terms import chosen
-from sim.filtering import low_passed
-from workers import make_evaluator
+from benchmarks.physics.delfly_tables import closest_law_percent, fling_ends, lift_by_root_pitch, tables_law
+from wingfit.calibration.estimates.likelihood import Estimate, estimate, iterate
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.agreement import agreements, lacking
+from wingfit.calibration.forces.global_model import at, fit_global
+from wingfit.calibration.forces.result import Agreement, GlobalModel, LocalEstimate, Quantity
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import LowPass, Recording
+from wingfit.records.dataset import STANDARD_GRAVITY
+from wingfit.sim.filtering import low_passed
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.motion import motion_genes
+from wingfit.sim.vehicle.terms import chosen
+from wingfit.sim.virtual_rigs.balance import (
+    DRAG,
+    TRIALS,
+    Balance,
+    Trial,
+    blank_recording,
+    delfly,
+    record,
+    true_beat,
+    write_campaign,
+)
+from wingfit.workers import make_evaluator
 
 Array = npt.NDArray[np.float64]
 

@@ -19,16 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import machine
+from benchmarks.common import machine
 from benchmarks.concealed.bench import WingBench
 from benchmarks.concealed.plant.observe_law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
-from calibration.spec import CalibrationSpec
-from diagnosis import DiagnosisSpec, Progress, diagnose
-from records import Dataset, load_dataset, save_dataset
-from service.commands.output import progress
-from workers import make_evaluator
-from workers.factory import EvaluatorKind
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.cli.output import progress
+from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose
+from wingfit.records import Dataset, load_dataset, save_dataset
+from wingfit.workers import make_evaluator
+from wingfit.workers.factory import EvaluatorKind
 
 HIDDEN: Concealed = {"added_mass": {"strength": 1.0}}
 FITTED = (

@@ -24,14 +24,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
 
-from benchmarks.effect_rigs import RIGS, AnyModel, Rig, rig_of
-from benchmarks.machine import commit, cpu
-from calibration.linearised import free_genes, linearise, residuals_of, unit_at, values_at
-from calibration.problem import Problem, base_genome
-from records import Recording
-from sim.effects.contract import Effect
-from sim.effects.registry import EFFECTS
-from workers.in_process import InProcessEvaluator
+from benchmarks.common.machine import commit, cpu
+from benchmarks.physics.effect_rigs import RIGS, AnyModel, Rig, rig_of
+from wingfit.calibration.estimates.linearised import free_genes, linearise, residuals_of, unit_at, values_at
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import Recording
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.workers.in_process import InProcessEvaluator
 
 Array = npt.NDArray[np.float64]
 

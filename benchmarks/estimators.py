@@ -17,15 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.machine import commit, cpu
-from calibration.evaluator import Evaluator
-from calibration.likelihood import iterate
-from calibration.linearised import free_genes, values_at
-from calibration.problem import Problem, base_genome
-from calibration.search import CalibrationSpec, calibrate, model_for, plan
-from records import Dataset, load_dataset
-from workers import make_evaluator
-from workers.factory import EvaluatorKind
+from benchmarks.common.machine import commit, cpu
+from wingfit.calibration.estimates.likelihood import iterate
+from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.records import Dataset, load_dataset
+from wingfit.workers import make_evaluator
+from wingfit.workers.factory import EvaluatorKind
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
 AS_GOOD = 1.01  # of the floor

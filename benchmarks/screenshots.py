@@ -15,13 +15,13 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks import machine
+from benchmarks.common import machine
+from benchmarks.common.ray_nodes import REPOSITORY
+from benchmarks.common.server_process import Server
 from benchmarks.proof import robird
 from benchmarks.proof.told import saved
-from benchmarks.ray_nodes import REPOSITORY
-from benchmarks.server_process import Server
-from service.client import Client
-from service.commands.output import progress
+from wingfit.cli.output import progress
+from wingfit.client.client import Client
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import calibration, flops, gene_box
-from benchmarks.machine import commit, cpu
-from benchmarks.settling import (
+from benchmarks import calibration
+from benchmarks.common.machine import commit, cpu
+from benchmarks.physics import flops, gene_box
+from benchmarks.physics.settling import (
     Subject,
     beats_to_periodic,
     by_default,
@@ -36,12 +37,12 @@ from benchmarks.settling import (
     ms_per_beat,
     reference,
 )
-from calibration.search import CalibrationSpec
-from sim.flexible_wing import FlexibleWing
-from sim.kernels import LANES
-from sim.numerics import Numerics
-from sim.rig import robird_wing, tunnel, vacuum
-from workers import make_evaluator
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.sim.kernels import LANES
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.workers import make_evaluator
 
 TOLERANCE = 1e-4  # m
 CONDITIONS = {"vacuum": vacuum(10.0, 0.05, 3.0), "air": tunnel(0.05, 3.0, 6.0)}

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from deap import cma
 
-from calibration.genetic import FAILED, Individual, finite, reflected
+from wingfit.calibration.genetic import FAILED, Individual, finite, reflected
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Distribution:
 
     ``centroid``, ``paths``, ``covariance``, ``sigma`` and ``updates`` are those of the strategy; ``unit``, ``fitness``
     and ``distance`` the best individual so far; ``mean`` the mean fitness of those of the last generation that did not
-    fail. ``generation``, ``stall`` and ``best`` as in :class:`calibration.genetic.Population`.
+    fail. ``generation``, ``stall`` and ``best`` as in :class:`wingfit.calibration.genetic.Population`.
     """
 
     centroid: list[float] = field(default_factory=list)

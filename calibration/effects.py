@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from sim.effects.contract import Effect
-from sim.effects.registry import EFFECTS
-from sim.wing_genes import Group, group
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.wing.genes import Group, group
 
 # Aerodynamic, and yet fitted in vacuum: in air it only scales what the coefficients of the air scale as well.
 _SEEN_IN_VACUUM = ("residual_air",)

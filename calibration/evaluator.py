@@ -13,9 +13,9 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from calibration.problem import Evaluation, Misfit, Problem, concatenate, misfit
-from records.blas_threads import one_blas_thread
-from sim.kernels import LANES
+from wingfit.calibration.problem import Evaluation, Misfit, Problem, concatenate, misfit
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.kernels import LANES
 
 
 class Evaluator(Protocol):

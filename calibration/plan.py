@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibration.cutting import Cut
-from calibration.effects import group_of, refuse_idle
-from calibration.problem import base_genome, compared
-from calibration.spec import CalibrationSpec, model_for, resolved
-from records import Dataset, LowPass, Recording
-from sim.alignment import recorded_crossing
-from sim.filtering import default_cutoff, low_passed
+from wingfit.calibration.effects import group_of, refuse_idle
+from wingfit.calibration.forces.split_beats import Cut
+from wingfit.calibration.problem import base_genome, compared
+from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
+from wingfit.records import Dataset, LowPass, Recording
+from wingfit.sim.filtering import default_cutoff, low_passed
+from wingfit.sim.wing.alignment import recorded_crossing
 
 VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
 

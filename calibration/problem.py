@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from records import Genome, Recording
-from records.dataset import Kind
-from sim.model import Model
+from wingfit.records import Genome, Recording
+from wingfit.records.dataset import Kind
+from wingfit.sim.model import Model
 
 Array = npt.NDArray[np.float64]
 

@@ -9,22 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from calibration.effects import absent
-from calibration.evaluator import Evaluator
-from calibration.noise import noise_distance
-from calibration.plan import Stage, plan
-from calibration.problem import Problem, base_genome
-from calibration.search import found
-from calibration.spec import CalibrationSpec, wing_model
-from calibration.uncertainty import Standing, standing
-from records import Dataset, Gene, Genome
-from records.blas_threads import one_blas_thread
-from sim.alignment import recorded_crossing
-from sim.flexible_wing import FlexibleWing
-from sim.model import Solution
+from wingfit.calibration.effects import absent
+from wingfit.calibration.estimates.noise import noise_distance
+from wingfit.calibration.estimates.uncertainty import Standing, standing
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.plan import Stage, plan
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.search import found
+from wingfit.calibration.spec import CalibrationSpec, wing_model
+from wingfit.records import Dataset, Gene, Genome
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.model import Solution
+from wingfit.sim.wing.alignment import recorded_crossing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 if TYPE_CHECKING:
-    from calibration.force_result import ForceResult
+    from wingfit.calibration.forces.result import ForceResult
 
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
@@ -33,7 +33,7 @@ ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is tak
 class GeneResult:
     """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
 
-    ``standard_error`` is relative to the value (:mod:`calibration.uncertainty`); ``identifiable``
+    ``standard_error`` is relative to the value (:mod:`wingfit.calibration.estimates.uncertainty`); ``identifiable``
     says whether the data can tell the gene: an error of at most 7.5 %, a value off its bounds, and a misfit that noise
     explains (ADEQUATE); None where the gene was not searched. ``absolute_error`` is the standard error in ``unit``.
     """
@@ -104,7 +104,7 @@ def summarise(
 ) -> Result | ForceResult:
     """Judge what a calibration found, by its last ``checkpoint``, on every recording of the dataset."""
     if dataset.kind == "forces":
-        from calibration.estimation import summarise_forces  # its results are made of these
+        from wingfit.calibration.forces.estimation import summarise_forces  # its results are made of these
 
         return summarise_forces(spec, dataset, evaluator, checkpoint)
     (*_, genome) = found(spec, dataset, checkpoint).values()

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from calibration import cma, genetic
-from calibration.evaluator import Evaluator
-from calibration.genetic import FAILED
-from calibration.likelihood import ITERATIONS, Step, iterate
-from calibration.linearised import free_genes, values_at
-from calibration.plan import Stage, plan
-from calibration.problem import Problem, base_genome
-from calibration.spec import CalibrationSpec, model_for, resolved
-from records import Dataset, Gene
-from records.blas_threads import one_blas_thread
-from sim.model import Model
+from wingfit.calibration import cma, genetic
+from wingfit.calibration.estimates.likelihood import ITERATIONS, Step, iterate
+from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.genetic import FAILED
+from wingfit.calibration.plan import Stage, plan
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
+from wingfit.records import Dataset, Gene
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.model import Model
 
 __all__ = ["CalibrationSpec", "Generation", "Stage", "calibrate", "found", "model_for", "plan", "resolved"]
 
@@ -38,11 +38,11 @@ class Generation:
     by their noise, so that its ``best`` need not fall every time.
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
-    (:class:`calibration.problem.Misfit`); ``diversity`` the mean over the free genes of the population's standard
-    deviation in unit coordinates (of an iteration: the largest move of a gene); ``failed`` counts this generation's
-    failed individuals, of which ``reasons`` lists up to ten different ones; ``genome`` is full; ``progress`` is a
-    fraction of the whole calibration (an estimate, non-decreasing, 1 only at the end). In ``checkpoint``, ``found``
-    maps the names of the stages so far to the best full genome of each.
+    (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` the mean over the free genes of the population's
+    standard deviation in unit coordinates (of an iteration: the largest move of a gene); ``failed`` counts this
+    generation's failed individuals, of which ``reasons`` lists up to ten different ones; ``genome`` is full;
+    ``progress`` is a fraction of the whole calibration (an estimate, non-decreasing, 1 only at the end). In
+    ``checkpoint``, ``found`` maps the names of the stages so far to the best full genome of each.
     """
 
     stage: str

@@ -8,19 +8,19 @@ from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
-from calibration.evaluator import Evaluator
-from calibration.plan import plan, prepared
-from calibration.problem import base_genome
-from diagnosis.assess import assess, suspected
-from diagnosis.assessment import Assessment, Counted
-from diagnosis.conclude import concluded
-from diagnosis.finding import Finding
-from diagnosis.rigs import subject_of
-from diagnosis.spec import DiagnosisSpec, Progress
-from diagnosis.stack import Stack
-from diagnosis.subject import Subject
-from records import Dataset, Recording
-from records.blas_threads import one_blas_thread
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.plan import plan, prepared
+from wingfit.calibration.problem import base_genome
+from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.rigs import subject_of
+from wingfit.diagnosis.search import assess, suspected
+from wingfit.diagnosis.search_state import Assessment, Counted
+from wingfit.diagnosis.spec import DiagnosisSpec, Progress
+from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.build_finding import concluded
+from wingfit.records import Dataset, Recording
+from wingfit.records.blas_threads import one_blas_thread
 
 ASSESSED = 0.7  # of the work: after that there is a verdict, and its place and its proof are looked for
 

@@ -11,23 +11,23 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from calibration.effects import sizes
-from calibration.plan import fitted_through
-from calibration.spec import CalibrationSpec, model_for
-from diagnosis.subject import Place, Subject, Suspect
-from records import Condition, Dataset, Recording, Vehicle, Wing
-from records.dataset import ForceAxis
-from sim.alignment import recorded_crossing
-from sim.blade_element_wing import BladeElementWing
-from sim.blades.terms import PRESETS
-from sim.division import Division
-from sim.effects.contract import Effect
-from sim.effects.probe import Probe
-from sim.effects.registry import EFFECTS
-from sim.flexible_wing import FlexibleWing
-from sim.model import Model
-from sim.planform import Planform
-from sim.probing import Probed, probed
+from wingfit.calibration.effects import sizes
+from wingfit.calibration.plan import fitted_through
+from wingfit.calibration.spec import CalibrationSpec, model_for
+from wingfit.diagnosis.subject import Place, Subject, Suspect
+from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
+from wingfit.records.dataset import ForceAxis
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.model import Model
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.terms import PRESETS
+from wingfit.sim.wing.alignment import recorded_crossing
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.planform import Planform
+from wingfit.sim.wing.probing import Probed, probed
 
 Array = npt.NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from calibration.spec import CalibrationSpec
-from diagnosis.finding import Finding
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis.finding import Finding
 
 
 @dataclass(frozen=True)

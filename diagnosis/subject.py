@@ -1,6 +1,6 @@
 """What a diagnosis needs of a rig: a model that can be extended, the suspects, a finer model, and where channels lie.
 
-The two rigs that are known are adapted in :mod:`diagnosis.rigs`; any other that meets :class:`Subject` will do.
+The two rigs that are known are adapted in :mod:`wingfit.diagnosis.rigs`; any other that meets :class:`Subject` will do.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Gene, Recording
-from sim.effects.probe import Probe
-from sim.model import Model
-from sim.probing import Probed
+from wingfit.records import Condition, Gene, Recording
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.model import Model
+from wingfit.sim.wing.probing import Probed
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]

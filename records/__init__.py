@@ -5,12 +5,12 @@ Axes (docs/notation.md) of a wing: x aft along the chord, y outboard along the s
 of a vehicle: x forward to the nose, z down.
 """
 
-from records.dataset import Condition, Dataset, LowPass, Recording
-from records.drive import Drive, FourBarDrive, FourierDrive
-from records.errors import DatasetError, Fault
-from records.genes import EstimateError, Gene, Genome
-from records.storage import load_archive, load_dataset, save_dataset
-from records.vehicle import (
+from wingfit.records.dataset import Condition, Dataset, LowPass, Recording
+from wingfit.records.drive import Drive, FourBarDrive, FourierDrive
+from wingfit.records.errors import DatasetError, Fault
+from wingfit.records.files.storage import load_archive, load_dataset, save_dataset
+from wingfit.records.genes import EstimateError, Gene, Genome
+from wingfit.records.vehicle import (
     ChordStation,
     Flap,
     FourierFlap,
@@ -21,7 +21,7 @@ from records.vehicle import (
     Vehicle,
     WingMotion,
 )
-from records.wing import Hinge, Marker, Materials, Rod, Station, Wing
+from wingfit.records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 
 __all__ = [
     "ChordStation",

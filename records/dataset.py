@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from records.vehicle import Vehicle, WingMotion
-from records.wing import Wing
+from wingfit.records.vehicle import Vehicle, WingMotion
+from wingfit.records.wing import Wing
 
 Rig = Literal["vacuum_chamber", "wind_tunnel", "free_flight"]
 ForceAxis = Literal["x", "z"]

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from records.limits import MAX_ERRORS
+from wingfit.records.limits import MAX_ERRORS
 
 _SHOWN = 80
 

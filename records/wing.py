@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from records.drive import Drive
+from wingfit.records.drive import Drive
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,22 @@ import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
-from diagnosis.intervals import reach
-from report.layout import figure, panels
-from report.markup import Markup, joined, tag
-from report.svg import (
+from wingfit.diagnosis.evidence.intervals import reach
+from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
+from wingfit.report.layout import figure, panels
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import (
+    Scale,
+    capital,
+    change,
+    channel_scale,
+    number,
+    scale_for,
+    share,
+    shortened,
+    stages,
+)
+from wingfit.report.svg import (
     LEVELS,
     SIDES,
     Axis,
@@ -28,7 +39,6 @@ from report.svg import (
     x_axis,
     y_axis,
 )
-from report.words import Scale, capital, change, channel_scale, number, scale_for, share, shortened, stages
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT

@@ -1,6 +1,6 @@
 """A finding as JSON, exactly, both ways.
 
-Numbers stay in the units of :mod:`diagnosis.finding`: JSON is for programs, the page for people.
+Numbers stay in the units of :mod:`wingfit.diagnosis.finding`: JSON is for programs, the page for people.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Literal
 import pydantic
 from pydantic.dataclasses import dataclass
 
-from diagnosis.finding import Finding
+from wingfit.diagnosis.finding import Finding
 
 FORMAT_VERSION = 1
 

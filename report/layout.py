@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from report.markup import Markup, tag
+from wingfit.report.markup import Markup, tag
 
 
 def section(heading: str, *parts: object) -> Markup:

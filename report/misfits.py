@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
-from report.layout import figure, folded, panels, table
-from report.markup import Markup, joined, tag
-from report.svg import Axis, axis, curve, dots, drawing, legend, line, text, whisker, x_axis, y_axis
-from report.words import Scale, bounds, change, channel_scale, condition, number, shortened, stages
+from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
+from wingfit.report.layout import figure, folded, panels, table
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import Scale, bounds, change, channel_scale, condition, number, shortened, stages
+from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, text, whisker, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 ROW, MOST_ROWS, MOST_OVERLAYS = 38.0, 18, 12

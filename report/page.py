@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from diagnosis.finding import VERDICTS, Finding, Floors
-from report import beat_maps, misfits, place, ranking, tables, wing_map
-from report.layout import figure, panels, section
-from report.markup import Markup, joined, tag
-from report.style import style_sheet
-from report.svg import Axis, bar, drawing, text, x_axis
-from report.words import (
+from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
+from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
+from wingfit.report.layout import figure, panels, section
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import (
     Scale,
     best_of,
     channel_scale,
@@ -20,6 +18,8 @@ from report.words import (
     titles,
     what_was_put_in,
 )
+from wingfit.report.style import style_sheet
+from wingfit.report.svg import Axis, bar, drawing, text, x_axis
 
 _PROVED = "Is the fit better on recordings it has not seen?"
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
@@ -66,7 +66,7 @@ def _parts(finding: Finding) -> list[object]:
             misfits.proof(finding),
             misfits.recordings(finding),
         ),
-        _section("Where and when", place.place(finding), wing_map.wing_map(finding), beat_maps.misfit_maps(finding)),
+        _section("Where and when", location.place(finding), wing_map.wing_map(finding), beat_maps.misfit_maps(finding)),
         _section(f"The {beat_maps.lacking(finding)} that is missing", beat_maps.missing_loads(finding)),
         _section("What was considered", ranking.ranking(finding)),
         tables.law(finding.law),

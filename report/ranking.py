@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from diagnosis.finding import Finding, Hypothesis
-from report.layout import figure, folded, table
-from report.markup import Markup, joined, tag
-from report.svg import bar
-from report.words import best_of, channel_scale, listed, number, percent, title_of, titles
+from wingfit.diagnosis.finding import Finding, Hypothesis
+from wingfit.report.layout import figure, folded, table
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import best_of, channel_scale, listed, number, percent, title_of, titles
+from wingfit.report.svg import bar
 
 MOST_SHOWN = 8
 _NOTE = (

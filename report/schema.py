@@ -1,4 +1,4 @@
-"""The JSON Schema of a finding, generated from its types; ``python -m report.schema`` prints it."""
+"""The JSON Schema of a finding, generated from its types; ``python -m wingfit.report.schema`` prints it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 import sys
 from typing import Any
 
-from report.finding_file import ADAPTER, FORMAT_VERSION
+from wingfit.report.finding_file import ADAPTER, FORMAT_VERSION
 
 
 def finding_schema() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from report.svg import LEVELS, SIDES
+from wingfit.report.svg import LEVELS, SIDES
 
 _LEVELS_LIGHT = ("#f1f4e6", "#c7e9b4", "#7fcdbb", "#41b6c4", "#1d91c0", "#225ea8", "#0c2c84")
 _LEVELS_DARK = ("#22302f", "#1f4a7a", "#1d79ab", "#33a9bd", "#7fcdbb", "#cdebb0", "#fffbd0")

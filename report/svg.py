@@ -1,7 +1,7 @@
 """A small kit for figures: axes with round numbers, marks, colour levels.
 
 Panels are drawn about 360 units wide, so that on a phone, where each fills the width, letters keep their size. Colours
-are classes, given in :mod:`report.style` for light and for dark.
+are classes, given in :mod:`wingfit.report.style` for light and for dark.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from report.markup import Markup, joined, tag
-from report.words import number
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import number
 
 LEVELS = 12  # colours of a map from nothing to most, classes l0 to l11
 SIDES = 6  # colours of a map on either side of nothing, classes d0 to d12

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
-from diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Interval
-from report.layout import folded, section, table
-from report.markup import Markup, joined, tag
-from report.words import bounds, capital, number, percent, scale_for, title_of, titles, what_was_put_in, with_unit
+from wingfit.diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Interval
+from wingfit.report.layout import folded, section, table
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import (
+    bounds,
+    capital,
+    number,
+    percent,
+    scale_for,
+    title_of,
+    titles,
+    what_was_put_in,
+    with_unit,
+)
 
 MOST_GENES = 12
 _ADVICE = (

@@ -5,11 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from diagnosis.finding import Finding, Interval, MarkerMisfit
-from report.layout import figure, panels
-from report.markup import Markup, joined, tag
-from report.svg import LEVELS, Axis, area, arrow, colour_bar, drawing, legend, level, line, text, whisker, x_axis
-from report.words import Scale, capital, change, channel_scale, number, share, shortened, stages
+from wingfit.diagnosis.finding import Finding, Interval, MarkerMisfit
+from wingfit.report.layout import figure, panels
+from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.number_format import Scale, capital, change, channel_scale, number, share, shortened, stages
+from wingfit.report.svg import (
+    LEVELS,
+    Axis,
+    area,
+    arrow,
+    colour_bar,
+    drawing,
+    legend,
+    level,
+    line,
+    text,
+    whisker,
+    x_axis,
+)
 
 WIDTH, LEFT, RIGHT, TOP = 360.0, 16.0, 344.0, 34.0
 SLANT = 0.45  # the wing seen from above and behind: a length along x is drawn this long, and this far sideways

@@ -16,23 +16,24 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
-from service import http, problems, threads
-from service.database import Database
-from service.describing import describe
-from service.diagnoser import Diagnoser
-from service.engine import Engine
-from service.gate import Gate
-from service.guard import Guard
-from service.observing import METRICS, Metrics, Observer
-from service.pieces import Pieces
-from service.quick import Quick
-from service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
-from service.settings import Settings
-from service.shortcut import SHORTCUT, Shortcut
-from service.shutdown import StopLimits
-from service.state import MakeEvaluator, Service
-from service.unforeseen import Unforeseen
-from service.version import wingfit_version
+from wingfit.service.auth.authentication import Gate
+from wingfit.service.container import MakeEvaluator, Service
+from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.http import problems, threads
+from wingfit.service.http import responses as http
+from wingfit.service.http.error_boundary import Unforeseen
+from wingfit.service.http.openapi_additions import describe
+from wingfit.service.http.pieces import Pieces
+from wingfit.service.http.quick import Quick
+from wingfit.service.http.request_limits import Guard
+from wingfit.service.http.shortcut import SHORTCUT, Shortcut
+from wingfit.service.operations.metrics_and_log import METRICS, Metrics, Observer
+from wingfit.service.operations.shutdown import StopLimits
+from wingfit.service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
+from wingfit.service.runs.engine import Engine
+from wingfit.service.settings import Settings
+from wingfit.service.storage.database import Database
+from wingfit.service.version import wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from records.errors import nearest
+from wingfit.records.errors import nearest
 
 PREFIX = "WINGFIT_"
 # Variables that other parts of wingfit read, and that may be in a server's environment too.

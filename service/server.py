@@ -15,16 +15,17 @@ from types import FrameType
 import uvicorn
 from fastapi import FastAPI
 
-from service import keys, shutdown
-from service.app import create_app
-from service.database import Database, DataFolderError
-from service.diagnoser import Diagnoser
-from service.engine import Engine
-from service.observing import set_up_log
-from service.protocol import Protocol
-from service.settings import Settings, SettingsError, is_loopback
-from service.shutdown import Deadline, StopLimits, Watchdog
-from service.state import MakeEvaluator
+from wingfit.service.app import create_app
+from wingfit.service.auth import keys
+from wingfit.service.container import MakeEvaluator
+from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.http.header_limits import Protocol
+from wingfit.service.operations import shutdown
+from wingfit.service.operations.metrics_and_log import set_up_log
+from wingfit.service.operations.shutdown import Deadline, StopLimits, Watchdog
+from wingfit.service.runs.engine import Engine
+from wingfit.service.settings import Settings, SettingsError, is_loopback
+from wingfit.service.storage.database import Database, DataFolderError
 
 LOG = logging.getLogger("wingfit")
 # For which a thread that computes may keep others from running Python. Reading gives its turn away at every row, so

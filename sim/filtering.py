@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt, sosfreqz
 
-from records import LowPass, Recording
-from records.limits import UNEVEN_STEPS
+from wingfit.records import LowPass, Recording
+from wingfit.records.limits import UNEVEN_STEPS
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from records import Gene, Recording
+from wingfit.records import Gene, Recording
 
 Array = npt.NDArray[np.float64]
 

@@ -1,16 +1,16 @@
-"""Compile the kernels into the on-disk cache, so that the first run starts at once: ``python -m sim.warm``."""
+"""Compile the kernels into the on-disk cache, so that the first run starts at once: ``python -m wingfit.sim.warm``."""
 
 from __future__ import annotations
 
 import time
 
-from records import Genome
-from sim.balance import TRIALS, delfly
-from sim.balance import blank_recording as blank_forces
-from sim.blade_element_wing import BladeElementWing
-from sim.flexible_wing import FlexibleWing
-from sim.numerics import Numerics
-from sim.rig import WIND_TUNNEL, blank_recording, robird_wing
+from wingfit.records import Genome
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.virtual_rigs.balance import TRIALS, delfly
+from wingfit.sim.virtual_rigs.balance import blank_recording as blank_forces
+from wingfit.sim.virtual_rigs.campaign import WIND_TUNNEL, blank_recording, robird_wing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 WITH_MEMORY = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture")
 

@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import interpolate
 
-from records import Condition, LowPass, Recording
-from records.blas_threads import one_blas_thread
-from records.dataset import STANDARD_GRAVITY
-from records.limits import UNEVEN_STEPS
-from tracking.rigid_body import Poses, poses, quaternions, scale_remarks
-from tracking.zero_phase import Kernels, kernels
+from wingfit.records import Condition, LowPass, Recording
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.records.dataset import STANDARD_GRAVITY
+from wingfit.records.limits import UNEVEN_STEPS
+from wingfit.tracking.rigid_body import Poses, poses, quaternions, scale_remarks
+from wingfit.tracking.zero_phase import Kernels, kernels
 
 Array = npt.NDArray[np.float64]
 _CHUNK = 512

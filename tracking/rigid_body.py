@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from records.blas_threads import one_blas_thread
+from wingfit.records.blas_threads import one_blas_thread
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special, stats
 
-from records.blas_threads import one_blas_thread
-from tracking.noise import LinearFit, Noise, least_squares, products
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.tracking.noise import LinearFit, Noise, least_squares, products
 
 Array = npt.NDArray[np.float64]
 
@@ -86,7 +86,7 @@ class PeriodicFit:
 
     @property
     def series(self) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-        """Mean, cosine and sine coefficients as :class:`records.FourierFlap` takes them."""
+        """Mean, cosine and sine coefficients as :class:`wingfit.records.FourierFlap` takes them."""
         c = self.coefficients
         return float(c[0]), tuple(c[1::2].tolist()), tuple(c[2::2].tolist())
 

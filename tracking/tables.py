@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from records.errors import Faults, decode, fail, nearest, shown
-from records.limits import MAX_ROWS
+from wingfit.records.errors import Faults, decode, fail, nearest, shown
+from wingfit.records.limits import MAX_ROWS
 
 Array = npt.NDArray[np.float64]
 _NAMED = 6

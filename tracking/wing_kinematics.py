@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import optimize, stats
 
-from records import FourierFlap, FourierPitch, PassivePitch, WingMotion
-from records.blas_threads import one_blas_thread
-from tracking.noise import least_squares, products
-from tracking.smoothing import PeriodicFit, basis, fit_periodic
+from wingfit.records import FourierFlap, FourierPitch, PassivePitch, WingMotion
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.tracking.noise import least_squares, products
+from wingfit.tracking.smoothing import PeriodicFit, basis, fit_periodic
 
 Array = npt.NDArray[np.float64]
 PitchKind = Literal["fourier", "passive"]

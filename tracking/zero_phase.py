@@ -1,7 +1,7 @@
 """Smoothing and differentiating in one linear step: kernels of a zero-phase Butterworth filter and its derivatives.
 
-The filter is the digital Butterworth low-pass run forwards and backwards that :class:`records.LowPass` names; the
-derivative is exact in frequency, so that a derivative is that of the filtered signal and loses nothing more.
+The filter is the digital Butterworth low-pass run forwards and backwards that :class:`wingfit.records.LowPass` names;
+the derivative is exact in frequency, so that a derivative is that of the filtered signal and loses nothing more.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from records import LowPass
+from wingfit.records import LowPass
 
 Array = npt.NDArray[np.float64]
 _LENGTH = 8192

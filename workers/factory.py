@@ -7,9 +7,9 @@ from typing import Literal, Protocol, get_args
 
 import numpy.typing as npt
 
-from calibration.evaluator import Evaluator
-from calibration.problem import Evaluation, Problem
-from workers.watch import Standing, never
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.workers.watch import Standing, never
 
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 
@@ -61,15 +61,15 @@ def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str
     if address is not None and "://" in address:
         raise ValueError(f"the Ray address is {address!r}; write host:port, and run a node of it on this machine")
     if kind == "in_process":
-        from workers.in_process import InProcessEvaluator
+        from wingfit.workers.in_process import InProcessEvaluator
 
         return InProcessEvaluator()
     if kind == "processes":
-        from workers.processes import ProcessPoolEvaluator
+        from wingfit.workers.processes import ProcessPoolEvaluator
 
         return ProcessPoolEvaluator(workers)
     if kind == "ray":
-        from workers.ray_cluster import RayEvaluator
+        from wingfit.workers.ray_cluster import RayEvaluator
 
         return RayEvaluator(workers, address)
     raise ValueError(f"no evaluator {kind!r}; there are {', '.join(get_args(EvaluatorKind))}")

@@ -7,10 +7,10 @@ from typing import Literal
 
 import numpy.typing as npt
 
-from calibration.evaluator import as_batch, gather, run_unit, units
-from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluationInterruptedError, EvaluatorClosedError
-from workers.watch import Standing, never
+from wingfit.calibration.evaluator import as_batch, gather, run_unit, units
+from wingfit.calibration.problem import Evaluation, Misfit, Problem
+from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
+from wingfit.workers.watch import Standing, never
 
 
 class InProcessEvaluator:

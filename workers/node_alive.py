@@ -1,4 +1,4 @@
-"""Whether the Ray node of this machine is alive in its cluster: ``python -m workers.node_alive ray-head:6379``.
+"""Whether the Ray node of this machine is alive in its cluster: ``python -m wingfit.workers.node_alive ray-head:6379``.
 
 Exits with 0 if it is, else with 1 and the reason. The head is asked, because a node that lost its head, or that the
 head has given up, may still have all its processes. One call takes half a second of processor time, to import Ray.
@@ -21,7 +21,7 @@ class NodeNotAliveError(RuntimeError):
 
 def main(words: list[str] | None = None) -> int:
     """Check one node, by default that of this machine."""
-    parser = argparse.ArgumentParser(prog="python -m workers.node_alive", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m wingfit.workers.node_alive", description=__doc__)
     parser.add_argument("head", help="address of the cluster's head, as host:port")
     parser.add_argument(
         "--node", help="IP address of the node (default: the one from which this machine reaches the head)"

@@ -2,7 +2,8 @@
 
 One thread looks after one process over one pipe. When a process dies, its thread alone notices, starts
 another and repeats the one unit that was lost; everything else goes on. One more thread watches the time: a process
-that is stopped, or takes longer for a unit than :class:`workers.watch.Expectation` allows, is killed, and so replaced.
+that is stopped, or takes longer for a unit than :class:`wingfit.workers.watch.Expectation` allows, is killed, and so
+replaced.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
-from calibration.evaluator import as_batch, gather, units
-from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
-from workers.share import ProblemMemory, Task, child_environment, lower_priority
-from workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally, never
+from wingfit.calibration.evaluator import as_batch, gather, units
+from wingfit.calibration.problem import Evaluation, Misfit, Problem
+from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
+from wingfit.workers.share import ProblemMemory, Task, child_environment, lower_priority
+from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally, never
 
 LOG = logging.getLogger("wingfit.workers")
 LOOK_SECONDS = 0.5

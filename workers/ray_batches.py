@@ -2,8 +2,8 @@
 
 Nothing is ever cancelled: in Ray 2.60 a cancellation that meets the end of its task aborts this process. So no more
 batches are under way than keep the workers busy, and what a call that is given up leaves behind is soon done.
-A worker that hangs ends itself (:mod:`workers.guardian`). A batch whose worker or node is lost is done again from
-here and not by Ray, which would say nothing of it.
+A worker that hangs ends itself (:mod:`wingfit.workers.guardian`). A batch whose worker or node is lost is done again
+from here and not by Ray, which would say nothing of it.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from calibration.problem import Misfit, Problem
-from workers.errors import WorkerLostError
-from workers.ray_connection import ray, ray_errors
-from workers.watch import ATTEMPTS, STARTS, Expectation, Tally
+from wingfit.calibration.problem import Misfit, Problem
+from wingfit.workers.errors import WorkerLostError
+from wingfit.workers.ray_connection import ray, ray_errors
+from wingfit.workers.watch import ATTEMPTS, STARTS, Expectation, Tally
 
 LOG = logging.getLogger("wingfit.workers")
 POLL_SECONDS = 0.2

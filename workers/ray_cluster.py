@@ -18,14 +18,14 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
-from calibration.evaluator import as_batch, gather, units
-from calibration.problem import Evaluation, Misfit, Problem
-from workers.errors import EvaluationInterruptedError, EvaluatorClosedError
-from workers.guardian import Guardian
-from workers.ray_batches import Batch, Batches, Cluster
-from workers.ray_connection import Connection, ray
-from workers.share import PROBLEMS_KEPT, ProblemMemory, Task, lower_priority
-from workers.watch import START_SECONDS, Expectation, Standing, Tally, never
+from wingfit.calibration.evaluator import as_batch, gather, units
+from wingfit.calibration.problem import Evaluation, Misfit, Problem
+from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
+from wingfit.workers.guardian import Guardian
+from wingfit.workers.ray_batches import Batch, Batches, Cluster
+from wingfit.workers.ray_connection import Connection, ray
+from wingfit.workers.share import PROBLEMS_KEPT, ProblemMemory, Task, lower_priority
+from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally, never
 
 LOG = logging.getLogger("wingfit.workers")
 STOP_SECONDS = 30.0

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from calibration.evaluator import Unit, run_unit
-from calibration.problem import Misfit, Problem
+from wingfit.calibration.evaluator import Unit, run_unit
+from wingfit.calibration.problem import Misfit, Problem
 
 NICENESS = 10
 PROBLEMS_KEPT = 8

@@ -19,10 +19,10 @@ from typing import Any
 
 import httpx
 
-from benchmarks import machine
 from benchmarks.abuse import fuzz, good, hdf5, requests, uploads
 from benchmarks.abuse.cases import Case
-from benchmarks.server_process import Server
+from benchmarks.common import machine
+from benchmarks.common.server_process import Server
 
 Json = dict[str, Any]
 ENOUGH_MB = 1024.0

@@ -24,8 +24,8 @@ from typing import Any
 import httpx
 
 from benchmarks.abuse import good, uploads
+from benchmarks.common.ray_nodes import REPOSITORY
 from benchmarks.durability.works import archive
-from benchmarks.ray_nodes import REPOSITORY
 
 Json = dict[str, Any]
 MISSING = "the fuzzer is not installed; install it: pip install -e .[fuzz], or do without: --no-fuzz"

@@ -24,7 +24,7 @@ import httpx
 import numpy as np
 
 from benchmarks.abuse import uploads
-from benchmarks.server_process import Server, descendants
+from benchmarks.common.server_process import Server, descendants
 
 Json = dict[str, Any]
 Make = Callable[[h5py.File], None]

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from benchmarks.abuse.cases import Case, upload
-from benchmarks.ray_nodes import REPOSITORY
-from records import load_archive, save_dataset
+from benchmarks.common.ray_nodes import REPOSITORY
+from wingfit.records import load_archive, save_dataset
 
 EXAMPLE = REPOSITORY / "examples" / "robird"
 TRACKS = "recordings/vac-0010mbar-lag0-2.0hz.csv"

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from records import Condition
+from wingfit.records import Condition
 
 Group = Literal["null", "listed", "unlisted", "measurement", "pairs", "advice"]
 GROUPS: tuple[Group, ...] = ("null", "listed", "unlisted", "measurement", "pairs", "advice")

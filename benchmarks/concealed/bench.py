@@ -24,13 +24,13 @@ from benchmarks.concealed.plant.simulate import simulate as simulate_wing
 from benchmarks.concealed.plant.vehicle_laws import LAWS as VEHICLE_LAWS
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.trials import Build
-from calibration.plan import prepared
-from calibration.spec import CalibrationSpec, model_for, wing_model
-from records import Condition, Dataset, Recording, Vehicle, Wing
-from sim.balance import delfly
-from sim.flexible_wing import FlexibleWing
-from sim.model import Model
-from sim.rig import robird_wing
+from wingfit.calibration.plan import prepared
+from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
+from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
+from wingfit.sim.model import Model
+from wingfit.sim.virtual_rigs.balance import delfly
+from wingfit.sim.virtual_rigs.campaign import robird_wing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
 Quality = TypeVar("Quality")

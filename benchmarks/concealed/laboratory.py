@@ -21,7 +21,7 @@ from benchmarks.concealed.plant.observe_law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
 from benchmarks.concealed.trials import Trial, conditions, name_of
-from records import Condition, Dataset, Recording, load_dataset, save_dataset
+from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset
 
 Array = npt.NDArray[np.float64]
 

@@ -23,11 +23,11 @@ from benchmarks.concealed.answer import Answer
 from benchmarks.concealed.score import WORSE, Mark, blank, side_of
 from benchmarks.concealed.strength import Refit, rms, stacked
 from benchmarks.concealed.tool import Task
-from calibration.spec import CalibrationSpec, model_for
-from diagnosis.rigs import subject_of
-from diagnosis.subject import Suspect
-from records import Recording, load_dataset
-from sim.flexible_wing import FlexibleWing
+from wingfit.calibration.spec import CalibrationSpec, model_for
+from wingfit.diagnosis.rigs import subject_of
+from wingfit.diagnosis.subject import Suspect
+from wingfit.records import Recording, load_dataset
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
 

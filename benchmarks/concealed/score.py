@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from benchmarks.concealed.answer import Answer, Group, Side
-from diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
-from sim.effects.registry import EFFECTS
-from sim.wing_genes import wing_genes
+from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.wing.genes import wing_genes
 
 WORSE = 1.01  # a held-out misfit that is larger by less is the same
 NAMING = ("named", "measurement fault")

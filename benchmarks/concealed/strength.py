@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
-from records import Gene, Recording
-from sim.model import Model
+from wingfit.records import Gene, Recording
+from wingfit.sim.model import Model
 
 Array = npt.NDArray[np.float64]
 

@@ -26,8 +26,8 @@ from benchmarks.concealed.score import Mark, failed, mark
 from benchmarks.concealed.table import Advised, Table
 from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
-from records import Condition, load_dataset
-from report import finding_from_json, finding_json
+from wingfit.records import Condition, load_dataset
+from wingfit.report import finding_from_json, finding_json
 
 if TYPE_CHECKING:
     from benchmarks.concealed.peers import PeerOutcome

@@ -6,11 +6,11 @@ import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from calibration.spec import CalibrationSpec
-from diagnosis import DiagnosisSpec, diagnose
-from diagnosis.finding import Finding
-from records import load_dataset
-from workers import make_evaluator
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis import DiagnosisSpec, diagnose
+from wingfit.diagnosis.finding import Finding
+from wingfit.records import load_dataset
+from wingfit.workers import make_evaluator
 
 
 @dataclass(frozen=True)

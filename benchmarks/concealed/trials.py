@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.concealed.answer import GROUPS, Group
-from records import Condition
+from wingfit.records import Condition
 
 TARGETS = (2.0, 3.0, 5.0)
 AIR_PA, ROOM_K = 101_325.0, 293.15

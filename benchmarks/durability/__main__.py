@@ -24,13 +24,13 @@ from typing import Any
 import httpx
 import numpy as np
 
-from benchmarks import machine
+from benchmarks.common import machine
+from benchmarks.common.server_process import WORKERS, Server
 from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
 from benchmarks.durability.visitors import FINAL, Visitor, finding, outcome, settle, settle_diagnosis
 from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, archive
-from benchmarks.server_process import WORKERS, Server
-from service.database import FILE_NAME
+from wingfit.service.storage.database import FILE_NAME
 
 Json = dict[str, Any]
 KILLS = {"server": 300, "workers": 60, "hung": 20, "nodes": 20, "stack": 20}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.ray_nodes import REPOSITORY
+from benchmarks.common.ray_nodes import REPOSITORY
 
 Json = dict[str, Any]
 EXAMPLES = REPOSITORY / "examples"

@@ -18,15 +18,15 @@ from typing import Any
 
 import httpx
 
-from benchmarks import machine
+from benchmarks.common import machine
+from benchmarks.common.server_process import Server
 from benchmarks.load.beside import Load, beside, per_read_us
 from benchmarks.load.calibrations import LONG, ROBIRD, SHORT, computed
 from benchmarks.load.filling import Filled, fill
 from benchmarks.load.mix import walk
 from benchmarks.load.nodes import scaling
 from benchmarks.load.pages import pages
-from benchmarks.server_process import Server
-from service.client import Client
+from wingfit.client.client import Client
 
 Json = dict[str, Any]
 NONE, WATCHED, CALM, BRISK, FULL = "undisturbed", "watched", "calm", "brisk", "full"

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from benchmarks.common.server_process import Server
 from benchmarks.load.calibrations import computed
 from benchmarks.load.crowd import Crowd, Told, visit
 from benchmarks.load.figures import milliseconds
 from benchmarks.load.mix import KINDS, Stored, reads
-from benchmarks.server_process import Server
-from service.client import Client
+from wingfit.client.client import Client
 
 Json = dict[str, Any]
 READS = 20_000  # drawn; then again from the first

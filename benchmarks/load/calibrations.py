@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.durability.works import EXAMPLES
-from service.client import Client
+from wingfit.client.client import Client
 
 Json = dict[str, Any]
 ROBIRD = EXAMPLES / "robird"

@@ -10,11 +10,11 @@ from typing import Any
 from sqlalchemy import func, insert, literal, select
 from sqlalchemy.orm import Session
 
-from service import store
-from service.database import Database
-from service.tables import ArchiveRow, DatasetRow, GenerationRow, RunRow
-from service.views import columns
-from workers.jobs import State
+from wingfit.service.runs.views import columns
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import ArchiveRow, DatasetRow, GenerationRow, RunRow
+from wingfit.workers.jobs import State
 
 Values = dict[str, Any]
 DATASETS = 20

@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.common.server_process import Server
 from benchmarks.durability.cluster import Cluster
 from benchmarks.load.calibrations import ROBIRD, computed
-from benchmarks.server_process import Server
-from service.client import Client
+from wingfit.client.client import Client
 
 Json = dict[str, Any]
 SETTLE_SECONDS = 120.0

@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.load.figures import milliseconds
 from benchmarks.load.filling import Filled
 from benchmarks.load.mix import Stored
-from service.http import HISTORY_PAGE, LARGEST_HISTORY_PAGE, LARGEST_PAGE, PAGE
+from wingfit.service.http.responses import HISTORY_PAGE, LARGEST_HISTORY_PAGE, LARGEST_PAGE, PAGE
 
 Json = dict[str, Any]
 TIMES, TIMES_LARGEST = 100, 20

@@ -13,8 +13,8 @@ import numpy as np
 
 from benchmarks.peers import exudyn_engine, scipy_engine
 from benchmarks.peers.wing import PeerWing, peer_wing
-from sim.flexible_wing import FlexibleWing
-from sim.rig import robird_wing, tunnel, vacuum
+from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Medium = Literal["air", "vacuum"]
 

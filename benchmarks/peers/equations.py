@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_matrix
 
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import allocating
+from wingfit.sim.kernels.jit import allocating
 
 Array = npt.NDArray[np.float64]
 V3 = tuple[float, float, float]

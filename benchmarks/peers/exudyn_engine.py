@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.peers.equations import air_loads
 from benchmarks.peers.scipy_engine import Cost, OutOfTimeError
 from benchmarks.peers.wing import PeerWing, rod_motion
-from sim.kernels.jit import allocating
+from wingfit.sim.kernels.jit import allocating
 
 Array = npt.NDArray[np.float64]
 Law = Literal["angles", "logarithm", "energy"]

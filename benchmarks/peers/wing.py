@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from records import Condition, Gene
-from sim.atmosphere import density
-from sim.drive import flap_angle
-from sim.kernels.arrays import AREA
-from sim.kernels.jit import allocating
-from sim.structure import Structure
-from sim.wing_genes import lanes
+from wingfit.records import Condition, Gene
+from wingfit.sim.atmosphere import density
+from wingfit.sim.kernels.arrays import AREA
+from wingfit.sim.kernels.jit import allocating
+from wingfit.sim.wing.drive import flap_angle
+from wingfit.sim.wing.genes import lanes
+from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

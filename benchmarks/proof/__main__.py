@@ -13,10 +13,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.machine import commit, cpu
+from benchmarks.common.machine import commit, cpu
 from benchmarks.proof import delfly, robird
 from benchmarks.proof.told import Story, opened
-from service.commands.output import note, say
+from wingfit.cli.output import note, say
 
 FOLDER = Path("build") / "proof"
 WORKERS = 2

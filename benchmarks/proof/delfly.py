@@ -16,16 +16,16 @@ from benchmarks.concealed.bench import VehicleBench
 from benchmarks.concealed.trials import Build
 from benchmarks.delfly import LIFT_CORRELATION, fit
 from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
-from calibration.evaluation import agreements
-from calibration.evaluator import Evaluator
-from calibration.plan import prepared
-from calibration.problem import base_genome
-from calibration.search import calibrate
-from calibration.spec import CalibrationSpec, vehicle_model
-from diagnosis.finding import Finding, Interval
-from records import Dataset
-from sim.balance import DRAG, HELD_OUT, TRIALS, Trial
-from workers import make_evaluator
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.agreement import agreements
+from wingfit.calibration.plan import prepared
+from wingfit.calibration.problem import base_genome
+from wingfit.calibration.search import calibrate
+from wingfit.calibration.spec import CalibrationSpec, vehicle_model
+from wingfit.diagnosis.finding import Finding, Interval
+from wingfit.records import Dataset
+from wingfit.sim.virtual_rigs.balance import DRAG, HELD_OUT, TRIALS, Trial
+from wingfit.workers import make_evaluator
 
 BASELINE = "berman_wang"
 FLING = "clap_and_peel"

@@ -29,15 +29,15 @@ from benchmarks.proof.told import (
     over_floor,
     saved,
 )
-from calibration.evaluator import Evaluator
-from calibration.problem import base_genome
-from calibration.result import Result, judge
-from calibration.search import calibrate
-from calibration.spec import CalibrationSpec, wing_model
-from diagnosis.finding import Finding
-from records import Condition, Dataset
-from service.commands.output import progress
-from workers import make_evaluator
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import base_genome
+from wingfit.calibration.result import Result, judge
+from wingfit.calibration.search import calibrate
+from wingfit.calibration.spec import CalibrationSpec, wing_model
+from wingfit.cli.output import progress
+from wingfit.diagnosis.finding import Finding
+from wingfit.records import Condition, Dataset
+from wingfit.workers import make_evaluator
 
 DIVISION = "11"
 HIDDEN: Concealed = {

@@ -9,11 +9,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from diagnosis.finding import Finding, GeneValue, Hypothesis
-from records import Dataset, save_dataset
-from report import html
-from service.commands.output import progress
-from service.local import diagnose
+from wingfit.cli.output import progress
+from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis
+from wingfit.records import Dataset, save_dataset
+from wingfit.report import html
+from wingfit.service.diagnoses.local import diagnose
 
 Numbers = Mapping[str, Any]
 

@@ -10,10 +10,11 @@ from fastapi import APIRouter, Depends, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
-from service import http, store
-from service.backup import BackupError, snapshot
-from service.problems import ProblemError
-from service.state import Service, ServiceDep
+from wingfit.service.container import Service, ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.storage import store
+from wingfit.service.storage.backup import BackupError, snapshot
 
 router = APIRouter(prefix="/v1/backup", tags=["service"])
 MEDIA_TYPE = "application/vnd.sqlite3"

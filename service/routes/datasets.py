@@ -12,17 +12,19 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from records import Dataset
-from records.confined import ReaderError
-from service import http, store, views
-from service.access import owner_of_new
-from service.database import Database
-from service.datasets import Opened
-from service.guard import UPLOAD_LIMIT
-from service.problems import ProblemError, error_item, invalid
-from service.schemas import DatasetOut, Page
-from service.state import IN_TURN_OF_DOWNLOADS, IN_TURN_OF_UPLOADS, Service, ServiceDep
-from service.tables import ArchiveRow, DatasetRow
+from wingfit.records import Dataset
+from wingfit.records.files.confined import ReaderError
+from wingfit.service.auth.access import owner_of_new
+from wingfit.service.container import IN_TURN_OF_DOWNLOADS, IN_TURN_OF_UPLOADS, Service, ServiceDep
+from wingfit.service.datasets.parsed_datasets import Opened
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.http.request_limits import UPLOAD_LIMIT
+from wingfit.service.runs import views
+from wingfit.service.runs.schemas import DatasetOut, Page
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 MEDIA_TYPES = {".zip": "application/zip", ".nc": "application/x-netcdf"}

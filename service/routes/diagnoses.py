@@ -9,15 +9,18 @@ from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
 from starlette.responses import HTMLResponse, Response, StreamingResponse
 
-from service import diagnosis_checks, diagnosis_specs, diagnosis_views, http, spec_views, store
-from service.diagnosis_schemas import DiagnosisIn, DiagnosisOut
-from service.events import LastEventId, Told, Watched, described
-from service.problems import ProblemError, conflict, error_item, invalid
-from service.routes.runs import load
-from service.schemas import Page
-from service.state import IN_TURN_OF_DOWNLOADS, Service, ServiceDep
-from service.tables import DiagnosisRow, RunRow
-from workers import jobs
+from wingfit.service.container import IN_TURN_OF_DOWNLOADS, Service, ServiceDep
+from wingfit.service.diagnoses import checks, specs, views
+from wingfit.service.diagnoses.schemas import DiagnosisIn, DiagnosisOut
+from wingfit.service.http import responses as http
+from wingfit.service.http.events import LastEventId, Told, Watched, described
+from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
+from wingfit.service.routes.runs import load
+from wingfit.service.runs import spec_views
+from wingfit.service.runs.schemas import Page
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import DiagnosisRow, RunRow
+from wingfit.workers import jobs
 
 router = APIRouter(prefix="/v1/diagnoses", tags=["diagnoses"])
 
@@ -61,17 +64,17 @@ def submit(
     dataset_id = _dataset_id(body, run)
     dataset = load(service, dataset_id)
     of_run = store.spec(run) if run else None
-    spec = diagnosis_checks.checked(body, dataset, service.engine, service.diagnoser, of_run, _genome(run))
+    spec = checks.checked(body, dataset, service.engine, service.diagnoser, of_run, _genome(run))
     name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"[: spec_views.LONGEST_NAME]
 
     def create(session: Session) -> store.Answer:
         owner = store.admitted(session, dataset_id, service.settings.max_active)
         row = DiagnosisRow(id=store.new_id("dx"), owner=owner, name=name, dataset_id=dataset_id, kind=dataset.kind)
-        row.run_id, row.spec = body.run_id, diagnosis_specs.plain(spec)
+        row.run_id, row.spec = body.run_id, specs.plain(spec)
         row.created_at, row.evaluations, row.elapsed_seconds = store.now(), 0, 0.0
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
         session.add(row)
-        return store.Answer(202, f"/v1/diagnoses/{row.id}", diagnosis_views.diagnosis(row).model_dump(mode="json"))
+        return store.Answer(202, f"/v1/diagnoses/{row.id}", views.diagnosis(row).model_dump(mode="json"))
 
     answered, new = http.created(service.database, again, create)
     if new:
@@ -92,7 +95,7 @@ def list_diagnoses(
     equal = {"dataset_id": dataset_id, "run_id": run_id, "state": state}
     with service.database.read() as session:
         rows, following = store.page(session, DiagnosisRow, limit, cursor, **equal)
-    return Page(items=[diagnosis_views.diagnosis(row) for row in rows], next_cursor=following)
+    return Page(items=[views.diagnosis(row) for row in rows], next_cursor=following)
 
 
 @router.get("/{diagnosis_id}", response_model=DiagnosisOut, responses=http.errors(404), summary="Fetch a diagnosis")
@@ -100,7 +103,7 @@ def fetch(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatc
     """Return one diagnosis with its progress."""
     with service.database.read() as session:
         row = store.diagnosis(session, diagnosis_id)
-    return http.tagged(diagnosis_views.diagnosis(row), if_none_match)
+    return http.tagged(views.diagnosis(row), if_none_match)
 
 
 @router.delete("/{diagnosis_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a diagnosis")
@@ -116,7 +119,7 @@ def cancel(service: ServiceDep, diagnosis_id: str) -> DiagnosisOut:
     """Cancel a diagnosis; one under way ends within seconds."""
     row = service.runner.control(service.diagnosing, diagnosis_id, jobs.Cancel())
     assert isinstance(row, DiagnosisRow)  # noqa: S101  # for the type checker: the rows of diagnoses
-    return diagnosis_views.diagnosis(row)
+    return views.diagnosis(row)
 
 
 @router.get(
@@ -158,8 +161,8 @@ def events(service: ServiceDep, diagnosis_id: str, last_event_id: LastEventId = 
 
     def look(session: Session, after: int, limit: int) -> Told:
         steps = store.past_steps(session, diagnosis_id, after, limit)
-        job = diagnosis_views.diagnosis(store.diagnosis(session, diagnosis_id))
-        return Told(job, [diagnosis_views.step(one) for one in steps])
+        job = views.diagnosis(store.diagnosis(session, diagnosis_id))
+        return Told(job, [views.step(one) for one in steps])
 
     return service.events.answer(Watched(diagnosis_id, "step", look), last_event_id)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from service import effect_views, http
-from service.effect_schemas import EffectOut, EffectsOut
+from wingfit.service.http import responses as http
+from wingfit.service.outcomes import effect_views
+from wingfit.service.outcomes.effect_schemas import EffectOut, EffectsOut
 
 router = APIRouter(prefix="/v1/effects", tags=["effects"])
 

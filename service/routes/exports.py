@@ -11,9 +11,13 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from service import csv_text, diagnosis_exports, genomes, http, netcdf, run_exports, run_netcdf
-from service.export_schemas import DiagnosisExportOut, Format, RunExportOut
-from service.state import IN_TURN_OF_DOWNLOADS, PlaceDep, Service, ServiceDep
+from wingfit.service.container import IN_TURN_OF_DOWNLOADS, PlaceDep, Service, ServiceDep
+from wingfit.service.diagnoses import exports as diagnosis_exports
+from wingfit.service.http import csv_text
+from wingfit.service.http import responses as http
+from wingfit.service.runs import best_genome, netcdf_variables, run_netcdf
+from wingfit.service.runs import exports as run_exports
+from wingfit.service.runs.export_schemas import DiagnosisExportOut, Format, RunExportOut
 
 router = APIRouter(prefix="/v1", tags=["exports"])
 JSON = "application/json"
@@ -36,7 +40,7 @@ def _described(example: str) -> dict[str, Any]:
         "headers": saved,
         "content": {
             csv_text.MEDIA_TYPE: {"schema": {"type": "string"}, "example": example},
-            netcdf.MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
+            netcdf_variables.MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
         },
     }
 
@@ -59,11 +63,11 @@ async def export_run(
         await place.take(service.downloads)
         return await run_in_threadpool(_run, service, run_id, format)
     exported = await run_in_threadpool(run_exports.of, service, run_id)
-    genome = await run_in_threadpool(genomes.standing, service, exported.row)
+    genome = await run_in_threadpool(best_genome.standing, service, exported.row)
     async with service.exports.turn():
         body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
         await place.take(service.answers)
-    return Response(body, media_type=netcdf.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
+    return Response(body, media_type=netcdf_variables.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
@@ -105,7 +109,7 @@ def export_diagnosis(
     if format == "csv":
         body, media_type, name = diagnosis_exports.table(exported.finding), csv_text.MEDIA_TYPE, "-ranking.csv"
     elif format == "netcdf":
-        body, media_type, name = diagnosis_exports.file(exported), netcdf.MEDIA_TYPE, ".nc"
+        body, media_type, name = diagnosis_exports.file(exported), netcdf_variables.MEDIA_TYPE, ".nc"
     else:
         body, media_type, name = diagnosis_exports.document(exported).model_dump_json(), JSON, ".json"
     return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))

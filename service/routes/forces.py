@@ -7,11 +7,13 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response
 
-from service import force_views, http, sources, store
-from service.force_schemas import ForcesOut, ModelsOut, PredictionIn, PredictionOut, Source
-from service.problems import conflict
-from service.routes.outcomes import check_recording, failed, run_row
-from service.state import IN_TURN, ServiceDep
+from wingfit.service.container import IN_TURN, ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import conflict
+from wingfit.service.outcomes import coefficient_source, force_views
+from wingfit.service.outcomes.force_schemas import ForcesOut, ModelsOut, PredictionIn, PredictionOut, Source
+from wingfit.service.routes.outcomes import check_recording, failed, run_row
+from wingfit.service.storage import store
 
 router = APIRouter(prefix="/v1", tags=["forces"])
 
@@ -45,7 +47,7 @@ def forces(
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
     try:
-        chosen = sources.chosen(service, row, dataset, wanted, source)
+        chosen = coefficient_source.chosen(service, row, dataset, wanted, source)
         found = service.engine.forces(spec, dataset, chosen.genome, wanted, chosen.source)
     except ValueError as error:
         raise failed(error) from None
@@ -63,7 +65,7 @@ def forces(
 def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
     """Return the forces over a beat that the run's global model predicts; nothing is stored."""
     row = run_row(service, run_id)
-    law = sources.law(row, dataset := service.datasets.get(row.dataset_id))
+    law = coefficient_source.law(row, dataset := service.datasets.get(row.dataset_id))
     try:
         found = service.engine.predict(store.spec(row), dataset, law, force_views.condition(body))
     except ValueError as error:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
-from service import http, keys
-from service.access import CALLER, CALLER_OF
-from service.gate import COOKIE
-from service.key_schemas import KeyIn, KeyOut, KeysOut, NewKeyOut, SessionIn, SessionOut
-from service.problems import ProblemError
-from service.state import ServiceDep
+from wingfit.service.auth import keys
+from wingfit.service.auth.access import CALLER, CALLER_OF
+from wingfit.service.auth.authentication import COOKIE
+from wingfit.service.auth.key_schemas import KeyIn, KeyOut, KeysOut, NewKeyOut, SessionIn, SessionOut
+from wingfit.service.container import ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError
 
 router = APIRouter(prefix="/v1", tags=["keys"])
 COOKIE_SECONDS = 30 * 86400

@@ -8,17 +8,19 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response, StreamingResponse
 
-from calibration.search import CalibrationSpec
-from records import Dataset, Recording
-from service import force_views, genomes, http, load_views, spec_views, store, views
-from service.checks import gene_names
-from service.events import LastEventId, described, of_run
-from service.force_schemas import AnyResult, ForceSimulationOut
-from service.load_schemas import LoadsOut, OutputName
-from service.problems import ProblemError, conflict, error_item, invalid
-from service.remedies import with_remedy
-from service.routes.runs import load
-from service.schemas import (
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.records import Dataset, Recording
+from wingfit.service.container import IN_TURN, IN_TURN_OF_DOWNLOADS, Service, ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.events import LastEventId, described, of_run
+from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
+from wingfit.service.outcomes import force_views, load_views
+from wingfit.service.outcomes.force_schemas import AnyResult, ForceSimulationOut
+from wingfit.service.outcomes.load_schemas import LoadsOut, OutputName
+from wingfit.service.routes.runs import load
+from wingfit.service.runs import best_genome, spec_views, views
+from wingfit.service.runs.request_checks import gene_names
+from wingfit.service.runs.schemas import (
     ComparisonOut,
     GenomeOut,
     HistoryItem,
@@ -28,10 +30,11 @@ from service.schemas import (
     SimulationOut,
     WingIn,
 )
-from service.state import IN_TURN, IN_TURN_OF_DOWNLOADS, Service, ServiceDep
-from service.tables import RunRow
-from sim.outputs import Outputs
-from workers.jobs import State
+from wingfit.service.runs.simulation_hints import with_remedy
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import RunRow
+from wingfit.sim.wing.outputs import Outputs
+from wingfit.workers.jobs import State
 
 router = APIRouter(prefix="/v1", tags=["outcomes"])
 
@@ -66,7 +69,7 @@ def history(
 @router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the best genome so far, beside the nominal one."""
-    return http.tagged(genomes.standing(service, run_row(service, run_id)), if_none_match)
+    return http.tagged(best_genome.standing(service, run_row(service, run_id)), if_none_match)
 
 
 @router.get("/runs/{run_id}/result", response_model=AnyResult, responses=http.errors(404, 409), summary="Result")
@@ -224,7 +227,12 @@ def _chosen(
     dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
-    return dataset, spec, wanted, genomes.best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    return (
+        dataset,
+        spec,
+        wanted,
+        best_genome.best(row) if genome == "best" else service.engine.genome(spec, dataset, {}),
+    )
 
 
 def _loads(

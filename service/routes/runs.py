@@ -8,16 +8,18 @@ from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response
 
-from calibration.search import CalibrationSpec
-from records import Dataset
-from service import http, spec_views, store, views
-from service.checks import gene_names, unknown_recordings
-from service.problems import ProblemError, error_item, invalid
-from service.schemas import CheckedOut, Page, RunOut
-from service.spec_schemas import RunIn
-from service.state import Service, ServiceDep
-from service.tables import RunRow
-from workers import jobs
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.records import Dataset
+from wingfit.service.container import Service, ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.runs import spec_views, views
+from wingfit.service.runs.request_checks import gene_names, unknown_recordings
+from wingfit.service.runs.schemas import CheckedOut, Page, RunOut
+from wingfit.service.runs.spec_schemas import RunIn
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import RunRow
+from wingfit.workers import jobs
 
 router = APIRouter(prefix="/v1/runs", tags=["runs"])
 

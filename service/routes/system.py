@@ -9,10 +9,10 @@ from fastapi import APIRouter, Request
 from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.responses import HTMLResponse, PlainTextResponse
 
-from service import http
-from service.problems import ProblemError
-from service.schemas import HealthOut
-from service.state import ServiceDep
+from wingfit.service.container import ServiceDep
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.runs.schemas import HealthOut
 
 router = APIRouter(tags=["service"])
 
@@ -50,7 +50,7 @@ async def metrics(service: ServiceDep) -> PlainTextResponse:
 @router.get("/v1/schemas/dataset", responses=http.errors(), summary="Schema of dataset.yaml")
 def dataset_schema() -> dict[str, Any]:
     """Return the JSON Schema of ``dataset.yaml``."""
-    from records.schema import dataset_schema as schema
+    from wingfit.records.description.schema import dataset_schema as schema
 
     return schema()
 
@@ -58,7 +58,7 @@ def dataset_schema() -> dict[str, Any]:
 @router.get("/v1/schemas/finding", responses=http.errors(), summary="Schema of a finding")
 def finding_schema() -> dict[str, Any]:
     """Return the JSON Schema of what a diagnosis finds."""
-    from report.schema import finding_schema as schema
+    from wingfit.report.schema import finding_schema as schema
 
     return schema()
 

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from records import Gene, Vehicle, Wing
-from records.genes import Scale
-from sim.planform import wing_mass
+from wingfit.records import Gene, Vehicle, Wing
+from wingfit.records.genes import Scale
+from wingfit.sim.wing.planform import wing_mass
 
 if TYPE_CHECKING:
-    from sim.effects.observation import Sampling
-    from sim.effects.vehicle import VehicleScene
-    from sim.effects.wing import WingScene
+    from wingfit.sim.effects.ports.observation import Sampling
+    from wingfit.sim.effects.ports.vehicle import VehicleScene
+    from wingfit.sim.effects.ports.wing import WingScene
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim.effects.contract import Effect, Parameter, Values
-from sim.effects.wing import WingScene
-from sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE, START
-from sim.kernels.jit import inlined
-from sim.kernels.lanewise import cosine_and_sine
-from sim.kernels.laws import AFTER, strip_port
-from sim.kernels.vector import load, load0, load1, store
-from sim.structure import Structure
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE, START
+from wingfit.sim.kernels.jit import inlined
+from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
+from wingfit.sim.kernels.lanes.vector import load, load0, load1, store
+from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Probe:
         return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
     def effects(self) -> tuple[Effect, ...]:
-        """Load and motion as effects, for :class:`sim.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
+        """Load and motion as effects, for :class:`sim.wing.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
         return (self._load(), self._motion()) if self.driving else (self._load(),)
 
     @property

@@ -5,67 +5,69 @@ from __future__ import annotations
 from collections.abc import Iterable
 from importlib import import_module
 
-from records import Vehicle, Wing
-from sim.effects.contract import Effect
+from wingfit.records import Vehicle, Wing
+from wingfit.sim.effects.contract import Effect
 
-# One line each: a file of this folder that declares EFFECT.
-_NAMES: tuple[str, ...] = (
+# One line each: a file of the library that declares EFFECT.
+_PLACES: tuple[str, ...] = (
     # structure: what changes the springs before what takes its measure from them
-    "damage",
-    "cubic_stiffness",
-    "rod_slip",
-    "hysteresis",
-    "viscoelastic",
+    "structure.damage",
+    "structure.cubic_stiffness",
+    "structure.rod_slip",
+    "structure.hysteresis",
+    "structure.viscoelastic",
     # inertia
-    "lumped_mass",
-    "mass_offset",
+    "inertia.lumped_mass",
+    "inertia.mass_offset",
     # actuation
-    "stroke_amplitude",
-    "stroke_bias",
-    "drive_harmonics",
-    "phase_lag_error",
-    "hinge_tilt",
-    "hinge_offset",
-    "compliant_drive",
-    "backlash",
+    "actuation.stroke_amplitude",
+    "actuation.stroke_bias",
+    "actuation.drive_harmonics",
+    "actuation.phase_lag_error",
+    "actuation.hinge_tilt",
+    "actuation.hinge_offset",
+    "actuation.compliant_drive",
+    "actuation.backlash",
     # aerodynamics, in the order in which each sees what the last changed: stream, coefficients of the angle of attack,
     # circulation of all kinds, wake
-    "residual_air",
-    "airspeed_error",
-    "added_mass",
-    "leading_edge_vortex",
-    "viscous_drag",
-    "plate_drag",
-    "dynamic_stall",
-    "rotational_circulation",
-    "circulation_lag",
-    "clap_and_peel",
-    "varying_coefficients",
-    "tip_loss",
-    "induced_inflow",
-    "wake_capture",
+    "aerodynamics.residual_air",
+    "aerodynamics.airspeed_error",
+    "aerodynamics.added_mass",
+    "aerodynamics.leading_edge_vortex",
+    "aerodynamics.viscous_drag",
+    "aerodynamics.plate_drag",
+    "aerodynamics.dynamic_stall",
+    "aerodynamics.rotational_circulation",
+    "aerodynamics.circulation_lag",
+    "aerodynamics.clap_and_peel",
+    "aerodynamics.varying_coefficients",
+    "aerodynamics.tip_loss",
+    "aerodynamics.induced_inflow",
+    "aerodynamics.wake_capture",
     # measurement, on the way of a track: wing, image, tracker, frame
-    "marker_slip",
-    "rolling_shutter",
-    "camera_desync",
-    "lens_distortion",
-    "marker_swap",
-    "tracker_lag",
-    "camera_rotation",
-    "camera_shift",
+    "cameras.marker_slip",
+    "cameras.rolling_shutter",
+    "cameras.camera_desync",
+    "cameras.lens_distortion",
+    "cameras.marker_swap",
+    "cameras.tracker_lag",
+    "cameras.camera_rotation",
+    "cameras.camera_shift",
     # of a force: axes, mount, amplifier
-    "balance_tilt",
-    "balance_resonance",
-    "filter_delay",
-    "balance_offset",
-    "balance_drift",
+    "balance.balance_tilt",
+    "balance.balance_resonance",
+    "balance.filter_delay",
+    "balance.balance_offset",
+    "balance.balance_drift",
     # of both
-    "scale_error",
-    "clock_offset",
-    "strobe_rate",
+    "recording.scale_error",
+    "recording.clock_offset",
+    "recording.strobe_rate",
 )
 
-EFFECTS: dict[str, Effect] = {name: import_module(f"sim.effects.{name}").EFFECT for name in _NAMES}
+EFFECTS: dict[str, Effect] = {
+    place.rpartition(".")[2]: import_module(f"wingfit.sim.effects.library.{place}").EFFECT for place in _PLACES
+}
 
 
 def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:

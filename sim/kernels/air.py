@@ -14,8 +14,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels import LANES
-from sim.kernels.arrays import (
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import (
     ALPHA,
     AREA,
     CHORD_X,
@@ -35,9 +35,9 @@ from sim.kernels.arrays import (
     STREAM_C,
     STREAM_N,
 )
-from sim.kernels.jit import allocating, kernel
-from sim.kernels.lanewise import angle
-from sim.kernels.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
+from wingfit.sim.kernels.jit import allocating, kernel
+from wingfit.sim.kernels.lanes.lanewise import angle
+from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

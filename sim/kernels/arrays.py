@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.memory import aligned, several
+from wingfit.sim.kernels.lanes.memory import aligned, several
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -34,7 +34,7 @@ DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
     PUSH_M, PUSH_L,  # m^3/s^2: moment about the span, nose up, and about the chord, tip up, spread evenly
     LOADS,
 ) = range(9)  # fmt: skip
-# Derivatives that the step needs of each state of an effect (sim.kernels.laws).
+# Derivatives that the step needs of each state of an effect (wingfit.sim.kernels.laws).
 DECAY, DRIVE, PULL = range(3)
 FRAME = 17  # numbers in a law's frame: places, parameters and states per place, then addresses
 # Of the clock of a beat: the drive phase now, that at the start of the step, and the stage's share of a step's change.
@@ -47,7 +47,8 @@ class Wiring(NamedTuple):
     """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
 
     Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
-    (``sim.kernels.tangents``); order to fill are that of ``sim.elimination``. ``geometry`` [S, GEOMETRY].
+    (``wingfit.sim.kernels.tangents``); order to fill are that of ``wingfit.sim.solver.elimination``. ``geometry`` [S,
+    GEOMETRY].
     """
 
     mass: Array
@@ -89,7 +90,7 @@ class Laws(NamedTuple):
     ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, where in
     ``parameters`` [., W] and in the states [Z, W] they start, where in ``axes`` its states' axes start. ``axes``: of
     each state per connector, 0..5 as in stiffness. ``size`` [Z]: a state times this is comparable with metres.
-    ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`sim.kernels.motor`), whose states are the last.
+    ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
     """
 
     strip: Index
@@ -108,7 +109,7 @@ class Lanes(NamedTuple):
     (m). Then what only some wings have, and empty elsewhere: the stiffness [C, 9, W] that couples rotation with
     translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their block in the matrix, whose momentum is
     joined by ``masses`` [P, 36, W], the first ``weighing`` of them of weight, the others of air moved along; and the
-    laws of effects, see :mod:`sim.kernels.laws`.
+    laws of effects, see :mod:`wingfit.sim.kernels.laws`.
     """
 
     stiffness: Array

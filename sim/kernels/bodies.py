@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import allocating, inlined, kernel
-from sim.kernels.matrices import Three, cross
-from sim.kernels.vector import Vector, load, load0, store, store0
+from wingfit.sim.kernels.jit import allocating, inlined, kernel
+from wingfit.sim.kernels.lanes.matrices import Three, cross
+from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 Array = npt.NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.arrays import State
-from sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.arrays import State
+from wingfit.sim.kernels.jit import inlined, kernel
 
 Array = npt.NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import inlined, kernel
-from sim.kernels.matrices import (
+from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Three,
     axial,
@@ -28,7 +28,7 @@ from sim.kernels.matrices import (
     trace_minus,
     transposed,
 )
-from sim.kernels.vector import Vector, load, load0, store, store0
+from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

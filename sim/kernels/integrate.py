@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels import LANES
-from sim.kernels.air import strip_flow, strip_forces
-from sim.kernels.arrays import (
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.air import strip_flow, strip_forces
+from wingfit.sim.kernels.arrays import (
     AIR,
     DAMPERS,
     FRONT_MOTOR,
@@ -29,19 +29,19 @@ from sim.kernels.arrays import (
     Wiring,
     Work,
 )
-from sim.kernels.bodies import inertial, kinetic_and_height, move, track
-from sim.kernels.connectors import connect, relative_pose, tangent, twists
-from sim.kernels.jit import allocating, kernel
-from sim.kernels.lanewise import cosine_and_sine
-from sim.kernels.laws import AFTER, BEFORE, call
-from sim.kernels.linear import factor, solve, subtract_column
-from sim.kernels.masses import add_energies, add_mass_blocks, add_mass_terms, add_momentum
-from sim.kernels.matrices import cross, times
-from sim.kernels.motor import give_way, rods_of
-from sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
-from sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
-from sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
-from sim.kernels.vector import load, load0, load1, load3, store, store1
+from wingfit.sim.kernels.bodies import inertial, kinetic_and_height, move, track
+from wingfit.sim.kernels.connectors import connect, relative_pose, tangent, twists
+from wingfit.sim.kernels.jit import allocating, kernel
+from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
+from wingfit.sim.kernels.lanes.matrices import cross, times
+from wingfit.sim.kernels.lanes.vector import load, load0, load1, load3, store, store1
+from wingfit.sim.kernels.laws import AFTER, BEFORE, call
+from wingfit.sim.kernels.linear import factor, solve, subtract_column
+from wingfit.sim.kernels.masses import add_energies, add_mass_blocks, add_mass_terms, add_momentum
+from wingfit.sim.kernels.motor import give_way, rods_of
+from wingfit.sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
+from wingfit.sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
+from wingfit.sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
 
 Array = npt.NDArray[np.float64]
 
@@ -186,7 +186,7 @@ def note(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trac
 
 @allocating
 def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Assemble and factor the step's matrix S at its start (``sim.kernels.tangents``)."""
+    """Assemble and factor the step's matrix S at its start (``wingfit.sim.kernels.tangents``)."""
     hg = setting.step * GAMMA
     work.Q0[:] = work.Q
     work.d0[:] = work.d

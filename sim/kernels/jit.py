@@ -82,7 +82,7 @@ def _cache_folder(source: Path) -> Path:
     digest = hashlib.sha256()
     alone = source.is_file()
     own = {source, *source.parent.glob("_*.py")} if alone else set(source.glob("*.py"))
-    for file in sorted({*own, *Path(__file__).resolve().parent.glob("*.py")}):
+    for file in sorted({*own, *Path(__file__).resolve().parent.rglob("*.py")}):
         digest.update(file.name.encode() + hashlib.sha256(file.read_bytes()).digest())
     beside = (source.parent if alone else source) / "__pycache__"
     places = (

@@ -2,9 +2,9 @@
 
 A law is a function ``law(frame, moment)`` that is compiled by itself, cached by the content of its own file and of the
 kernels, and only where it is used (:func:`address`). ``strip_port(frame)`` or ``connector_port(frame)`` opens what it
-may read and add to; arrays end in the lanes, to be used with the functions of :mod:`sim.kernels.vector`. Laws of the
-air are called at two moments of every stage: BEFORE the flow of the strips is known, when they may set the induced
-velocity from their states, and AFTER it, when they change the loads and give the rates of their states. Laws of
+may read and add to; arrays end in the lanes, to be used with the functions of :mod:`wingfit.sim.kernels.lanes.vector`.
+Laws of the air are called at two moments of every stage: BEFORE the flow of the strips is known, when they may set the
+induced velocity from their states, and AFTER it, when they change the loads and give the rates of their states. Laws of
 connectors are called once, AFTER.
 """
 
@@ -20,9 +20,9 @@ from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
-from sim.kernels import LANES
-from sim.kernels.arrays import CLOCK, FLOW, GEOMETRY, LOADS
-from sim.kernels.jit import callback, inlined
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import CLOCK, FLOW, GEOMETRY, LOADS
+from wingfit.sim.kernels.jit import callback, inlined
 
 Array = npt.NDArray[np.float64]
 Law = Callable[[Any, int], None]

@@ -4,7 +4,8 @@ The exact linearisation of the wing is not symmetric: dampers turn with the bodi
 whole 6 x 6 blocks, inverted without exchanges: inertia over the step and dissipation make them dominate. ``blocks``
 [NB, 36, W] holds the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as
 many above it, in the same order, and last the columns of the driving rods, which are known and never factored.
-``sim.elimination`` lists, in the bodies' order of elimination, the blocks and which products to subtract.
+``wingfit.sim.solver.elimination`` lists, in the bodies' order of elimination, the blocks and which products to
+subtract.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.jit import kernel
-from sim.kernels.vector import load, load1, store, store1
+from wingfit.sim.kernels.jit import kernel
+from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

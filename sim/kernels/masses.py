@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.connectors import add_wrench
-from sim.kernels.jit import inlined, kernel
-from sim.kernels.matrices import (
+from wingfit.sim.kernels.connectors import add_wrench
+from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Three,
     add_to_block,
@@ -35,7 +35,7 @@ from sim.kernels.matrices import (
     times,
     times_skew,
 )
-from sim.kernels.vector import load, load0, load1, store0
+from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -139,7 +139,7 @@ def add_mass_blocks(
     length: float,
     blocks: Array,
 ) -> None:
-    """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`sim.kernels.tangents`)."""
+    """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
     for k in range(weighing):
         i = pairs[k, 0]
         M, omega, v = _matrix(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)

@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.arrays import DECAY, Work
-from sim.kernels.jit import kernel
-from sim.kernels.vector import load, load1, store, store1
+from wingfit.sim.kernels.arrays import DECAY, Work
+from wingfit.sim.kernels.jit import kernel
+from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
 
 Array = npt.NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.bodies import body_rate
-from sim.kernels.jit import kernel
-from sim.kernels.matrices import cross, load_vector
-from sim.kernels.vector import Vector, load, load1, load3, store
+from wingfit.sim.kernels.bodies import body_rate
+from wingfit.sim.kernels.jit import kernel
+from wingfit.sim.kernels.lanes.matrices import cross, load_vector
+from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
 
 Array = npt.NDArray[np.float64]
 

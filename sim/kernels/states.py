@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
-from sim.kernels.connectors import add_turned, push_apart, twists
-from sim.kernels.jit import allocating, kernel
-from sim.kernels.vector import load, load1, store, store1
+from wingfit.sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
+from wingfit.sim.kernels.connectors import add_turned, push_apart, twists
+from wingfit.sim.kernels.jit import allocating, kernel
+from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
 
 Array = npt.NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
-from sim.kernels.jit import inlined, kernel
-from sim.kernels.matrices import (
+from wingfit.sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
+from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Three,
     add_to_block,
@@ -48,7 +48,7 @@ from sim.kernels.matrices import (
     transposed,
     with_diagonal,
 )
-from sim.kernels.vector import load, load1, store
+from wingfit.sim.kernels.lanes.vector import load, load1, store
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -218,8 +218,8 @@ def add_connectors(
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
     driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.
-    ``more`` as in :func:`sim.kernels.connectors.connect`, ``more_k`` and ``more_d`` [C, 6, W] minus its derivatives by
-    displacement and twist along its own axes, or empty.
+    ``more`` as in :func:`wingfit.sim.kernels.connectors.connect`, ``more_k`` and ``more_d`` [C, 6, W] minus its
+    derivatives by displacement and twist along its own axes, or empty.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]

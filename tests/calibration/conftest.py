@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.problem import base_genome
-from records import Condition, Dataset, Genome, Recording
-from sim.balance import delfly
-from sim.blade_element_wing import BladeElementWing
-from sim.flexible_wing import FlexibleWing
-from sim.rig import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
+from wingfit.calibration.problem import base_genome
+from wingfit.records import Condition, Dataset, Genome, Recording
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.virtual_rigs.balance import delfly
+from wingfit.sim.virtual_rigs.campaign import REFERENCE, Tracking, record, robird_wing, true_genome, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 FORCE_TRUTHS = ({"C_l": 1.22, "C_r": 1.45, "C_F": 1.57}, {"C_l": 1.43, "C_r": 1.39, "C_F": 1.61})
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calibration.problem import Problem, base_genome
-from records import Condition, Gene, Recording
-from sim.model import Array, Observation, genome_batch
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import Condition, Gene, Recording
+from wingfit.sim.model import Array, Observation, genome_batch
 
 TRUTH = {"a": 1.2, "b": 0.8, "c": 1.5}
 FREQUENCY = 12.5

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from deap import cma
 
-from calibration.cma import Distribution, drawn, learnt
-from calibration.genetic import FAILED, Individual
+from wingfit.calibration.cma import Distribution, drawn, learnt
+from wingfit.calibration.genetic import FAILED, Individual
 
 
 def valley(unit: np.ndarray, bottom: float = 0.3) -> np.ndarray:

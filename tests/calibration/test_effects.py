@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from calibration.effects import absent, effect_of, group_of
-from calibration.force_result import ForceResult
-from calibration.likelihood import Step, estimate, iterate
-from calibration.linearised import free_genes, unit_at, values_at
-from calibration.placing import placed
-from calibration.problem import Problem, base_genome
-from calibration.result import summarise
-from calibration.search import CalibrationSpec, calibrate, model_for, plan
-from calibration.uncertainty import uncertainty
-from records import Dataset, Gene, Genome, Recording
-from sim.effects.contract import Effect, Parameter, Values
-from sim.effects.observation import Sampling
-from sim.effects.registry import EFFECTS
-from sim.model import Array, Observation, genome_batch
-from sim.wing_genes import AERODYNAMIC, STRUCTURAL
 from tests.calibration.conftest import FORCE_TRUTHS
 from tests.calibration.linear import blank
 from tests.calibration.test_search import Here
+from wingfit.calibration.effects import absent, effect_of, group_of
+from wingfit.calibration.estimates.likelihood import Step, estimate, iterate
+from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
+from wingfit.calibration.estimates.uncertainty import uncertainty
+from wingfit.calibration.forces.result import ForceResult
+from wingfit.calibration.initial_effect_position import placed
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.result import summarise
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.records import Dataset, Gene, Genome, Recording
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.model import Array, Observation, genome_batch
+from wingfit.sim.wing.genes import AERODYNAMIC, STRUCTURAL
 
 SHIFT = ("camera_shift.x", "camera_shift.y", "camera_shift.z")
 SPEC = CalibrationSpec(division="4", effects=("camera_shift",), population=6, max_generations=2, seed=7)

@@ -7,13 +7,13 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from calibration.estimation import compare_forces, predict, summarise_forces
-from calibration.force_result import ForceResult
-from calibration.plan import plan
-from calibration.search import CalibrationSpec, calibrate
-from records import Dataset, LowPass, Recording
-from sim.balance import DRAG, EXAMPLE, HELD_OUT, TRIALS, Balance, campaign, true_beat
-from workers import make_evaluator
+from wingfit.calibration.forces.estimation import compare_forces, predict, summarise_forces
+from wingfit.calibration.forces.result import ForceResult
+from wingfit.calibration.plan import plan
+from wingfit.calibration.search import CalibrationSpec, calibrate
+from wingfit.records import Dataset, LowPass, Recording
+from wingfit.sim.virtual_rigs.balance import DRAG, EXAMPLE, HELD_OUT, TRIALS, Balance, campaign, true_beat
+from wingfit.workers import make_evaluator
 
 LOCAL = CalibrationSpec(mode="local")
 JOINT = CalibrationSpec(mode="joint")

@@ -5,16 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.cutting import pieces
-from calibration.evaluation import agreements, comparison, lacking, located, quantities, spectrum, whole_beats
-from calibration.likelihood import estimate
-from calibration.problem import Problem, base_genome
-from records import Condition, LowPass, Recording
-from sim.balance import DRAG, TRIALS, Balance, delfly, record, true_beat
-from sim.blade_element_wing import BladeElementWing
-from sim.blades.terms import chosen
-from sim.filtering import low_passed
-from workers import make_evaluator
+from wingfit.calibration.estimates.likelihood import estimate
+from wingfit.calibration.forces.agreement import (
+    agreements,
+    comparison,
+    lacking,
+    located,
+    quantities,
+    spectrum,
+    whole_beats,
+)
+from wingfit.calibration.forces.split_beats import pieces
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import Condition, LowPass, Recording
+from wingfit.sim.filtering import low_passed
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.terms import chosen
+from wingfit.sim.virtual_rigs.balance import DRAG, TRIALS, Balance, delfly, record, true_beat
+from wingfit.workers import make_evaluator
 
 Array = np.typing.NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 
-from calibration.genetic import FAILED, Population, first_generation, offspring, survive
+from wingfit.calibration.genetic import FAILED, Population, first_generation, offspring, survive
 
 
 def valley(unit: np.ndarray) -> np.ndarray:

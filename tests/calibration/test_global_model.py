@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.force_result import LocalEstimate
-from calibration.global_model import at, average, fit_global
-from records import Condition
-from sim.balance import TRIALS
+from wingfit.calibration.forces.global_model import at, average, fit_global
+from wingfit.calibration.forces.result import LocalEstimate
+from wingfit.records import Condition
+from wingfit.sim.virtual_rigs.balance import TRIALS
 
 CONDITIONS = [trial.condition for trial in TRIALS]
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from calibration.likelihood import Step, estimate, iterate
-from calibration.linearised import SHORTER, STEP
-from calibration.problem import Problem, base_genome, compared, misfit
-from calibration.uncertainty import uncertainty
-from records import Dataset, Genome, Recording
-from sim.flexible_wing import FlexibleWing
-from sim.model import Array, Observation
 from tests.calibration.linear import TRUTH, Linear, problem, recorded
 from tests.workers import pendulum
-from workers.in_process import InProcessEvaluator
+from wingfit.calibration.estimates.likelihood import Step, estimate, iterate
+from wingfit.calibration.estimates.linearised import SHORTER, STEP
+from wingfit.calibration.estimates.uncertainty import uncertainty
+from wingfit.calibration.problem import Problem, base_genome, compared, misfit
+from wingfit.records import Dataset, Genome, Recording
+from wingfit.sim.model import Array, Observation
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.workers.in_process import InProcessEvaluator
 
 HERE = InProcessEvaluator()
 MIX = np.array([[0.03, 0.012], [0.0, 0.006]])  # noise of two axes that differ and go together

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from calibration.evaluator import Unit, run_unit
-from calibration.problem import Misfit, Problem, base_genome
-from calibration.search import CalibrationSpec, model_for, plan
-from records import Dataset, Genome
+from wingfit.calibration.evaluator import Unit, run_unit
+from wingfit.calibration.problem import Misfit, Problem, base_genome
+from wingfit.calibration.search import CalibrationSpec, model_for, plan
+from wingfit.records import Dataset, Genome
 
 
 def row(part: Misfit, k: int) -> tuple[bytes, bytes, bytes]:

@@ -10,18 +10,18 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import lfilter
 
-from calibration.evaluator import as_batch, gather, run_unit, units
-from calibration.linearised import linearise, unit_at
-from calibration.noise import noise_distance
-from calibration.problem import Evaluation, Problem, base_genome, misfit
-from calibration.result import compare, judge
-from calibration.search import CalibrationSpec, calibrate, found, plan, resolved
-from calibration.spec import wing_model
-from calibration.uncertainty import standing
-from records import Condition, Dataset, Gene, Genome, Recording
-from sim.flexible_wing import FlexibleWing
-from sim.rig import Tracking, _noise
-from sim.wing_genes import AERODYNAMIC, STRUCTURAL
+from wingfit.calibration.estimates.linearised import linearise, unit_at
+from wingfit.calibration.estimates.noise import noise_distance
+from wingfit.calibration.estimates.uncertainty import standing
+from wingfit.calibration.evaluator import as_batch, gather, run_unit, units
+from wingfit.calibration.problem import Evaluation, Problem, base_genome, misfit
+from wingfit.calibration.result import compare, judge
+from wingfit.calibration.search import CalibrationSpec, calibrate, found, plan, resolved
+from wingfit.calibration.spec import wing_model
+from wingfit.records import Condition, Dataset, Gene, Genome, Recording
+from wingfit.sim.virtual_rigs.campaign import Tracking, _noise
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.genes import AERODYNAMIC, STRUCTURAL
 
 SPEC = CalibrationSpec(division="4", population=16, max_generations=4, seed=7)
 THREE = ("E_r", "G_f", "L_a")
@@ -374,7 +374,7 @@ def test_a_poor_fit_tells_no_gene_and_says_why(small: tuple[Dataset, Genome]) ->
 
 
 def test_a_gene_at_its_bound_is_not_told(small: tuple[Dataset, Genome]) -> None:
-    from calibration.result import _at_bound
+    from wingfit.calibration.result import _at_bound
 
     dataset, _ = small
     nominal = base_genome(wing_model(dataset, SPEC))

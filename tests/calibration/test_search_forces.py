@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration.plan import prepared
-from calibration.search import CalibrationSpec, calibrate, plan
-from records import Dataset, LowPass
 from tests.calibration.conftest import FORCE_TRUTHS
 from tests.calibration.test_search import Here, refused
+from wingfit.calibration.plan import prepared
+from wingfit.calibration.search import CalibrationSpec, calibrate, plan
+from wingfit.records import Dataset, LowPass
 
 
 def test_each_recording_of_forces_is_a_stage_of_its_own(forces: Dataset) -> None:

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter, sosfiltfilt
 
-from calibration.coloured import Block, grid, last_lag, score_covariances
-from calibration.likelihood import estimate, iterate
-from calibration.problem import Problem, base_genome
-from calibration.remarks import remarks
-from calibration.uncertainty import uncertainty
-from records import Gene, Recording
-from sim.model import Array
 from tests.calibration.linear import TRUTH, Linear, problem, recorded
 from tests.workers import pendulum
-from workers.in_process import InProcessEvaluator
+from wingfit.calibration.estimates.coloured import Block, grid, last_lag, score_covariances
+from wingfit.calibration.estimates.likelihood import estimate, iterate
+from wingfit.calibration.estimates.remarks import remarks
+from wingfit.calibration.estimates.uncertainty import uncertainty
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import Gene, Recording
+from wingfit.sim.model import Array
+from wingfit.workers.in_process import InProcessEvaluator
 
 HERE = InProcessEvaluator()
 NINETY = 1.645

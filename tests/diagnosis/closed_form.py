@@ -11,10 +11,10 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from calibration.problem import Problem
-from diagnosis import fit
-from diagnosis.fit import Fit
-from records import Gene, Genome
+from wingfit.calibration.problem import Problem
+from wingfit.diagnosis.evidence import fit
+from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.records import Gene, Genome
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -78,15 +78,15 @@ class ClosedForm:
         return [len(batch) for batch in self.batches]
 
     def fitted(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
-        """See :func:`diagnosis.fit.fitted`."""
+        """See :func:`wingfit.diagnosis.evidence.fit.fitted`."""
         return fit.fitted(self.rig, self.rig, self.problem, NO_EVALUATOR, start, jacobian, known=known)
 
     def thoroughly(self, start: Array, steps: int) -> list[Fit]:
-        """See :func:`diagnosis.fit.thoroughly`."""
+        """See :func:`wingfit.diagnosis.evidence.fit.thoroughly`."""
         return list(fit.thoroughly(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
 
     def measured(self, fitted: Fit) -> Fit:
-        """See :func:`diagnosis.fit.measured`."""
+        """See :func:`wingfit.diagnosis.evidence.fit.measured`."""
         return fit.measured(self.rig, self.rig, NO_EVALUATOR, fitted)
 
     @property

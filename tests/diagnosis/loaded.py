@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.missing import Case, decorrelated
-from records import Condition, Recording
-from sim.effects.probe import Probe
-from sim.flexible_wing import FlexibleWing
-from sim.loads import crossing
-from sim.numerics import Numerics
-from sim.probing import Probed, probed
-from sim.rig import blank_recording, robird_wing, tunnel, vacuum
+from wingfit.diagnosis.location.missing_load import Case, decorrelated
+from wingfit.records import Condition, Recording
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.loads import crossing
+from wingfit.sim.wing.probing import Probed, probed
 
 Array = npt.NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from diagnosis.subject import Family, Place, Suspect
-from records import Condition, Gene, Recording
-from sim.effects.probe import Probe
-from sim.model import Array, Model, Observation, genome_batch
+from wingfit.diagnosis.subject import Family, Place, Suspect
+from wingfit.records import Condition, Gene, Recording
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.model import Array, Model, Observation, genome_batch
 
 REACH = 0.25  # m, from the axis to the end of the arm
 MARKERS = {"inner": 0.10, "middle": 0.17, "outer": 0.24}  # m from the axis

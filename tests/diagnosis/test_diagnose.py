@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis import DiagnosisSpec, Finding, diagnose_subject
-from records import Recording
-from report import finding_from_json, finding_json, html
 from tests.diagnosis.pendulum_rig import FREQUENCIES, Pendulum, PendulumRig, at, blank, recorded
-from workers.in_process import InProcessEvaluator
+from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
+from wingfit.records import Recording
+from wingfit.report import finding_from_json, finding_json, html
+from wingfit.workers.in_process import InProcessEvaluator
 
 HELD_OUT = (1.45, 2.3, 3.0)  # Hz
 NOMINAL = {"stiffness": 0.25, "damping": 3e-3, "inertia": 1.2e-3}  # not the estimates

@@ -10,18 +10,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from calibration.spec import CalibrationSpec
-from diagnosis import DiagnosisSpec, check
-from diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
-from diagnosis.subject import Subject
-from records import Dataset, LowPass, Wing
-from sim.balance import TRIALS, delfly
-from sim.balance import blank_recording as blank_forces
-from sim.effects.markers import nearest
-from sim.filtering import default_cutoff
-from sim.flexible_wing import FlexibleWing
-from sim.model import Array
-from sim.rig import SMALL, blank_recording, name_of, robird_wing
 from tests.diagnosis.pendulum_rig import (
     FREQUENCIES,
     GENES,
@@ -36,6 +24,18 @@ from tests.diagnosis.pendulum_rig import (
     blank,
     recorded,
 )
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis import DiagnosisSpec, check
+from wingfit.diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
+from wingfit.diagnosis.subject import Subject
+from wingfit.records import Dataset, LowPass, Wing
+from wingfit.sim.effects.ports.markers import nearest
+from wingfit.sim.filtering import default_cutoff
+from wingfit.sim.model import Array
+from wingfit.sim.virtual_rigs.balance import TRIALS, delfly
+from wingfit.sim.virtual_rigs.balance import blank_recording as blank_forces
+from wingfit.sim.virtual_rigs.campaign import SMALL, blank_recording, name_of, robird_wing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 FEW = CalibrationSpec(division="4")
 NOMINAL = {gene.name: gene.nominal for gene in GENES}

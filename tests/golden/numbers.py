@@ -19,9 +19,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from calibration.search import CalibrationSpec, calibrate, model_for
-from records import Dataset, load_dataset
-from workers.in_process import InProcessEvaluator
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for
+from wingfit.records import Dataset, load_dataset
+from wingfit.workers.in_process import InProcessEvaluator
 
 Array = npt.NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
-from records import Dataset
+from wingfit.records import Dataset
 
 
 def fingerprint(value: object) -> object:

@@ -11,9 +11,9 @@ from types import MappingProxyType
 
 import pytest
 
-from records import DatasetError, load_archive, load_dataset
-from records.folder import contents
 from tests.records.samples import falcon_dataset
+from wingfit.records import DatasetError, load_archive, load_dataset
+from wingfit.records.files.folder import contents
 
 TRACKS = "recordings/vacuum-2hz.csv"
 YAML = "dataset.yaml"

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from records import (
+from wingfit.records import (
     Condition,
     Dataset,
     FourBarDrive,
@@ -21,7 +21,7 @@ from records import (
     Station,
     Wing,
 )
-from records.dataset import Rig
+from wingfit.records.dataset import Rig
 
 ROWS = ((0.06, 3), (0.20, 3), (0.33, 3), (0.46, 3))
 FOUR_BAR = FourBarDrive(ground=0.06, crank=0.012, coupler=0.055, rocker=0.03, offset=math.radians(-90.0))

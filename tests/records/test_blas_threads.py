@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
-from records import blas_threads
-from records.blas_threads import one_blas_thread
+from wingfit.records import blas_threads
+from wingfit.records.blas_threads import one_blas_thread
 
 
 @pytest.fixture(autouse=True)
@@ -180,7 +180,7 @@ def test_looks_for_libraries_only_after_an_import(monkeypatch: pytest.MonkeyPatc
 LATER = """
 import numpy
 from threadpoolctl import ThreadpoolController
-from records.blas_threads import one_blas_thread
+from wingfit.records.blas_threads import one_blas_thread
 def threads():
     return [library["num_threads"] for library in ThreadpoolController().select(user_api="blas").info()]
 with one_blas_thread:
@@ -197,7 +197,7 @@ assert 3 in threads(), threads()  # of the second, as it was found
 
 FORK = """
 import os, threading
-from records.blas_threads import one_blas_thread
+from wingfit.records.blas_threads import one_blas_thread
 stop = threading.Event()
 def work():
     while not stop.is_set():

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from records import Gene
+from wingfit.records import Gene
 
 
 @pytest.mark.parametrize(

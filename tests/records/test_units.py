@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from records.units import CELSIUS, DEG, MBAR, SI, Unit, from_si, number_text, to_si
-from records.yaml_text import read_yaml, write_yaml
+from wingfit.records.description.yaml_text import read_yaml, write_yaml
+from wingfit.records.units import CELSIUS, DEG, MBAR, SI, Unit, from_si, number_text, to_si
 
 UNITS = {"si": SI, "deg": DEG, "mbar": MBAR, "celsius": CELSIUS}
 finite = st.floats(allow_nan=False, allow_infinity=False)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from records import (
+from wingfit.records import (
     ChordStation,
     Condition,
     Dataset,
@@ -24,8 +24,8 @@ from records import (
     Vehicle,
     WingMotion,
 )
-from records.dataset import ForceAxis
-from records.folder import contents
+from wingfit.records.dataset import ForceAxis
+from wingfit.records.files.folder import contents
 
 FORCES = "recordings/hover.csv"
 YAML = "dataset.yaml"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from diagnosis.finding import (
+from wingfit.diagnosis.finding import (
     Advice,
     Exponent,
     Finding,

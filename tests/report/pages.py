@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
-from diagnosis.finding import Finding
-from report import html
+from wingfit.diagnosis.finding import Finding
+from wingfit.report import html
 
 VOID = frozenset({"meta", "br"})
 LOADS = frozenset({"src", "href", "srcset", "data", "action", "poster", "xlink:href"})

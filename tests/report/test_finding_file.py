@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.finding import VERDICTS, Finding, Interval
-from report import finding_from_json, finding_json
-from report.schema import finding_schema, schema_text
 from tests.report.findings import bare, force_finding, wing_finding, with_verdict
+from wingfit.diagnosis.finding import VERDICTS, Finding, Interval
+from wingfit.report import finding_from_json, finding_json
+from wingfit.report.schema import finding_schema, schema_text
 
 jsonschema: Any = import_module("jsonschema")
 PUBLISHED = Path(__file__).parents[2] / "docs" / "schemas" / "finding.schema.json"
@@ -42,7 +42,7 @@ def test_awkward_numbers_keep_every_bit() -> None:
 
 def test_the_published_schema_is_the_code_s() -> None:
     assert PUBLISHED.read_text(encoding="utf-8") == schema_text(), (
-        "run: python -m report.schema > docs/schemas/finding.schema.json"
+        "run: python -m wingfit.report.schema > docs/schemas/finding.schema.json"
     )
 
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from diagnosis.finding import VERDICTS, Finding, Interval, MarkerMisfit, Verdict
-from report import html
 from tests.report.findings import around, bare, force_finding, load, recording, times, wing_finding, with_verdict
 from tests.report.pages import LOADS, page
+from wingfit.diagnosis.finding import VERDICTS, Finding, Interval, MarkerMisfit, Verdict
+from wingfit.report import html
 
 HOSTILE = "</style></title><script>alert(1)</script><img src=x onerror=alert(1)>\"' & \x00\ud800"
 

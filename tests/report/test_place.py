@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosis.finding import Exponent, Interval
-from report.place import _scaling
+from wingfit.diagnosis.finding import Exponent, Interval
+from wingfit.report.location import _scaling
 
 
 def power(variable: str, low: float, high: float) -> Exponent:

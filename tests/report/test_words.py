@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from diagnosis.finding import Interval
-from report.markup import Markup, tag
-from report.place import _pieces, place
-from report.ranking import ranking
-from report.svg import Axis, axis, level, side
-from report.words import Scale, best_of, bounds, listed, number, percent, scale_for, shortened
 from tests.report.findings import BOTH, wing_finding
+from wingfit.diagnosis.finding import Interval
+from wingfit.report.location import _pieces, place
+from wingfit.report.markup import Markup, tag
+from wingfit.report.number_format import Scale, best_of, bounds, listed, number, percent, scale_for, shortened
+from wingfit.report.ranking import ranking
+from wingfit.report.svg import Axis, axis, level, side
 
 
 @pytest.mark.parametrize(

@@ -14,14 +14,14 @@ import pytest
 import uvicorn
 from fastapi import FastAPI
 
-from service import keys
-from service.app import create_app
-from service.database import Database
-from service.protocol import Protocol
-from service.settings import Settings
-from service.state import Service
 from tests.service import toy, toy_diagnosis
-from tests.service.browsing import chromium
+from tests.service.pages.browsing import chromium
+from wingfit.service.app import create_app
+from wingfit.service.auth import keys
+from wingfit.service.container import Service
+from wingfit.service.http.header_limits import Protocol
+from wingfit.service.settings import Settings
+from wingfit.service.storage.database import Database
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from service.cli import app as commands
-from service.server import ServeError, serve
-from service.settings import Settings, SettingsError
-from workers.jobs import MOST_STARTS
+from wingfit.cli.main import app as commands
+from wingfit.service.server import ServeError, serve
+from wingfit.service.settings import Settings, SettingsError
+from wingfit.workers.jobs import MOST_STARTS
 
 ROOT = Path(__file__).parents[2]
 SPELLINGS = [("1 true yes y on TRUE Yes Y oN", True), ("0 false no n off FALSE No N oFF", False)]
@@ -58,7 +58,7 @@ def test_a_variable_that_nothing_reads_is_refused_with_the_nearest_name() -> Non
 def test_every_variable_of_the_project_is_known() -> None:
     """Whatever the sources name may be in the environment of a server."""
     files = [path for path in ROOT.iterdir() if path.suffix in (".yml", ".md") or path.name == "Dockerfile"]
-    for folder in ("service", "workers", "benchmarks", "docs"):
+    for folder in ("service", "workers", "cli", "client", "benchmarks", "docs"):
         files += [path for path in (ROOT / folder).rglob("*") if path.suffix in (".py", ".md")]
     files += [path for path in (ROOT / "deploy").rglob("*") if path.is_file()]
     text = "\n".join(path.read_text() for path in files)
@@ -90,7 +90,7 @@ def test_what_kubernetes_sets_for_a_service_is_no_mistake() -> None:
 
 def test_a_server_refuses_and_a_client_does_not(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     started = subprocess.run(
-        [sys.executable, "-m", "service.server"],
+        [sys.executable, "-m", "wingfit.service.server"],
         env=os.environ | {"WINGFIT_REQUIRE_KEY": "1", "WINGFIT_DATA": str(tmp_path / "data")},
         cwd=ROOT,
         capture_output=True,

@@ -18,16 +18,16 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from calibration.estimation import Prediction
-from calibration.evaluator import Evaluator
-from calibration.force_result import Agreement, ForceComparison, GlobalModel, Source
-from calibration.problem import Evaluation, Problem
-from calibration.result import Comparison, GeneResult, RecordingResult, Result
-from calibration.search import CalibrationSpec, Generation, resolved
-from records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
-from sim.model import Solution
-from sim.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
-from workers.watch import Standing, never
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.estimation import Prediction
+from wingfit.calibration.forces.result import Agreement, ForceComparison, GlobalModel, Source
+from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.calibration.result import Comparison, GeneResult, RecordingResult, Result
+from wingfit.calibration.search import CalibrationSpec, Generation, resolved
+from wingfit.records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
+from wingfit.sim.model import Solution
+from wingfit.sim.wing.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
+from wingfit.workers.watch import Standing, never
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
 NOMINAL = {"stiffness": 1.0, "damping": 0.1}
@@ -70,7 +70,7 @@ class Fault:
 
 
 class ArchiveError(ValueError):
-    """Looks like records.DatasetError."""
+    """Looks like wingfit.records.DatasetError."""
 
     def __init__(self, *errors: Fault) -> None:
         super().__init__("; ".join(error.message for error in errors))

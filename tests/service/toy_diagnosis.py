@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from calibration.evaluator import Evaluator
-from diagnosis.finding import (
+from tests.service.toy import UNLUCKY
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.diagnosis.finding import (
     Advice,
     Exponent,
     Finding,
@@ -31,9 +32,8 @@ from diagnosis.finding import (
     RecordingMisfit,
     Where,
 )
-from diagnosis.spec import DiagnosisSpec, Progress
-from records import Dataset
-from tests.service.toy import UNLUCKY
+from wingfit.diagnosis.spec import DiagnosisSpec, Progress
+from wingfit.records import Dataset
 
 KNOWN = ("hinge_offset", "camera_shift", "added_mass")
 STAGES = (

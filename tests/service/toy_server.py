@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 
-from service.server import ServeError, serve
-from service.settings import Settings, SettingsError
 from tests.service.toy import NoEvaluator, ToyEngine
 from tests.service.toy_diagnosis import ToyDiagnoser
+from wingfit.service.server import ServeError, serve
+from wingfit.service.settings import Settings, SettingsError
 
 if __name__ == "__main__":
     try:

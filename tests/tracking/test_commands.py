@@ -11,16 +11,16 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from records import FourierFlap, PassivePitch, WingMotion
-from records.convert_vehicle import to_vehicle
-from records.forces import read_forces
-from records.vehicle_file import VehicleFile
-from records.yaml_text import read_yaml
-from service.client import WingfitError
-from service.commands.freeflight import forces
-from service.commands.kinematics import kinematics
 from tests.tracking.signals import noise, passive_pitch, split_cycle, wing_markers
 from tests.tracking.test_free_flight import CENTRE, MARKERS, pitched, seen_from, times
+from wingfit.cli.forces.free_flight import forces
+from wingfit.cli.forces.kinematics import kinematics
+from wingfit.client.client import WingfitError
+from wingfit.records import FourierFlap, PassivePitch, WingMotion
+from wingfit.records.description.convert_vehicle import to_vehicle
+from wingfit.records.description.vehicle_file import VehicleFile
+from wingfit.records.description.yaml_text import read_yaml
+from wingfit.records.files.forces import read_forces
 
 FREQUENCY = 12.5
 NAMES = ("nose", "trailing", "left", "right", "fin", "belly")

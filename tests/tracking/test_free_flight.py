@@ -10,12 +10,12 @@ import pytest
 from scipy import signal
 from scipy.spatial.transform import Rotation
 
-from records import LowPass
-from records.vehicle_file import VehicleRecordingFile
 from tests.tracking.signals import noise
-from tracking.free_flight import Body, FreeFlight, free_flight, recording
-from tracking.rigid_body import poses
-from tracking.zero_phase import kernels
+from wingfit.records import LowPass
+from wingfit.records.description.vehicle_file import VehicleRecordingFile
+from wingfit.tracking.free_flight import Body, FreeFlight, free_flight, recording
+from wingfit.tracking.rigid_body import poses
+from wingfit.tracking.zero_phase import kernels
 
 Array = npt.NDArray[np.float64]
 GRAVITY = 9.80665

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tracking.signals import noise, split_cycle
-from tracking.smoothing import PeriodicFit, basis, fit_periodic
+from wingfit.tracking.smoothing import PeriodicFit, basis, fit_periodic
 
 FREQUENCY = 12.5
 PHASES = np.arange(720) / 720

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from records import FourierPitch, PassivePitch
 from tests.tracking.signals import noise, passive_pitch, split_cycle, wing_markers
-from tracking.smoothing import fit_periodic
-from tracking.wing_kinematics import (
+from wingfit.records import FourierPitch, PassivePitch
+from wingfit.tracking.smoothing import fit_periodic
+from wingfit.tracking.wing_kinematics import (
     Angles,
     WingPlace,
     beats_of,

@@ -18,15 +18,15 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import ThreadpoolController, threadpool_limits
 
-from calibration.evaluator import Evaluator
-from calibration.problem import Evaluation, Problem, base_genome
-from calibration.result import judge
-from calibration.search import CalibrationSpec, calibrate, model_for, plan
-from diagnosis import DiagnosisSpec, diagnose_subject
-from records import Dataset, load_dataset
-from records.blas_threads import OneBlasThread
 from tests.diagnosis.pendulum_rig import PendulumRig, recorded
-from workers.in_process import InProcessEvaluator
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Evaluation, Problem, base_genome
+from wingfit.calibration.result import judge
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.diagnosis import DiagnosisSpec, diagnose_subject
+from wingfit.records import Dataset, load_dataset
+from wingfit.records.blas_threads import OneBlasThread
+from wingfit.workers.in_process import InProcessEvaluator
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "robird"
 SMALL = CalibrationSpec(division="4", mode="joint", genes=("E_f", "E_r", "D_E"), seed=3)

@@ -11,9 +11,9 @@ import json
 import sys
 from pathlib import Path
 
-from calibration.problem import Evaluation
 from tests.workers import pendulum
-from workers import make_evaluator
+from wingfit.calibration.problem import Evaluation
+from wingfit.workers import make_evaluator
 
 ANSWER = "answer: "
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from calibration.problem import Problem, base_genome
-from records import Condition, Gene, Recording
-from sim.model import Array, Observation, genome_batch
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.records import Condition, Gene, Recording
+from wingfit.sim.model import Array, Observation, genome_batch
 
 GENES = (
     Gene("length", "m", 0.25, 0.05, 1.0, "log", "distance from the pivot to the marker"),

@@ -10,10 +10,10 @@ import sys
 import time
 from pathlib import Path
 
+from benchmarks.common.ray_nodes import REPOSITORY, environment, free_port
+from benchmarks.common.server_process import Server
 from benchmarks.durability.works import EXAMPLES
-from benchmarks.ray_nodes import REPOSITORY, environment, free_port
-from benchmarks.server_process import Server
-from service.client import Client
+from wingfit.client.client import Client
 
 FOLDER = Path("/tmp/run")  # noqa: S108  a file system of its own
 SPEC = {

@@ -13,23 +13,26 @@ from typing import NamedTuple
 
 import pytest
 
-import diagnosis
-from calibration import estimation, evaluation, evaluator, global_model, likelihood, noise, result, search, uncertainty
-from records import blas_threads
-from service import load_views
-from sim import alignment, balance, loads, planform, rig
-from sim.blade_element_wing import BladeElementWing
-from sim.flexible_wing import FlexibleWing
-from tracking import free_flight, rigid_body, smoothing, wing_kinematics
+from wingfit import diagnosis
+from wingfit.calibration import evaluator, result, search
+from wingfit.calibration.estimates import likelihood, noise, uncertainty
+from wingfit.calibration.forces import agreement, estimation, global_model
+from wingfit.records import blas_threads
+from wingfit.service.outcomes import load_views
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.virtual_rigs import balance, campaign
+from wingfit.sim.wing import alignment, loads, planform
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.tracking import free_flight, rigid_body, smoothing, wing_kinematics
 
 REPOSITORY = Path(__file__).parents[2]
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 GUARDED: tuple[Callable[..., object], ...] = (
-    alignment.recorded_crossing, balance.record, loads.simulate_outputs, planform.bodies, rig.record,
+    alignment.recorded_crossing, balance.record, loads.simulate_outputs, planform.bodies, campaign.record,
     BladeElementWing.beat, BladeElementWing.observe, FlexibleWing.beats, FlexibleWing.observe,
     estimation.summarise_forces, estimation.compare_forces, estimation.predict,
-    evaluation.agreements, evaluation.comparison, evaluation.located, evaluation.lacking,
+    agreement.agreements, agreement.comparison, agreement.located, agreement.lacking,
     evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
     noise.noise_distance, result.summarise, result.judge, result.compare, search.calibrate,
     uncertainty.standing, uncertainty.uncertainty,

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.ray_nodes import REPOSITORY
-from workers.node_alive import TIMEOUT_SECONDS
+from benchmarks.common.ray_nodes import REPOSITORY
+from wingfit.workers.node_alive import TIMEOUT_SECONDS
 
 # Head, object manager and node manager (by convention), client, dashboard, its agents, and the range of workers.
 RAY_PORTS = {6379, 8076, 8077, 8265, 10001, 52365, *range(10002, 20000)}
@@ -60,7 +60,7 @@ def test_no_ray_node_is_on_the_published_network(compose: dict[str, Any], servic
 
 
 def test_the_front_passes_on_to_the_port_of_the_api_alone(services: dict[str, dict[str, Any]]) -> None:
-    assert services["front"]["command"] == ["python", "-m", "service.forward", "api:8321"]
+    assert services["front"]["command"] == ["python", "-m", "wingfit.service.operations.forward", "api:8321"]
     assert "WINGFIT_PORT=8321" in (REPOSITORY / "Dockerfile").read_text()
     assert services["front"]["depends_on"] == {"api": {"condition": "service_healthy"}}
 
@@ -178,7 +178,7 @@ def test_every_long_lived_container_has_a_health_check(services: dict[str, dict[
         assert "healthcheck" not in services[name], f"{name} has the image's, which asks port 8321"
     assert "('ray-head', 6379)" in services["ray-head"]["healthcheck"]["test"][-1]
     worker = services["ray-worker"]["healthcheck"]
-    assert worker["test"] == ["CMD", "python", "-m", "workers.node_alive", "ray-head:6379"]
+    assert worker["test"] == ["CMD", "python", "-m", "wingfit.workers.node_alive", "ray-head:6379"]
     assert int(worker["interval"].removesuffix("s")) >= 30, "each takes half a second of processor time"
     assert int(worker["timeout"].removesuffix("s")) > 2 * TIMEOUT_SECONDS
     assert services["ray-token"]["healthcheck"] == {"disable": True}

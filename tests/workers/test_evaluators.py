@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.evaluator import gather, run_unit, units
-from calibration.problem import Evaluation, Problem
 from tests.workers import pendulum
-from workers import (
+from wingfit.calibration.evaluator import gather, run_unit, units
+from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.workers import (
     EvaluationInterruptedError,
     EvaluatorClosedError,
     EvaluatorKind,
@@ -29,8 +29,8 @@ from workers import (
     WorkerLostError,
     make_evaluator,
 )
-from workers.ray_batches import UNDER_WAY, UNKNOWN_TASKS
-from workers.watch import ATTEMPTS
+from wingfit.workers.ray_batches import UNDER_WAY, UNKNOWN_TASKS
+from wingfit.workers.watch import ATTEMPTS
 
 KINDS: tuple[EvaluatorKind, ...] = ("in_process", "processes", "ray")
 DISTRIBUTED: tuple[EvaluatorKind, ...] = ("processes", "ray")
@@ -232,7 +232,7 @@ def test_closing_ends_a_call_under_way(kind: EvaluatorKind, tmp_path: Path) -> N
 import threading, time
 from pathlib import Path
 from tests.workers import pendulum
-from workers import EvaluatorClosedError, make_evaluator
+from wingfit.workers import EvaluatorClosedError, make_evaluator
 
 population = pendulum.population(400)
 
@@ -275,7 +275,7 @@ def environment() -> dict[str, str]:
 
 
 def test_only_ray_costs_the_import_of_ray() -> None:
-    code = "import sys, workers.processes as p; p.ProcessPoolEvaluator(1).close(); print('ray' in sys.modules)"
+    code = "import sys, wingfit.workers.processes as p; p.ProcessPoolEvaluator(1).close(); print('ray' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True)
     assert done.stdout.strip() == "False"
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from workers.jobs import (
+from wingfit.workers.jobs import (
     ETA_LONGEST,
     MOST_STARTS,
     Cancel,

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.ray_nodes import REPOSITORY
-from service import guard
-from service.settings import Settings
+from benchmarks.common.ray_nodes import REPOSITORY
 from tests.workers.test_deployment import pins
+from wingfit.service.http import request_limits
+from wingfit.service.settings import Settings
 
 FOLDER = REPOSITORY / "deploy" / "kubernetes"
 FILES = sorted(path.name for path in FOLDER.glob("*.yaml") if path.name != "kustomization.yaml")
@@ -151,7 +151,7 @@ def test_the_servers_probes_are_answered_by_any_name() -> None:
     api = container("api")
     paths = {kind: api[f"{kind}Probe"]["httpGet"]["path"] for kind in ("startup", "liveness", "readiness")}
     assert paths == {"startup": "/v1/health", "liveness": "/v1/health", "readiness": "/v1/ready"}
-    assert set(paths.values()) <= guard.PROBES
+    assert set(paths.values()) <= request_limits.PROBES
     for kind in paths:
         assert api[f"{kind}Probe"]["httpGet"]["port"] == api["ports"][0]["name"]
     patience = api["startupProbe"]["periodSeconds"] * api["startupProbe"]["failureThreshold"]
@@ -165,7 +165,7 @@ def test_rays_probes_are_ours() -> None:
     for name in ("head", "workers"):
         inner = container(name)
         assert {"livenessProbe", "readinessProbe"} <= set(inner)
-        assert "workers.node_alive" in " ".join(inner["livenessProbe"]["exec"]["command"])
+        assert "wingfit.workers.node_alive" in " ".join(inner["livenessProbe"]["exec"]["command"])
         assert inner["livenessProbe"]["periodSeconds"] >= 30, "each takes half a second of processor time"
     assert container("workers")["livenessProbe"]["exec"]["command"][-1] == head
     assert container("workers")["readinessProbe"]["tcpSocket"]["port"] == int(

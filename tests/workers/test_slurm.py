@@ -18,9 +18,9 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
+from benchmarks.common.ray_nodes import IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
 from benchmarks.durability.works import EXAMPLES
-from benchmarks.ray_nodes import IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
-from service.client import Client, ServerAwayError
+from wingfit.client.client import Client, ServerAwayError
 
 SCRIPT = REPOSITORY / "deploy" / "slurm" / "wingfit.sbatch"
 SECONDS = 120.0

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 from ray.util import get_node_ip_address
 
-from benchmarks.ray_nodes import REPOSITORY, Node, environment, free_port
+from benchmarks.common.ray_nodes import REPOSITORY, Node, environment, free_port
 from tests.workers import pendulum
 from tests.workers.driver import ANSWER, digest
-from workers import make_evaluator
+from wingfit.workers import make_evaluator
 
 START_SECONDS = 90.0
 WORK_SECONDS = 120.0
@@ -107,7 +107,7 @@ def nodes_seen(folder: Path) -> set[int]:
 
 def node_alive(cluster: Cluster, *options: str, token: Path | None = None, head: str = "") -> tuple[int, str]:
     done = subprocess.run(
-        [sys.executable, "-m", "workers.node_alive", head or cluster.address, *options], cwd=REPOSITORY,
+        [sys.executable, "-m", "wingfit.workers.node_alive", head or cluster.address, *options], cwd=REPOSITORY,
         env=environment(token or cluster.token), capture_output=True, text=True, check=False, timeout=60.0,
     )  # fmt: skip
     return done.returncode, done.stderr

@@ -15,8 +15,17 @@ import pytest
 
 from tests.workers import pendulum
 from tests.workers.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
-from workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
-from workers.watch import ENOUGH, FACTOR, FIRST_SECONDS, NEW_SECONDS, SLACK_SECONDS, Expectation, Standing, Tally
+from wingfit.workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
+from wingfit.workers.watch import (
+    ENOUGH,
+    FACTOR,
+    FIRST_SECONDS,
+    NEW_SECONDS,
+    SLACK_SECONDS,
+    Expectation,
+    Standing,
+    Tally,
+)
 
 
 @pytest.fixture(params=DISTRIBUTED, scope="module")
@@ -166,7 +175,7 @@ def test_counts_add_up() -> None:
 
 GUARDED = """
 import os, signal, sys, time
-from workers.guardian import Guardian
+from wingfit.workers.guardian import Guardian
 guardian = Guardian(silence_s=float(sys.argv[2]), beat_s=0.2)
 with guardian.watching(float(sys.argv[3])):
     time.sleep(0.1)

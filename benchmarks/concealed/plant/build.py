@@ -13,7 +13,7 @@ from benchmarks.concealed.plant.joints import Joint, joints, shares
 from benchmarks.concealed.plant.linkage import series_of
 from benchmarks.concealed.plant.march import C
 from benchmarks.concealed.plant.rig import AIR_LAWS, JETS, LAG, POINTS, STALL, Rig
-from records import Condition, Drive, Wing
+from wingfit.records import Condition, Drive, Wing
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

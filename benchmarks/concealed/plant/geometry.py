@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from records import Wing
+from wingfit.records import Wing
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.build import Draft
-from records import Wing
+from wingfit.records import Wing
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics"]

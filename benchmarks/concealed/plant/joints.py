@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.geometry import Cut
-from records import Rod
+from wingfit.records import Rod
 
 Array = npt.NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from records import Drive, FourBarDrive
+from wingfit.records import Drive, FourBarDrive
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -4,17 +4,8 @@ from __future__ import annotations
 
 from benchmarks.concealed.plant.build import Draft
 from benchmarks.concealed.plant.hidden import Kind, Values
-from benchmarks.concealed.plant.rig import (
-    CARRIED,
-    LAG,
-    LAG_RATE,
-    STALL,
-    STALL_ANGLE,
-    STALL_DELAY,
-    VORTEX,
-    VORTEX_ANGLE,
-)
-from records import Wing
+from benchmarks.concealed.plant.rig import CARRIED, LAG, LAG_RATE, STALL, STALL_ANGLE, STALL_DELAY, VORTEX, VORTEX_ANGLE
+from wingfit.records import Wing
 
 
 def _carried(draft: Draft, strength: float, _: Values) -> None:

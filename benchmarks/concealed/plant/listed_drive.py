@@ -11,7 +11,7 @@ import numpy.typing as npt
 from benchmarks.concealed.plant.build import Draft
 from benchmarks.concealed.plant.hidden import Kind, Values
 from benchmarks.concealed.plant.linkage import series_of
-from records import FourBarDrive, Wing
+from wingfit.records import FourBarDrive, Wing
 
 Complex = npt.NDArray[np.complex128]
 

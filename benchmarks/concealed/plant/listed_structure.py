@@ -10,7 +10,7 @@ from benchmarks.concealed.plant.build import Draft
 from benchmarks.concealed.plant.geometry import Cut, Lump
 from benchmarks.concealed.plant.hidden import Kind, Values
 from benchmarks.concealed.plant.rig import DAHL, MAXWELL, SLIDER
-from records import Wing
+from wingfit.records import Wing
 
 _SPECTRUM = ((0.5, 1.0), (0.5, 6.0))  # parts of the stiffness that relaxes, and their times in parts of the first
 _YIELDS = (0.4, 1.0, 2.5)  # of Dahl's elements, in parts of the middle one's

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.concealed.plant.observe_cameras import Cameras, Tracks, direction_values, draw_cameras, places, seen
 from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters, check_known, strength
 from benchmarks.concealed.plant.observe_noise import Noise, bursts, draw_noise, track_noise
-from records import Condition, Recording, Wing
+from wingfit.records import Condition, Recording, Wing
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from benchmarks.concealed.plant.observe_law import Concealed, Parameters, strength
-from records import Wing
+from wingfit.records import Wing
 
 Array = npt.NDArray[np.float64]
 Tracks = Callable[[Array], Array]  # true positions [T, M, 3] at phases [T, M] in beats

@@ -14,8 +14,8 @@ from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt
 
 from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters, check_known, strength
 from benchmarks.concealed.plant.observe_noise import COLOURS, Colour, coloured
-from records import Condition, Recording, Vehicle
-from records.dataset import STANDARD_GRAVITY
+from wingfit.records import Condition, Recording, Vehicle
+from wingfit.records.dataset import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 

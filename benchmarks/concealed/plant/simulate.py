@@ -15,7 +15,7 @@ from benchmarks.concealed.plant.hidden import Effect, Hidden, Truth
 from benchmarks.concealed.plant.march import State
 from benchmarks.concealed.plant.rig import Rig, states_of
 from benchmarks.concealed.plant.settle import Accuracy, settle
-from records import Condition, Wing
+from wingfit.records import Condition, Wing
 
 Array = npt.NDArray[np.float64]
 

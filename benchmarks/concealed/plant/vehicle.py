@@ -27,8 +27,8 @@ from benchmarks.concealed.plant.vehicle_laws import (
     levered,
     tip,
 )
-from records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
-from records.vehicle import Flap
+from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
+from wingfit.records.vehicle import Flap
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from scipy.special import zeta as hurwitz
 
 from benchmarks.concealed.plant.observe_law import Law, Parameters
-from records import Condition, Vehicle
-from records.dataset import STANDARD_GRAVITY
+from wingfit.records import Condition, Vehicle
+from wingfit.records.dataset import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

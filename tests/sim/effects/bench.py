@@ -11,20 +11,20 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from records import Condition, Genome, Wing
-from sim.division import Division
-from sim.effects.registry import EFFECTS
-from sim.effects.wing import WingScene
-from sim.flexible_wing import FlexibleWing
-from sim.kernels import LANES
-from sim.kernels.arrays import Lanes, Work, new_work
-from sim.kernels.laws import AFTER
-from sim.numerics import Numerics
-from sim.rig import blank_recording, robird_wing, tunnel
-from sim.simulate import Beat
-from sim.structure import Structure, build
-from sim.wing_genes import lanes, wing_genes
 from tests.sim.effects.rigs import CONDITIONS
+from wingfit.records import Condition, Genome, Wing
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import Lanes, Work, new_work
+from wingfit.sim.kernels.laws import AFTER
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.solver.simulate import Beat
+from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, tunnel
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.genes import lanes, wing_genes
+from wingfit.sim.wing.structure import Structure, build
 
 Array = npt.NDArray[np.float64]
 AIR, VACUUM = tunnel(0.05, 3.0, 6.0), CONDITIONS["vacuum"]

@@ -10,16 +10,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from sim.division import Division
-from sim.effects.wing import WingScene
-from sim.kernels import LANES
-from sim.kernels.arrays import new_work
-from sim.kernels.integrate import advance
-from sim.numerics import Numerics
-from sim.rig import robird_wing, vacuum
-from sim.scene import at_rest, drive_table, new_trace
-from sim.structure import Structure, build
 from tests.sim.effects.bench import beat_of
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import new_work
+from wingfit.sim.kernels.integrate import advance
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.solver.scene import at_rest, drive_table, new_trace
+from wingfit.sim.virtual_rigs.campaign import robird_wing, vacuum
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.structure import Structure, build
 
 Array = npt.NDArray[np.float64]
 

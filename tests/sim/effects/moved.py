@@ -10,17 +10,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from records import Condition, Wing
-from sim.division import Division
-from sim.effects.registry import EFFECTS
-from sim.effects.wing import WingScene
-from sim.kernels import LANES
-from sim.kernels.arrays import new_work
-from sim.kernels.integrate import airflow
-from sim.scene import at_rest
-from sim.structure import build
-from tests.sim.marching import plank
-from tests.sim.plates import loaded
+from tests.sim.kernels.marching import plank
+from tests.sim.wing.plates import loaded
+from wingfit.records import Condition, Wing
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import new_work
+from wingfit.sim.kernels.integrate import airflow
+from wingfit.sim.solver.scene import at_rest
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.structure import build
 
 Array = npt.NDArray[np.float64]
 

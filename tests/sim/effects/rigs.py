@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from records import Genome, Recording, Vehicle, Wing
-from sim.balance import TRIALS, delfly
-from sim.blade_element_wing import BladeElementWing
-from sim.effects.contract import Effect
-from sim.effects.observation import Sampling, apply
-from sim.effects.registry import EFFECTS
-from sim.flexible_wing import FlexibleWing
-from sim.numerics import Numerics
-from sim.rig import Tracking, blank_recording, record, robird_wing, tunnel, vacuum
+from wingfit.records import Genome, Recording, Vehicle, Wing
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.ports.observation import Sampling, apply
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.virtual_rigs.balance import TRIALS, delfly
+from wingfit.sim.virtual_rigs.campaign import Tracking, blank_recording, record, robird_wing, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
 AnyModel = FlexibleWing | BladeElementWing

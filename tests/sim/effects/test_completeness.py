@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.effects.registry import EFFECTS
+from wingfit.sim.effects.registry import EFFECTS
 
 ROOT = Path(__file__).parents[3]
 PAGES = ROOT / "docs" / "effects"
@@ -22,11 +22,11 @@ def test_has_a_page_with_its_figure(name: str) -> None:
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_has_tests_of_its_own(name: str) -> None:
-    assert "def test_" in (ROOT / "tests" / "sim" / "effects" / f"test_{name}.py").read_text(encoding="utf-8")
+    assert "def test_" in next((ROOT / "tests" / "sim" / "effects").glob(f"*/test_{name}.py")).read_text(encoding="utf-8")
 
 
 def test_every_file_that_declares_an_effect_is_registered() -> None:
-    files = (ROOT / "sim" / "effects").glob("*.py")
+    files = (ROOT / "sim" / "effects" / "library").glob("*/*.py")
     declared = {file.stem for file in files if "\nEFFECT = " in file.read_text(encoding="utf-8")}
     assert declared == set(EFFECTS)
 

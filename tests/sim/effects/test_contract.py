@@ -10,12 +10,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sim.effects.contract import Effect
-from sim.effects.registry import EFFECTS, chosen
-from sim.flexible_wing import FlexibleWing
-from sim.model import Observation
-from sim.numerics import Numerics
 from tests.sim.effects.rigs import AnyModel, Array, bare, recordings, rig_of
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.registry import EFFECTS, chosen
+from wingfit.sim.model import Observation
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 KINDS = ("wing", "vehicle")
 CASES = [(name, kind) for name, effect in EFFECTS.items() for kind in KINDS if effect.applies_to(rig_of(bare(kind)))]

@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.division import Division
-from sim.effects.joints import Joints
-from sim.structure import build
-from tests.sim.marching import CHORD, LENGTH, plank
+from tests.sim.kernels.marching import CHORD, LENGTH, plank
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.structure import build
 
 
 @pytest.mark.parametrize(("strips", "pieces"), [(4, 1), (5, 3)])

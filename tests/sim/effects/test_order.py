@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import pytest
 
-from records import Vehicle, Wing
-from sim.balance import delfly
-from sim.effects.registry import EFFECTS, chosen
-from sim.rig import robird_wing
+from wingfit.records import Vehicle, Wing
+from wingfit.sim.effects.registry import EFFECTS, chosen
+from wingfit.sim.virtual_rigs.balance import delfly
+from wingfit.sim.virtual_rigs.campaign import robird_wing
 
 FIRST_LAST_WHY = (
     ("residual_air", "added_mass", "the mass of the air moved along is that of the air there is"),

@@ -6,15 +6,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sim.division import Division
-from sim.effects.joints import Joints
-from sim.effects.registry import EFFECTS
-from sim.kernels import LANES
-from sim.kernels.integrate import forces
-from sim.rig import robird_wing
-from sim.structure import build
 from tests.sim.effects.bench import VACUUM, Bench, beat_of, ledger, scene_of, told
 from tests.sim.effects.moved import Motion, Moved
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.registry import EFFECTS
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.integrate import forces
+from wingfit.sim.virtual_rigs.campaign import robird_wing
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.structure import build
 
 PROMISES = [name for name, effect in EFFECTS.items() if effect.wing is not None and effect.power != "any"]
 

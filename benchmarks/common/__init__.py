@@ -1,0 +1,1 @@
+"""Parts of several benchmarks: the machine, servers as processes, Ray nodes, figures."""

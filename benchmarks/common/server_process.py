@@ -1,0 +1,151 @@
+"""A server as a process of its own, over a data folder, and the ways in which it dies."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+import httpx
+
+from benchmarks.common.ray_nodes import REPOSITORY, environment, free_port
+
+START_SECONDS = 120.0
+DIE_SECONDS = 30.0
+WORKERS = 2
+
+
+class Server:
+    """A server over a data folder, on one port over all its lives."""
+
+    def __init__(
+        self,
+        folder: Path,
+        evaluator: str,
+        token: Path | None = None,
+        ray_address: str = "",
+        settings: Mapping[str, str] | None = None,
+    ) -> None:
+        self.folder, self.port = folder, free_port()
+        base = environment(token) if token else dict(os.environ)
+        self._environment = base | {
+            "WINGFIT_DATA": str(folder / "data"),
+            "WINGFIT_PORT": str(self.port),
+            "WINGFIT_EVALUATOR": evaluator,
+            "WINGFIT_WORKERS": str(WORKERS),
+            **(settings or {}),
+        }
+        if ray_address:
+            self._environment["WINGFIT_RAY_ADDRESS"] = ray_address
+        self._process: subprocess.Popen[bytes] | None = None
+        self.fail_point = ""
+
+    def start(self, fail_point: str = "") -> None:
+        """Start, and wait until it answers; with a fail point it may die before."""
+        self.fail_point = fail_point
+        with (self.folder / "server.log").open("ab") as log:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "wingfit.service.server"],
+                env=self._environment | ({"WINGFIT_FAIL_POINT": fail_point} if fail_point else {}),
+                cwd=REPOSITORY,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        deadline = time.monotonic() + START_SECONDS
+        while not self.answers():
+            if self._process.poll() is not None:
+                if fail_point:
+                    return
+                raise RuntimeError(f"the server ended with {self._process.returncode}: {self.tail()}")
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"the server does not answer: {self.tail()}")
+            time.sleep(0.02)
+
+    def answers(self) -> bool:
+        """Whether it answers now."""
+        with suppress(httpx.TransportError):
+            return httpx.get(f"http://127.0.0.1:{self.port}/v1/health", timeout=5.0).status_code == 200
+        return False
+
+    def peak_mb(self) -> float:
+        """Most memory that the server itself has held."""
+        lines = (Path("/proc") / str(self.pid) / "status").read_text().splitlines()
+        return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024
+
+    def tail(self) -> str:
+        """The end of its log."""
+        return (self.folder / "server.log").read_text(errors="replace")[-2000:]
+
+    def died(self, seconds: float) -> bool:
+        """Whether it dies by itself within ``seconds``."""
+        assert self._process is not None  # noqa: S101  # started
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+            return True
+        return False
+
+    def kill(self) -> None:
+        """kill -9 of the server alone."""
+        assert self._process is not None  # noqa: S101  # started
+        with suppress(ProcessLookupError):
+            os.kill(self._process.pid, signal.SIGKILL)
+        self._process.wait(DIE_SECONDS)
+
+    def kill_all(self) -> None:
+        """kill -9 of the server and of all that it started, at once."""
+        victims = [self.pid, *descendants(self.pid)]
+        for pid in victims:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        assert self._process is not None  # noqa: S101  # started
+        self._process.wait(DIE_SECONDS)
+
+    @property
+    def pid(self) -> int:
+        """Of the server."""
+        assert self._process is not None  # noqa: S101  # started
+        return self._process.pid
+
+    def workers(self) -> list[int]:
+        """Processes that evaluate."""
+        return [pid for pid, command in _commands(descendants(self.pid)) if _evaluates(command)]
+
+    def stop(self) -> None:
+        """Ask it to end."""
+        assert self._process is not None  # noqa: S101  # started
+        self._process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(DIE_SECONDS)
+        if self._process.poll() is None:
+            self.kill()
+
+
+def descendants(pid: int) -> list[int]:
+    """Living processes that ``pid`` started, and that these did."""
+    children: dict[int, list[int]] = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError, ValueError):
+            fields = (folder / "stat").read_text().rsplit(")", 1)[1].split()
+            if fields[0] != "Z":
+                children.setdefault(int(fields[1]), []).append(int(folder.name))
+    found, new = list[int](), [pid]
+    while new:
+        new = [child for parent in new for child in children.get(parent, [])]
+        found += new
+    return found
+
+
+def _commands(pids: list[int]) -> Iterator[tuple[int, str]]:
+    for pid in pids:
+        with suppress(OSError):
+            yield pid, (Path("/proc") / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
+
+
+def _evaluates(command: str) -> bool:
+    return "spawn_main" in command or command.startswith("ray::")

@@ -1,0 +1,1 @@
+"""Measurements of the simulated physics, and reference solutions."""

@@ -1,0 +1,58 @@
+"""What the printed tables say without any recording (Armanini et al. 2016, Tables 3-5 and 8)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import linprog
+
+from wingfit.calibration.forces.global_model import fit_global
+from wingfit.calibration.forces.result import GlobalModel, LocalEstimate
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.lift_drag import lift_drag
+from wingfit.sim.vehicle.motion import angles
+from wingfit.sim.virtual_rigs.balance import TRIALS, delfly, true_beat
+
+
+def tables_law() -> GlobalModel:
+    """Eq. 23 by plain least squares on the source's own Table 8."""
+    local = [
+        LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(t.coefficients, 0.0), (), (), 0.0, True, ())
+        for t in TRIALS
+    ]
+    return fit_global(local, [trial.condition for trial in TRIALS], weighted=False)
+
+
+def closest_law_percent(name: str) -> float:
+    """Least that the largest relative error of any affine law can be on the source's Table 8: minimax, per cent."""
+    values = np.array([trial.coefficients[name] for trial in TRIALS])
+    design = (
+        np.array([[1.0, t.condition.flap_frequency, t.condition.angle_of_attack] for t in TRIALS]) / values[:, None]
+    )
+    one = np.ones((len(values), 1))
+    found = linprog(
+        [0, 0, 0, 1],
+        A_ub=np.block([[design, -one], [-design, -one]]),
+        b_ub=np.concatenate([one[:, 0], -one[:, 0]]),
+        bounds=[(None, None)] * 3 + [(0, None)],
+    )
+    return 100 * float(found.x[3])
+
+
+def lift_by_root_pitch() -> dict[str, list[float]]:
+    """Mean lift (N) under each condition with the coefficients of Table 8, for both readings of the twist's root."""
+    found = {}
+    for name, root in (("0", 0.0), ("90_deg", np.pi / 2)):
+        vehicle = delfly()
+        turned = replace(vehicle, motion=replace(vehicle.motion, root_pitch=root))
+        beats = [(trial, true_beat(turned, trial).mean(axis=0)) for trial in TRIALS]
+        found[name] = [float(lift_drag(force, t.condition.angle_of_attack)[0]) for t, force in beats]
+    return found
+
+
+def fling_ends(model: BladeElementWing) -> list[float]:
+    """Earliest and latest t* at which fling circulation ends, over the conditions."""
+    peels = [angles(model.vehicle.motion, {}, t.condition.flap_frequency, 4000, claps=True).peel[0] for t in TRIALS]
+    ends = [float(np.flatnonzero(peel)[-1]) / len(peel) for peel in peels]
+    return [min(ends), max(ends)]

@@ -1,0 +1,102 @@
+"""Beams as wings of foam alone, and the chain of rigid bodies that they become, bent far by a load at the tip."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from benchmarks.physics.beam_theory import Beam
+from tests.sim.wing.plates import loaded, plate, spring_wrenches
+from wingfit.records import Materials, Rod, Station
+from wingfit.sim.kernels import LANES
+from wingfit.sim.solver.scene import at_rest
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.structure import Structure, build
+
+Array = npt.NDArray[np.float64]
+
+
+def cut_beam(beam: Beam, division: str) -> Structure:
+    """The beam as a wing of foam alone, its middle line straight, both driven rods entering there without substance."""
+    middle, (c0, c1), (h0, h1) = beam.chord[0] / 2, beam.chord, beam.thickness
+    rods = tuple(Rod(n, middle, 0.0, middle, beam.length, 0.0, 0.0, 0.0) for n in ("front", "rear"))
+    stations = tuple(Station(y, middle - c / 2, c, h) for y, c, h in ((0.0, c0, h0), (beam.length, c1, h1)))
+    wing = plate(c0, beam.length, h0, (rods[0], rods[1]))
+    wing = replace(wing, stations=stations, materials=Materials(beam.density, 0.0))
+    return build(wing, Division.parse(division))
+
+
+def genome(beam: Beam) -> dict[str, float]:
+    """Moduli of the beam, no damping."""
+    return {"E_f": beam.young, "G_f": beam.shear, "D_E": 0.0, "D_G": 0.0}
+
+
+class _Chain:
+    """Chain of rigid bodies on their springs under a dead force at the tip, in joint coordinates.
+
+    u [n, 6] of each joint: rotation vector, and displacement in the inner body's axes. (In the bodies' own coordinates
+    every rotation would stretch the chain, and Newton's method would have to follow a curved, stiff valley.)
+    """
+
+    def __init__(self, beam: Beam, strips: int) -> None:
+        self.structure = cut_beam(beam, f"{strips}x1")
+        self.springs = loaded(self.structure, genome(beam)).stiffness
+        self.n, self.state = strips, at_rest(self.structure)
+        self.tip = np.array([0.0, beam.length - self.state.p[strips - 1, 1, 0], 0.0])
+        w = self.structure.wiring
+        # arms of the one joint at the inner side of each body; at the root the first rod's, the second lies on it
+        inner = np.array([np.flatnonzero(w.second == k)[0] for k in range(strips)])
+        self.a, self.b = w.a[inner], w.b[inner]
+
+    def poses(self, u: Array) -> tuple[Array, Array]:
+        """Rotations [W, n + 2, 3, 3] and places [W, n + 2, 3] at joint coordinates ``u`` [W, 6 n]."""
+        joint = u.reshape(len(u), self.n, 6)
+        R = np.tile(self.state.R[..., 0].reshape(-1, 3, 3), (len(u), 1, 1, 1))
+        p = np.tile(self.state.p[..., 0], (len(u), 1, 1))
+        for k in range(self.n):
+            inner = k - 1 if k else self.n
+            point = p[:, inner] + np.einsum("wij,wj->wi", R[:, inner], self.a[k] + joint[:, k, 3:])
+            R[:, k] = R[:, inner] @ Rotation.from_rotvec(joint[:, k, :3]).as_matrix()
+            p[:, k] = point - R[:, k] @ self.b[k]
+        return R, p
+
+    def unbalanced(self, u: Array, load: float) -> Array:
+        """Wrenches [W, 6 n] (body axes) that remain at ``u`` [W, 6 n]; the compiled forces, LANES at a time."""
+        found = []
+        R_all, p_all = self.poses(u[np.arange(-(-len(u) // LANES) * LANES) % len(u)])
+        for k in range(0, len(u), LANES):
+            R = np.ascontiguousarray(np.moveaxis(R_all[k : k + LANES], 0, -1)).reshape(self.n + 2, 9, LANES)
+            p = np.ascontiguousarray(np.moveaxis(p_all[k : k + LANES], 0, -1))
+            wrench = spring_wrenches(self.structure, self.springs, R, p)
+            found.append(np.moveaxis(wrench[: self.n], -1, 0).reshape(LANES, -1))
+        rest = np.concatenate(found)[: len(u)]
+        force = R_all[: len(u), self.n - 1, 2] * load  # upward in the world, seen from the last body
+        rest[:, -6:] += np.concatenate([np.cross(self.tip, force), force], axis=1)
+        return rest
+
+    def settle(self, load: float) -> tuple[Array, Array]:
+        """Pose in equilibrium, by Newton's method; its matrix by central differences of the compiled forces."""
+        size, h, u = 6 * self.n, 1e-5, np.zeros(6 * self.n)
+        for _ in range(40):
+            sides = self.unbalanced(u + h * np.concatenate([np.eye(size), -np.eye(size)]), load)
+            slope = (sides[:size] - sides[size:]).T / (2 * h)
+            step = -np.linalg.solve(slope, self.unbalanced(u[None], load)[0])
+            u = u + step * min(1.0, 0.3 / float(np.abs(step).max()))
+            if np.abs(step).max() < 1e-9:
+                R, p = self.poses(u[None])
+                return R[0], p[0]
+        raise RuntimeError(f"no equilibrium of {self.n} strips under {load:g} N after 40 Newton steps")
+
+
+def spring_chain(beam: Beam, strips: int, load: float) -> tuple[float, float, float]:
+    """What `beam_theory.elastica` gives, of the chain; ``load`` is P L^2 / E I of the uniform beam."""
+    chain = _Chain(beam, strips)
+    inertia = beam.chord[0] * beam.thickness[0] ** 3 / 12
+    R, p = chain.settle(load * beam.young * inertia / beam.length**2)
+    last = R[strips - 1]
+    tip = p[strips - 1] + last @ chain.tip
+    return float(tip[2] / beam.length), float(1 - tip[1] / beam.length), math.atan2(last[2, 1], last[1, 1])

@@ -1,0 +1,1 @@
+"""Maximum-likelihood estimates, their covariance, and what the data cannot separate."""

@@ -1,0 +1,62 @@
+"""The covariance R of the measured outputs: estimated from residuals, and whitening by it (Armanini et al., Eq. 22)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.calibration.problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+FLOOR = 1e-6  # of the largest recorded value: a fit better than this is taken for this good, so that R stays regular
+POOLED = 5.0  # samples that the mean variance of a recording counts for in the variance of each of its tracks
+
+
+@dataclass(frozen=True)
+class Noise:
+    """R of one recording [C, C] (m^2 or N^2), and the matrix [C, C] that whitens rows of residuals from the right."""
+
+    covariance: Array
+    whitening: Array
+    log_determinants: Array
+    """[C] logarithms that add up to ln det R, one for each channel."""
+
+    @classmethod
+    def of(cls, problem: Problem, recording: int, residuals: Array) -> Noise:
+        """Estimate R from residuals [T, C].
+
+        Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
+        channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
+        drawn a little to their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
+        Channels that are not fitted get variance 1, which leaves no trace.
+        """
+        record = problem.recordings[recording]
+        seen = np.isfinite(residuals)
+        v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)
+        if record.kind == "forces":
+            matrix = v.T @ v / max(int(count.max()), 1)
+        else:
+            power = (v**2).sum(axis=0)
+            matrix = np.diag((power + POOLED * power.sum() / max(count.sum(), 1)) / (count + POOLED))
+        largest = float(np.nanmax(np.abs(record.values), initial=0.0)) or 1.0
+        matrix = matrix + np.diag(np.where(count > 0, (FLOOR * largest) ** 2, 1.0 - np.diag(matrix)))
+        factor = np.linalg.cholesky(matrix)
+        whitening = np.asarray(np.linalg.solve(factor, np.eye(len(factor))).T, float)
+        return cls(matrix, whitening, 2.0 * np.log(np.diag(factor)))
+
+    def whitened(self, residuals: Array) -> Array:
+        """Residuals [..., T, C] with unit covariance; zero where not compared."""
+        return np.asarray(np.where(np.isfinite(residuals), residuals, 0.0) @ self.whitening)
+
+    def cost(self, residuals: Array) -> float:
+        """-ln likelihood of residuals [T, C], Eq. 22."""
+        count, white = np.isfinite(residuals).sum(axis=0), self.whitened(residuals)
+        return 0.5 * float((white**2).sum() + count @ (self.log_determinants + np.log(2 * np.pi)))
+
+
+def whitened_sensitivity(noise: Noise, sensitivity: Array) -> Array:
+    """[T, C, F] of the whitened residuals from that of the residuals."""
+    return np.asarray(np.einsum("tcf,cd->tdf", sensitivity, noise.whitening, optimize=True))

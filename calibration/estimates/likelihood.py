@@ -1,0 +1,274 @@
+"""Maximum-likelihood estimation (Armanini et al. 2016, Eq. 22) on any model: damped Gauss-Newton in the gene box.
+
+J = 1/2 sum_i v_i^T R^-1 v_i + N/2 ln det R + N n_y/2 ln 2 pi, v the residuals. R is estimated anew in each iteration
+and held while the genes move (relaxation). A step solves the linearised problem inside the box, an active-set bounded
+least-squares problem, for several Levenberg-Marquardt dampings at once; the best of the genomes that result is taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+from wingfit.calibration.effects import is_size
+from wingfit.calibration.estimates.covariance import Noise, whitened_sensitivity
+from wingfit.calibration.estimates.linearised import free_genes, linearise, residuals_of, stopped, unit_at, values_at
+from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.initial_effect_position import placed
+from wingfit.calibration.problem import Problem
+from wingfit.records import Gene
+from wingfit.records.blas_threads import one_blas_thread
+
+Array = npt.NDArray[np.float64]
+
+# Dampings tried at once, times the last good one: two groups of lanes. Close to it they lie densely, because valleys of
+# stiffnesses that compensate each other bend: a damping three times too small leaves them, one three times too large
+# crawls along them.
+DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-4, 1e6  # of each gene's curvature
+LEAST_CURVATURE = 4.0  # damped at least as much as a prior of the box's half width: a gene that is not told stays
+LEAST_GAIN = 1e-3  # of the decrease that the linearised problem promises
+STEP = 1e-3  # unit coordinates
+COST = 1e-5  # of J's 1/2 sum v^T R^-1 v, which is half the number of samples
+ITERATIONS = 50
+
+
+@dataclass(frozen=True)
+class Step:
+    """One iteration, what a watcher sees; ``checkpoint`` (JSON) is all that is needed to go on from here.
+
+    Attributes:
+        index: number of the iteration, from 0.
+        values: of the free genes after it.
+        cost: Eq. 22 before it, with R of then.
+        fitness: sum of squares after it (:attr:`wingfit.calibration.problem.Misfit.squares`).
+        distance: misfit after it, m or N.
+        step: largest move of a gene, unit coordinates.
+        gain: decrease of the cost over the decrease promised; 0 when no step was better.
+        evaluations: individuals evaluated in it.
+        reasons: of those that failed.
+        converged: whether this is the last.
+    """
+
+    index: int
+    values: dict[str, float]
+    cost: float
+    fitness: float
+    distance: float
+    step: float
+    gain: float
+    evaluations: int
+    reasons: tuple[str, ...]
+    converged: bool
+    checkpoint: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A maximum-likelihood estimate: where the iteration ended, and how sure that is.
+
+    ``covariance`` and ``correlation`` [F, F] in the order of ``free``; ``noise`` is R of each recording, [C, C].
+    """
+
+    free: tuple[str, ...]
+    values: dict[str, float]
+    covariance: Array
+    correlation: Array
+    noise: tuple[Array, ...]
+    cost: float
+    iterations: int
+    evaluations: int
+    converged: bool
+    remarks: tuple[str, ...]
+    uncertainty: Uncertainty
+
+
+@dataclass(frozen=True)
+class _State:
+    """Everything that the next iteration depends on; ``flat`` counts iterations that gained next to nothing."""
+
+    unit: tuple[float, ...]
+    damping: float = FIRST_DAMPING
+    index: int = -1
+    flat: int = 0
+    converged: bool = False
+
+
+@dataclass(frozen=True)
+class _Move:
+    """A step taken or, where nothing was better, not taken."""
+
+    unit: Array
+    step: float
+    gain: float
+    decrease: float
+    damping: float
+    fitness: float
+    distance: float
+    evaluations: int
+    reasons: tuple[str, ...]
+
+
+@one_blas_thread
+def iterate(
+    problem: Problem,
+    evaluator: Evaluator,
+    start: Mapping[str, float],
+    checkpoint: dict[str, Any] | None = None,
+    iterations: int = ITERATIONS,
+) -> Iterator[Step]:
+    """Iterate from ``start`` (genes that it does not name start at the base) or on from ``checkpoint``.
+
+    Ends when no step is better, when a step is smaller than STEP and gains less than COST of the cost, when two in
+    succession gain as little (what then still moves is not told by the data), or after ``iterations``. Resumed equals
+    uninterrupted, bit for bit. ValueError when the start cannot be simulated. Effects that are switched off start so,
+    at the place that promises most (:mod:`wingfit.calibration.initial_effect_position`).
+    """
+    genes, before = free_genes(problem), 0
+    if checkpoint is None:
+        first = unit_at(genes, np.array([start.get(gene.name, problem.base[gene.name]) for gene in genes]))
+        first, before = placed(problem, evaluator, first)
+        state = _State(tuple(first.tolist()))
+    else:
+        state = _State(**(checkpoint | {"unit": tuple(checkpoint["unit"])}))
+    while not state.converged and state.index + 1 < iterations:
+        step, state = _iteration(problem, evaluator, genes, state)
+        yield replace(step, evaluations=step.evaluations + before)
+        before = 0
+
+
+@one_blas_thread
+def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float]) -> Estimate:
+    """Iterate to the end and judge the estimate there."""
+    evaluations, last = 0, None
+    for last in iterate(problem, evaluator, start):
+        evaluations += last.evaluations
+    if last is None:
+        raise ValueError("an estimate needs at least one iteration")
+    found = Problem(problem.model, problem.recordings, problem.free, problem.base.replace(last.values), problem.axes)
+    known = uncertainty(found, evaluator)
+    said = (
+        () if last.converged else (f"not converged after {last.index + 1} iterations; the last moved {last.step:.2g}",)
+    )
+    return Estimate(
+        free=problem.free,
+        values=last.values,
+        covariance=known.covariance,
+        correlation=known.correlation,
+        noise=known.noise,
+        cost=known.cost,
+        iterations=last.index + 1,
+        evaluations=evaluations,
+        converged=last.converged,
+        remarks=(*said, *at_bounds(free_genes(problem), last.values), *known.remarks),
+        uncertainty=known,
+    )
+
+
+def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
+    """Remarks on genes that the box stopped; a size of zero is no stop, but an effect's absence."""
+    genes = [gene for gene in genes if values[gene.name] != 0.0 or not is_size(gene.name)]
+    found = np.array([values[gene.name] for gene in genes])
+    return tuple(
+        f"{gene.name} is at its {'lower' if value <= gene.lower else 'upper'} bound {value:.4g}: the best value may "
+        "lie beyond; the errors of the others take it as known"
+        for gene, value, at_bound in zip(genes, found, stopped(genes, found), strict=True)
+        if at_bound
+    )
+
+
+def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state: _State) -> tuple[Step, _State]:
+    unit = np.array(state.unit)
+    linear = linearise(problem, evaluator, unit)
+    noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
+    curvature, slope, power = _normal_equations(noise, linear.residuals, linear.sensitivities)
+    move = _better(problem, evaluator, genes, unit, noise, (curvature, slope, power), state.damping)
+    stays = move.gain == 0.0
+    flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
+    converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
+    after = _State(tuple(move.unit.tolist()), move.damping, state.index + 1, flat, converged)
+    step = Step(
+        index=after.index,
+        values=dict(zip(problem.free, values_at(genes, move.unit[None])[0].tolist(), strict=True)),
+        cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
+        fitness=linear.fitness if stays else move.fitness,
+        distance=linear.distance if stays else move.distance,
+        step=move.step,
+        gain=move.gain,
+        evaluations=linear.evaluations + move.evaluations,
+        reasons=(*linear.reasons, *move.reasons),
+        converged=converged,
+        checkpoint=asdict(after) | {"unit": list(after.unit)},
+    )
+    return step, after
+
+
+def _normal_equations(
+    noise: list[Noise], residuals: tuple[Array, ...], sensitivities: tuple[Array, ...]
+) -> tuple[Array, Array, float]:
+    """Curvature [F, F] and slope [F] of the cost, and sum of v^T R^-1 v."""
+    size = sensitivities[0].shape[-1]
+    curvature, slope, power = np.zeros((size, size)), np.zeros(size), 0.0
+    for n, v, s in zip(noise, residuals, sensitivities, strict=True):
+        white = n.whitened(v).ravel()
+        steep = whitened_sensitivity(n, s).reshape(-1, size)
+        curvature += steep.T @ steep
+        slope += steep.T @ white
+        power += float(white @ white)
+    return curvature, slope, power
+
+
+def _better(
+    problem: Problem,
+    evaluator: Evaluator,
+    genes: list[Gene],
+    unit: Array,
+    noise: list[Noise],
+    normal: tuple[Array, Array, float],
+    damping: float,
+) -> _Move:
+    """The best genome that any damping leads to; the present one when none is better."""
+    curvature, slope, power = normal
+    evaluations, reasons = 0, []
+    while True:
+        dampings = damping * DAMPINGS
+        steps = np.array([_bounded_step(curvature, slope, unit, d) for d in dampings])
+        evaluation = evaluator.evaluate(problem, values_at(genes, unit + steps), residuals=True)
+        evaluations += len(steps)
+        reasons += [reason for reason in evaluation.reasons if reason]
+        after = np.zeros(len(steps))
+        for n, part in zip(noise, residuals_of(evaluation), strict=True):
+            after += (n.whitened(part) ** 2).sum(axis=(1, 2))
+        after[[reason is not None for reason in evaluation.reasons]] = np.inf
+        promised = -(steps @ slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, curvature, steps)
+        decrease = 0.5 * (power - after)
+        good = (promised > 0.0) & (decrease > LEAST_GAIN * promised)  # at a bound a step may be round-off alone
+        if good.any():
+            k = int(np.argmax(np.where(good, decrease, -np.inf)))
+            return _Move(
+                np.clip(unit + steps[k], 0.0, 1.0),
+                float(np.abs(steps[k]).max()),
+                float(decrease[k] / promised[k]),
+                float(decrease[k]),
+                float(max(dampings[k], LEAST_DAMPING)),
+                float(evaluation.fitness[k]),
+                float(evaluation.distance[k]),
+                evaluations,
+                tuple(reasons),
+            )
+        if dampings[-1] >= LARGEST_DAMPING or np.abs(steps).max() <= STEP:
+            return _Move(unit, 0.0, 0.0, 0.0, damping, np.inf, np.inf, evaluations, tuple(reasons))
+        damping = float(dampings[-1] / DAMPINGS[0])
+
+
+def _bounded_step(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
+    """Step [F] that minimises the damped quadratic inside the unit box."""
+    factor = np.linalg.cholesky(curvature + damping * np.diag(np.diag(curvature) + LEAST_CURVATURE))
+    aim = -np.linalg.solve(factor, slope)
+    return np.asarray(lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)

@@ -1,0 +1,76 @@
+"""What the data cannot tell, in words, from the covariance of an estimate."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Gene
+
+Array = npt.NDArray[np.float64]
+
+MEMBER = 0.3  # of the largest component of a direction: a gene with less has no part in it
+ALIKE = 0.25  # components that differ by less count as equal
+HELPED = 0.5  # an error that knowing the others reduces to less than this part belongs to a trade-off
+ROUND_OFF = 1e-9  # of the largest variance, so that a covariance can be inverted
+
+
+def remarks(genes: list[Gene], relative: Array, told: npt.NDArray[np.bool_], largest: float) -> tuple[str, ...]:
+    """Name what an estimate leaves less sure than ``largest``.
+
+    ``relative`` [F, F] is the covariance of relative changes. Its eigenvectors with large eigenvalues are the
+    directions in which the data hardly change: one gene that is not told, or several that make up for each other.
+    Shares of a group, which always make up for each other, are named together.
+    """
+    said = [
+        f"{gene.name} cannot be judged: no genome beside the best can be simulated"
+        for gene, ok in zip(genes, told, strict=True)
+        if not ok
+    ]
+    single = [k for k, gene in enumerate(genes) if told[k] and gene.share_of is None]
+    said += _directions([genes[k].name for k in single], relative[np.ix_(single, single)], largest)
+    for group in dict.fromkeys(gene.share_of for gene in genes if gene.share_of):
+        weak = [k for k, g in enumerate(genes) if g.share_of == group and told[k] and relative[k, k] > largest**2]
+        if weak:
+            said.append(f"of the shares {group}, these data do not tell {_bounds(genes, relative, weak)}")
+    return tuple(said)
+
+
+def _bounds(genes: list[Gene], relative: Array, which: list[int]) -> str:
+    return ", ".join(f"{genes[k].name} (bound {np.sqrt(relative[k, k]):.0%})" for k in which)
+
+
+def _directions(names: list[str], covariance: Array, largest: float) -> list[str]:
+    """Remarks on the directions that the data hardly see, worst first; each gene is spoken of once."""
+    said: list[str] = []
+    spoken: set[int] = set()
+    sizes, directions = np.linalg.eigh(covariance)
+    for size, direction in zip(sizes[::-1], directions.T[::-1], strict=True):
+        members = [int(k) for k in np.flatnonzero(np.abs(direction) >= MEMBER * np.abs(direction).max())]
+        if size > largest**2 and not spoken.issuperset(members):
+            said += _direction(names, covariance, direction / np.abs(direction).max(), members, largest, spoken)
+            spoken.update(members)
+    return said
+
+
+def _direction(
+    names: list[str], covariance: Array, direction: Array, members: list[int], largest: float, spoken: set[int]
+) -> list[str]:
+    """Remarks on one direction [F] and the genes with a part in it."""
+    errors = np.sqrt(np.diag(covariance))
+    part = covariance[np.ix_(members, members)]
+    part = part + ROUND_OFF * np.diag(part).max() * np.eye(len(members))
+    alone = 1.0 / np.sqrt(np.diag(np.linalg.inv(part)))
+    if len(members) == 1 or (alone > HELPED * errors[members]).any():
+        weak = [k for k in members if errors[k] > largest and k not in spoken]
+        return [f"{names[k]} is not told by these data: its bound is {errors[k]:.0%}" for k in weak]
+    bounds = ", ".join(f"{names[k]} {errors[k]:.0%}" for k in members)
+    if len(members) == 2 and np.abs(direction[members]).min() >= 1.0 - ALIKE:
+        a, b = members
+        sign = float(np.sign(direction[a] * direction[b]))
+        together = np.sqrt(max(covariance[a, a] + covariance[b, b] - 2 * sign * covariance[a, b], 0.0))
+        what = f"ratio {names[a]} : {names[b]}" if sign > 0 else f"product {names[a]} x {names[b]}"
+        return [f"only the {what} is told by these data, to {together:.1%}; the bounds of each are {bounds}"]
+    listed = f"{', '.join(names[k] for k in members[:-1])} and {names[members[-1]]}"
+    changes = ", ".join(f"{names[k]} {10 * direction[k]:+.0f} %" for k in members)
+    return [f"{listed} make up for each other: {changes} hardly changes the data; the bounds of each are {bounds}"]

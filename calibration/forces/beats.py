@@ -1,0 +1,90 @@
+"""Uncertainty of forces from beat to beat: what one beat says about a gene differs from what the next one says.
+
+The scatter of measured forces grows and falls with the forces themselves, since the flow separates anew in every beat.
+Such noise is not stationary within the beat. A formula that takes its correlations as those of a stationary one
+(:mod:`wingfit.calibration.estimates.coloured`) gives too small an error to a gene that acts where the scatter is large,
+and too large a one to a gene that acts elsewhere. From beat to beat it is stationary. So the scores S^T R^-1 v are
+summed over each whole beat, and the covariance of their sum is estimated from the series of beats with a flat-topped
+taper (Politis and Romano 1995; for scores: Newey and West 1987).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Recording
+
+Array = npt.NDArray[np.float64]
+
+FEWEST_MEAN = 3  # beats from which a mean beat can be told from noise
+HARMONICS = 8  # of the mean beat
+ENOUGH = 24  # beats from which their series is taken at its word
+FEWEST = 8  # beats below which it says too little to be looked at
+TAPER = np.array([1.0, 1.0, 1.0, 0.5])  # of lags 0, 1, 2, 3 beats
+WHOLE = 0.9  # of the samples that most beats have: what a beat must have to count
+
+
+def beat_scores(
+    record: Recording, white: Array, sensitivity: Array, seen: npt.NDArray[np.bool_]
+) -> tuple[Array, float]:
+    """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], 0 where not ``seen``.
+
+    Also the share of all samples seen that lies in whole beats.
+    """
+    beat = _beats(record)
+    scores = np.zeros((int(beat[-1]) + 1, sensitivity.shape[2]))
+    np.add.at(scores, beat, np.einsum("tcp,tc->tp", sensitivity, white))
+    count = np.bincount(beat, weights=seen.any(axis=1))
+    whole = count >= WHOLE * np.median(count[count > 0])
+    return scores[whole], float(count[whole].sum() / count.sum())
+
+
+def beat_score_covariance(scores: Array, samples_used: float, absorbed: float) -> Array:
+    """Covariance [F, F] of the sum of all scores of a recording, from those of its B whole beats [B, F].
+
+    A fit to this recording alone makes its scores add up to zero, as if their mean had been taken off; of what the
+    taper sums, that loses the share sum_k taper_k (B - |k|) / B^2. Of a fit to several recordings this one bears the
+    part ``absorbed``. ``samples_used`` is the share of all samples that lies in whole beats.
+    """
+    beats = len(scores)
+    total, pairs = TAPER[0] * scores.T @ scores, TAPER[0] * beats
+    for lag, weight in enumerate(TAPER[1:], 1):
+        product = scores[lag:].T @ scores[:-lag]
+        total += weight * (product + product.T)
+        pairs += 2 * weight * (beats - lag)
+    value, axes = np.linalg.eigh(total / (1.0 - absorbed * pairs / beats**2) / samples_used)
+    return np.asarray((axes * np.maximum(value, 0.0)) @ axes.T)
+
+
+def without_mean_beat(record: Recording, white: Array, beats: int) -> Array:
+    """Residuals [T, C] less what repeats in every beat, of a recording with so many whole ``beats``; zeros stay.
+
+    What repeats is misfit of the model, which is no noise: it does not change from recording to recording.
+    """
+    if beats < FEWEST_MEAN:
+        return white
+    psi = 2 * np.pi * record.condition.flap_frequency * record.times[:, None] * np.arange(1, HARMONICS + 1)
+    basis = np.hstack([np.ones((len(psi), 1)), np.cos(psi), np.sin(psi)])
+    out = np.zeros_like(white)
+    for channel, values in enumerate(white.T):
+        seen = values != 0.0
+        mean = np.linalg.lstsq(basis[seen], values[seen], rcond=None)[0]
+        out[seen, channel] = (values[seen] - basis[seen] @ mean) * np.sqrt(beats / (beats - 1.0))
+    return out
+
+
+def _beats(record: Recording) -> npt.NDArray[np.int64]:
+    """Number [T] of the beat of each sample."""
+    beat = np.floor(record.times * record.condition.flap_frequency + 1e-6).astype(np.int64)
+    return np.asarray(beat - beat[0])
+
+
+def widening(beats: float) -> float:
+    """Factor on a variance that is known from so many beats only.
+
+    They tell it with about nu = B / sum_k taper_k^2 degrees of freedom, and what is divided by its root then follows
+    Student's t, whose variance is nu / (nu - 2).
+    """
+    freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())
+    return freedom / (freedom - 2.0)

@@ -1,0 +1,355 @@
+"""What comes out of a calibration on forces: estimates with their errors, a global model, agreements, predictions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.calibration.effects import absent, is_measured
+from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
+from wingfit.calibration.estimates.linearised import free_genes
+from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
+from wingfit.calibration.forces.beats import FEWEST_MEAN, without_mean_beat
+from wingfit.calibration.forces.global_model import at, average, fit_global
+from wingfit.calibration.forces.result import (
+    Agreement,
+    ForceComparison,
+    ForceResult,
+    GlobalModel,
+    LocalEstimate,
+    Quantity,
+    Source,
+)
+from wingfit.calibration.forces.split_beats import Cut
+from wingfit.calibration.plan import Stage, plan, prepared
+from wingfit.calibration.problem import Problem, base_genome, compared
+from wingfit.calibration.result import ADEQUATE, GeneResult
+from wingfit.calibration.search import found as found_by_stage
+from wingfit.calibration.spec import CalibrationSpec, resolved, vehicle_model
+from wingfit.records import Condition, Dataset, Genome, Recording
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Forces that a model predicts for a condition, over one beat and unfiltered.
+
+    ``phase`` [n] is t*; ``forces`` [n] in N per quantity; ``values`` the coefficients that follow from the condition;
+    ``remarks`` say where it extrapolates.
+    """
+
+    phase: Array
+    forces: Mapping[Quantity, Array]
+    values: Mapping[str, float]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A stage, what is known about the genome it found, and the estimate made of that."""
+
+    stage: Stage
+    genome: Genome
+    known: Uncertainty
+    estimate: LocalEstimate
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """One recording beside models: agreements, and the RMS difference (N) of the fitted axes by source.
+
+    ``scatter`` is the RMS of what does not repeat from beat to beat in these axes, the noise; None with too few beats.
+    """
+
+    recording: Recording
+    agreements: tuple[Agreement, ...]
+    rms: Mapping[Source, float]
+    samples: int
+    scatter: float | None
+
+
+@one_blas_thread
+def summarise_forces(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+) -> ForceResult:
+    """Judge what a calibration found on every recording of the dataset, the held-out ones too.
+
+    ``checkpoint`` is the last generation's. The global model is one of local estimates; a recording that was not fitted
+    is predicted by it or, without it, by the joint estimate or the average of the local ones.
+    """
+    spec = resolved(spec, dataset)
+    model, best = vehicle_model(dataset, spec), found_by_stage(spec, dataset, checkpoint)
+    judged = [
+        _judge(stage, model, base_genome(model, best[stage.name]), spec, evaluator)
+        for stage in plan(spec, dataset)
+        if stage.name in best
+    ]
+    law, remarks = _global(spec, dataset, [one.estimate for one in judged])
+    nominal = base_genome(model, spec.fixed)
+    everywhere = []
+    for recording in dataset.recordings:
+        genomes, warnings = _sources(spec, model, nominal, judged, law, recording)
+        everywhere.append(_compare(model, prepared(spec, recording), genomes, spec.axes))
+        remarks = (*remarks, *warnings)
+    lacking = [_lacking(one, everywhere) for one in judged]
+    remarks = (*remarks, *(remark for remark in lacking if remark), *_filtered_before(spec, dataset))
+    names = {name for one in judged for name in one.estimate.recordings}
+    left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
+    fitted = [one for one in everywhere if one.recording.name in names]
+    held_out = [one for one in everywhere if one.recording.name in dataset.held_out]
+    return ForceResult(
+        genes=_genes(model, nominal, judged, not any(lacking)),
+        estimates=tuple(one.estimate for one in judged),
+        global_model=law,
+        agreements=tuple(agreement for one in everywhere for agreement in one.agreements),
+        left_out=left_out,
+        held_out=dataset.held_out,
+        before=_rms(fitted, ("nominal",)) or np.nan,
+        after=_rms(fitted, ("local", "joint")) or np.nan,
+        held_out_before=_rms(held_out, ("nominal",)),
+        held_out_after=_rms(held_out, ("global", "joint", "average")),
+        remarks=tuple(dict.fromkeys((*remarks, *warnings))),
+    )
+
+
+@one_blas_thread
+def compare_forces(
+    spec: CalibrationSpec, dataset: Dataset, recording: str, source: Source, genome: Mapping[str, float]
+) -> ForceComparison:
+    """Forces of ``genome`` (full, by name) over a recording, low-passed as in the calibration."""
+    spec = resolved(spec, dataset)
+    model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+    return comparison(record, _observed(model, record, [base_genome(model, genome)])[0], source)
+
+
+@one_blas_thread
+def predict(
+    spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
+) -> Prediction:
+    """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it.
+
+    They are those of the vehicle: faults of the measurement that the calibration found are left out.
+    """
+    spec = resolved(spec, dataset)
+    model = vehicle_model(dataset, spec)
+    law = replace(law, genes=tuple(gene for gene in law.genes if not is_measured(gene.name)))
+    fixed = {name: value for name, value in spec.fixed.items() if not is_measured(name)}
+    values, remarks = _by_law(model, law, condition)
+    times = np.arange(points) / (points * condition.flap_frequency)
+    blank = Recording(
+        "prediction", "wind_tunnel", condition, times, (), np.full((points, 2), np.nan), forces=("x", "z")
+    )
+    forces = _observed(model, blank, [base_genome(model, fixed).replace(values)])[0]
+    phase = np.arange(points) / points
+    return Prediction(phase, quantities(blank, forces), values, remarks)
+
+
+def _by_law(
+    model: BladeElementWing, law: GlobalModel, condition: Condition
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Coefficients that the law gives under ``condition``, within their genes' boxes, and what must be known of them.
+
+    One that the law takes out of its box is held at its edge, with a remark.
+    """
+    found = at(law, condition)
+    values, remarks = dict(found.values), list(found.remarks)
+    for gene in model.genes:
+        if gene.name in values and not gene.lower <= values[gene.name] <= gene.upper:
+            held = min(max(values[gene.name], gene.lower), gene.upper)
+            remarks.append(
+                f"the global model gives {gene.name} = {values[gene.name]:.4g} here, outside [{gene.lower:g}, "
+                f"{gene.upper:g}]; {held:g} is taken: the condition is too far from those fitted to be believed"
+            )
+            values[gene.name] = held
+    return values, tuple(remarks)
+
+
+def _observed(model: BladeElementWing, recording: Recording, genomes: list[Genome]) -> Array:
+    """Forces [B, T, C] of ``genomes``; ValueError when one of them fails."""
+    observed = model.observe([genome.values for genome in genomes], recording)
+    for reason in observed.reasons:
+        if reason is not None:
+            raise ValueError(f"the forces under {recording.name!r} cannot be computed: {reason}")
+    return observed.channels
+
+
+def _judge(
+    stage: Stage, model: BladeElementWing, genome: Genome, spec: CalibrationSpec, evaluator: Evaluator
+) -> _Judged:
+    problem = Problem(model, stage.recordings, stage.free, genome, spec.axes)
+    known = uncertainty(problem, evaluator)
+    values = {name: genome[name] for name in stage.free}
+    last = next(iterate(problem, evaluator, values))
+    estimate = LocalEstimate(
+        name=stage.name,
+        recordings=tuple(recording.name for recording in stage.recordings),
+        values=values,
+        standard_errors=known.standard_errors,
+        correlation=tuple(tuple(row) for row in known.correlation.tolist()),
+        noise=tuple(tuple(tuple(row) for row in matrix.tolist()) for matrix in known.noise),
+        cost=known.cost,
+        converged=last.step <= STEP,
+        remarks=(
+            *at_bounds(free_genes(problem), values),
+            *absent(genome.as_dict(), stage.free),
+            *known.remarks,
+        ),
+    )
+    return _Judged(stage, genome, known, estimate)
+
+
+def _global(
+    spec: CalibrationSpec, dataset: Dataset, estimates: list[LocalEstimate]
+) -> tuple[GlobalModel | None, tuple[str, ...]]:
+    """Eq. 23 on local estimates; without one, why."""
+    if spec.mode != "local":
+        return None, ()
+    try:
+        law = fit_global(estimates, [dataset.recording(e.recordings[0]).condition for e in estimates])
+    except ValueError as error:
+        return None, (f"no global model: {error}",)
+    return law, law.remarks
+
+
+def _sources(
+    spec: CalibrationSpec,
+    model: BladeElementWing,
+    nominal: Genome,
+    judged: list[_Judged],
+    law: GlobalModel | None,
+    recording: Recording,
+) -> tuple[dict[Source, Genome], tuple[str, ...]]:
+    """Genomes to compare with ``recording``, and warnings about them."""
+    found: dict[Source, Genome] = {"nominal": nominal}
+    warnings: tuple[str, ...] = ()
+    for one in judged:
+        if spec.mode != "local":
+            found["joint"] = one.genome
+        elif recording.name in one.estimate.recordings:
+            found["local"] = one.genome
+    if law is not None:
+        values, said = _by_law(model, law, recording.condition)
+        found["global"] = nominal.replace(values)
+        warnings = tuple(f"recording {recording.name!r}: {remark}" for remark in said)
+    if spec.mode == "local":
+        found["average"] = nominal.replace(average([one.estimate for one in judged]))
+    return found, warnings
+
+
+def _compare(
+    model: BladeElementWing, recording: Recording, genomes: dict[Source, Genome], axes: tuple[str, ...]
+) -> _Compared:
+    forces = dict(zip(genomes, _observed(model, recording, list(genomes.values())), strict=True))
+    fitted = np.zeros(recording.values.shape, bool)
+    if set(axes) <= set(recording.forces):  # one that is only predicted may have others
+        fitted = compared(recording, axes)
+    differences = {source: (found - recording.values)[fitted] for source, found in forces.items()}
+    rms: dict[Source, float] = {s: float(np.sqrt(np.mean(d**2))) for s, d in differences.items() if d.size}
+    found = tuple(a for source, modelled in forces.items() for a in agreements(recording, modelled, source))
+    return _Compared(recording, found, rms, int(fitted.sum()), _scatter(recording, fitted))
+
+
+def _scatter(recording: Recording, fitted: npt.NDArray[np.bool_]) -> float | None:
+    beats = len(Cut.of(recording).gapless)
+    if beats < FEWEST_MEAN or not fitted.any():
+        return None
+    noise = without_mean_beat(recording, np.where(fitted, recording.values, 0.0), beats)
+    return float(np.sqrt(np.mean(noise[fitted] ** 2)))
+
+
+def _lacking(judged: _Judged, everywhere: list[_Compared]) -> str | None:
+    """A remark where an estimate leaves more than noise explains."""
+    mine = [c for c in everywhere if c.recording.name in judged.estimate.recordings and c.scatter is not None]
+    left = _rms(mine, ("local", "joint"))
+    if left is None:
+        return None
+    noise = np.sqrt(np.average([(c.scatter or 0.0) ** 2 for c in mine], weights=[c.samples for c in mine]))
+    if left <= ADEQUATE * noise:
+        return None
+    beside = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
+    return (
+        f"{judged.estimate.name}: the best coefficients leave {left * 1e3:.3g} mN, {beside}: the model or its motion "
+        f"lacks something ('wingfit effects' lists what can be added), or the search was cut short. Standard errors "
+        f"count on at most {ADEQUATE:g} times the scatter, so no coefficient is called told"
+    )
+
+
+def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
+    """RMS difference over all samples of the recordings, each beside the first source in ``order`` that it has.
+
+    None where no recording has the fitted axes.
+    """
+    told = [one for one in some if one.samples]
+    if not told:
+        return None
+    squares = [next((one.rms[s] for s in order if s in one.rms), np.nan) ** 2 * one.samples for one in told]
+    return float(np.sqrt(np.sum(squares) / sum(one.samples for one in told)))
+
+
+def _left_out(
+    model: BladeElementWing,
+    spec: CalibrationSpec,
+    dataset: Dataset,
+    nominal: Genome,
+    estimates: list[LocalEstimate],
+) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
+    """Agreements with each fitted recording of the law fitted without it, none where the rest is too little.
+
+    Also remarks on these laws.
+    """
+    found: list[Agreement] = []
+    remarks: list[str] = []
+    for one in estimates:
+        law, said = _global(spec, dataset, [other for other in estimates if other is not one])
+        if law is None:
+            remarks += [f"with a recording left out: {remark}" for remark in said]
+            continue
+        recording = prepared(spec, dataset.recording(one.recordings[0]))
+        values, said = _by_law(model, law, recording.condition)
+        remarks += [f"recording {recording.name!r} left out: {remark}" for remark in said]
+        found += agreements(recording, _observed(model, recording, [nominal.replace(values)])[0], "global")
+    return tuple(found), tuple(remarks)
+
+
+def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+    """Remarks on recordings to which the low-pass that was asked for was not applied."""
+    return tuple(
+        f"recording {recording.name!r} says that it has been low-passed at {recording.low_pass.cutoff:g} Hz; "
+        f"{spec.low_pass:g} Hz was not applied to it"
+        for recording in dataset.recordings
+        if spec.low_pass and recording.low_pass is not None and recording.low_pass.cutoff != spec.low_pass
+    )
+
+
+def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
+    """Genes with the mean of the estimates, the largest of their errors, and whether all can tell them."""
+    best = nominal.replace(average([one.estimate for one in judged]))
+    results = []
+    for gene in model.genes:
+        standings = [one.known.standing[gene.name] for one in judged if gene.name in one.known.standing]
+        free = [0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged]
+        results.append(
+            GeneResult(
+                gene.name,
+                gene.unit,
+                gene.description,
+                nominal[gene.name],
+                best[gene.name],
+                gene.lower,
+                gene.upper,
+                bool(standings),
+                max(s.standard_error for s in standings) if standings else None,
+                adequate and all(s.identifiable for s in standings) and all(free) if standings else None,
+                max(s.absolute for s in standings) if standings else None,
+            )
+        )
+    return tuple(results)

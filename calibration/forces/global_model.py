@@ -1,0 +1,249 @@
+"""Coefficients over the flight envelope: Eq. 23 of Armanini et al. 2016, with weights, checks and limits.
+
+The coefficients that vary are affine in flap frequency and body pitch, the others constant:
+
+    C_g(f, theta_b) = constant + per_hz f + per_rad theta_b.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from wingfit.calibration.forces.result import GlobalGene, GlobalModel, LocalEstimate
+from wingfit.records import Condition
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.atmosphere import density
+
+Array = npt.NDArray[np.float64]
+
+AFFINE = ("C_l", "C_F")
+FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
+FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the law, for its own scatter to be estimated
+SMALL = 0.05  # of the root mean square of a coefficient: errors of smaller values are relative to this
+WEATHER = 0.05  # relative; the density of the air differs by as much from day to day, and warns of nothing
+COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be told apart
+
+
+@dataclass(frozen=True)
+class GlobalValues:
+    """Coefficients at a condition, by name; ``remarks`` warn where the condition is not like those fitted."""
+
+    values: dict[str, float]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    coefficients: Array
+    scatter: float | None
+
+
+@one_blas_thread
+def fit_global(
+    estimates: Sequence[LocalEstimate],
+    conditions: Sequence[Condition],
+    affine: Sequence[str] = AFFINE,
+    *,
+    weighted: bool = True,
+) -> GlobalModel:
+    """Fit Eq. 23 to ``estimates``, each from one recording under the condition at the same place.
+
+    Least squares, each local coefficient weighted by 1 / (its squared standard error + the squared scatter of the law
+    itself). That scatter is what makes the weighted squared differences as large as their degrees of freedom (Paule and
+    Mandel 1982); without it a condition with many beats would rule the fit although the law, not the noise, limits it.
+    With fewer than FREE_FOR_SCATTER conditions to spare, or ``weighted`` False, all count the same, as in the source.
+
+    ValueError where the conditions are too few, or frequency and pitch cannot be told apart.
+    """
+    if len(estimates) != len(conditions):
+        raise ValueError(f"{len(estimates)} estimates need as many conditions, got {len(conditions)}")
+    frequency = np.array([condition.flap_frequency for condition in conditions])
+    pitch = np.array([condition.angle_of_attack for condition in conditions])
+    _refuse_untellable(frequency, pitch)
+    whole = np.stack([np.ones_like(frequency), frequency, pitch], axis=1)
+    names = [name for name in estimates[0].values if all(name in estimate.values for estimate in estimates)]
+    return GlobalModel(
+        genes=tuple(_gene(name, estimates, whole if name in affine else whole[:, :1], weighted) for name in names),
+        recordings=tuple(name for estimate in estimates for name in estimate.recordings),
+        conditions=tuple(conditions),
+        remarks=(*_few(len(estimates)), *_untold(names, estimates)),
+    )
+
+
+@one_blas_thread
+def at(model: GlobalModel, condition: Condition) -> GlobalValues:
+    """Evaluate the coefficients of ``model`` under ``condition``, with a warning where it extrapolates."""
+    f, pitch = condition.flap_frequency, condition.angle_of_attack
+    values = {gene.name: gene.constant + gene.per_hz * f + gene.per_rad * pitch for gene in model.genes}
+    return GlobalValues(values, _extrapolation(model, condition))
+
+
+def average(estimates: Sequence[LocalEstimate]) -> dict[str, float]:
+    """Mean of the local coefficients: the source's average model."""
+    return {name: float(np.mean([e.values[name] for e in estimates])) for name in estimates[0].values}
+
+
+def _refuse_untellable(frequency: Array, pitch: Array) -> None:
+    if len(frequency) < FEWEST:
+        raise ValueError(
+            f"a law in flap frequency and body pitch needs at least {FEWEST} conditions, got {len(frequency)}: "
+            f"calibrate on more recordings, or use the average of the coefficients"
+        )
+    for name, unit, x in (("flap frequency", "Hz", frequency), ("body pitch", "rad", pitch)):
+        if np.ptp(x) < 1e-6 * (1 + np.abs(x).max()):
+            raise ValueError(
+                f"the {name} is {x[0]:.4g} {unit} in all {len(x)} conditions, so its effect cannot be told; "
+                f"add a recording at another {name}, or use the average of the coefficients"
+            )
+    alike = float(np.corrcoef(frequency, pitch)[0, 1])
+    if abs(alike) > COLLINEAR:
+        raise ValueError(
+            f"flap frequency and body pitch change together (correlation {alike:.3f}; at most {COLLINEAR:g} can be "
+            f"told apart): add a recording with the same frequency at another pitch, or use the average"
+        )
+
+
+def _few(conditions: int) -> tuple[str, ...]:
+    if conditions >= 3 + FREE_FOR_SCATTER:
+        return ()
+    return (
+        f"{conditions} conditions: the law's own scatter cannot be told, so every condition counts the same; "
+        f"from {3 + FREE_FOR_SCATTER} on they are weighted by their standard errors",
+    )
+
+
+def _untold(names: Sequence[str], estimates: Sequence[LocalEstimate]) -> tuple[str, ...]:
+    """Remarks on coefficients that no condition tells even by their size."""
+    return tuple(
+        f"{name} is told under none of the conditions: its law says nothing"
+        for name in names
+        if all(e.standard_errors[name] >= abs(e.values[name]) for e in estimates)
+    )
+
+
+def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted: bool) -> GlobalGene:
+    """Fit one coefficient to ``design`` [n, 3] or, for a mean, [n, 1]."""
+    local = np.array([estimate.values[name] for estimate in estimates])
+    errors = np.array([estimate.standard_errors[name] for estimate in estimates])
+    told = np.isfinite(errors)
+    if told.sum() < design.shape[1]:  # nothing tells it: what was assumed, so that it still has a value
+        told = np.ones_like(told)
+    fit = _fit(design[told], local[told], errors[told], weighted)
+    off = np.abs(design @ fit.coefficients - local) / _sizes(local)
+    constant, per_hz, per_rad = (*fit.coefficients.tolist(), 0.0, 0.0)[:3]
+    left_out = [_left_out(int(k), design, local, errors, told, weighted) for k in np.flatnonzero(told)]
+    seen = [error for error in left_out if error is not None]
+    return GlobalGene(
+        name,
+        constant,
+        per_hz,
+        per_rad,
+        fit.scatter,
+        float(off[told].max()),
+        max(seen) if len(seen) == len(left_out) else None,
+    )
+
+
+def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> _Fit:
+    conditions, coefficients = design.shape
+    if not weighted or conditions - coefficients < FREE_FOR_SCATTER or not np.isfinite(errors).all():
+        return _Fit(_weighted(design, local, np.ones(conditions)), None)
+    scatter2 = _scatter2(design, local, errors**2)
+    return _Fit(_weighted(design, local, errors**2 + scatter2), float(np.sqrt(scatter2)))
+
+
+def _weighted(design: Array, local: Array, variance: Array) -> Array:
+    root = 1 / np.sqrt(variance)
+    return np.asarray(np.linalg.lstsq(design * root[:, None], local * root, rcond=None)[0])
+
+
+def _scatter2(design: Array, local: Array, variance: Array) -> float:
+    """Squared scatter of the law with which the weighted squares equal the degrees of freedom; at least 0."""
+    freedom = design.shape[0] - design.shape[1]
+    variance = np.maximum(variance, 1e-12 * float(np.mean(local**2)))
+
+    def surplus(scatter2: float) -> float:
+        total = variance + scatter2
+        left = local - design @ _weighted(design, local, total)
+        return float(np.sum(left**2 / total) - freedom)
+
+    if surplus(0.0) <= 0:
+        return 0.0
+    above = float(np.sum((local - local.mean()) ** 2)) + float(variance.max())
+    return float(brentq(surplus, 0.0, above, xtol=1e-12 * above))
+
+
+def _left_out(
+    k: int, design: Array, local: Array, errors: Array, told: npt.NDArray[np.bool_], weighted: bool
+) -> float | None:
+    """Relative error at condition ``k`` of the law fitted without it; None where the rest determines no law."""
+    rest = told.copy()
+    rest[k] = False
+    if rest.sum() < design.shape[1] or not _independent(design[rest]):
+        return None
+    found = _fit(design[rest], local[rest], errors[rest], weighted).coefficients
+    return float(abs(design[k] @ found - local[k]) / _sizes(local)[k])
+
+
+def _sizes(local: Array) -> Array:
+    """What errors are relative to: the coefficients, where they are not so small that nothing could be relative."""
+    least = SMALL * float(np.sqrt(np.mean(local**2)))
+    return np.maximum(np.abs(local), least if least > 0 else 1.0)
+
+
+def _independent(design: Array) -> bool:
+    scaled = (design[:, 1:] - design[:, 1:].mean(axis=0)) / np.maximum(np.ptp(design[:, 1:], axis=0), 1e-300)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return not len(values) or bool(values[-1] > np.sqrt((1 - COLLINEAR) / 2) * values[0])
+
+
+def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
+    """Say where ``condition`` lies outside those of ``model``: by one variable, or by combining the law's two.
+
+    Airspeed and density are not in the law, but the coefficients were found at theirs. The combination is judged by the
+    leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted bounds an ellipse around them (hidden
+    extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
+    """
+    f, pitch = condition.flap_frequency, condition.angle_of_attack
+    remarks = [
+        *_outside("flap frequency", "Hz", f, model.frequency_range),
+        *_outside("body pitch", "deg", pitch, model.pitch_range, scale=180 / np.pi),
+    ]
+    if not remarks and _leverage(model, f, pitch) > 1 + 1e-9:
+        remarks.append(
+            f"flap frequency {f:.4g} Hz and body pitch {np.degrees(pitch):.4g} deg are each within what was fitted, "
+            f"but no fitted condition combines them like that: an extrapolation"
+        )
+    rho = density(condition.pressure, condition.temperature)
+    remarks += _outside("airspeed", "m/s", condition.airspeed, model.airspeed_range)
+    remarks += _outside("air density", "kg/m^3", rho, model.density_range, slack=WEATHER)
+    return tuple(remarks)
+
+
+def _outside(
+    name: str, unit: str, value: float, fitted: tuple[float, float], *, scale: float = 1.0, slack: float = 0.0
+) -> list[str]:
+    """A remark when ``value`` (shown times ``scale``) is outside what was fitted by more than the share ``slack``."""
+    low, high = fitted
+    if low * (1 - slack) - 1e-9 <= value <= high * (1 + slack) + 1e-9:
+        return []
+    return [
+        f"{name} {scale * value:.4g} {unit} is outside [{scale * low:.4g}, {scale * high:.4g}] {unit}, "
+        f"where the coefficients were fitted: an extrapolation"
+    ]
+
+
+def _leverage(model: GlobalModel, f: float, pitch: float) -> float:
+    """Leverage of a condition over the largest leverage of those fitted."""
+    conditions = np.array([[c.flap_frequency, c.angle_of_attack] for c in model.conditions])
+    centre, spread = conditions.mean(axis=0), conditions.std(axis=0)
+    fitted = (conditions - centre) / spread
+    inner = np.linalg.inv(fitted.T @ fitted)
+    x = (np.array([f, pitch]) - centre) / spread
+    largest = float(np.einsum("ni,ij,nj->n", fitted, inner, fitted).max())
+    return float(x @ inner @ x) / largest

@@ -1,0 +1,160 @@
+"""What a calibration on forces hands out: coefficients condition by condition, a global model, and how well each fits.
+
+Plain data; :mod:`wingfit.calibration.forces.estimation` and :mod:`wingfit.calibration.forces.agreement` fill it. SI
+units, forces in N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.calibration.result import GeneResult
+from wingfit.records import Condition
+from wingfit.sim.atmosphere import density
+
+Array = npt.NDArray[np.float64]
+Source = Literal["nominal", "local", "joint", "global", "average"]
+Quantity = Literal["lift", "drag", "x", "z"]
+
+
+@dataclass(frozen=True)
+class LocalEstimate:
+    """Maximum-likelihood estimate on one recording, or on several together (Armanini et al. 2016, Eq. 22).
+
+    ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in
+    the order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per
+    recording. ``remarks`` say in words what the data cannot separate.
+    """
+
+    name: str
+    recordings: tuple[str, ...]
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    correlation: tuple[tuple[float, ...], ...]
+    noise: tuple[tuple[tuple[float, ...], ...], ...]
+    cost: float
+    converged: bool
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class GlobalGene:
+    """One coefficient over the conditions (Eq. 23): constant + per_hz f + per_rad theta_b; slopes 0 for a mean.
+
+    Attributes:
+        scatter: standard deviation of the local coefficients about the law beyond their standard errors; None where
+            the conditions are too few to tell, and every one of them counts the same.
+        largest_error: largest relative difference from a local estimate.
+        left_out_error: largest relative difference from a local estimate that the fit had not seen; None with too few
+            conditions.
+    """
+
+    name: str
+    constant: float
+    per_hz: float
+    per_rad: float
+    scatter: float | None
+    largest_error: float
+    left_out_error: float | None
+
+
+@dataclass(frozen=True)
+class GlobalModel:
+    """Coefficients as functions of flap frequency and body pitch, and the conditions to which they were fitted.
+
+    ``conditions`` are those of the ``recordings``.
+    """
+
+    genes: tuple[GlobalGene, ...]
+    recordings: tuple[str, ...]
+    conditions: tuple[Condition, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def frequency_range(self) -> tuple[float, float]:
+        """Smallest and largest flap frequency, Hz."""
+        return _range([c.flap_frequency for c in self.conditions])
+
+    @property
+    def pitch_range(self) -> tuple[float, float]:
+        """Smallest and largest body pitch, rad."""
+        return _range([c.angle_of_attack for c in self.conditions])
+
+    @property
+    def airspeed_range(self) -> tuple[float, float]:
+        """Smallest and largest airspeed, m/s."""
+        return _range([c.airspeed for c in self.conditions])
+
+    @property
+    def density_range(self) -> tuple[float, float]:
+        """Smallest and largest density of the air, kg/m^3."""
+        return _range([density(c.pressure, c.temperature) for c in self.conditions])
+
+
+def _range(values: list[float]) -> tuple[float, float]:
+    return min(values), max(values)
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How one model agrees with one recording in one quantity.
+
+    RMS difference and Pearson's correlation are over all samples of the whole beats; ``rmse_percent`` is relative to
+    the range (largest minus smallest) of the recorded mean beat; means are over whole beats. Of a constant force there
+    is neither percentage (NaN) nor correlation.
+    """
+
+    recording: str
+    source: Source
+    quantity: Quantity
+    rmse: float
+    rmse_percent: float
+    correlation: float
+    mean_recorded: float
+    mean_modelled: float
+
+
+@dataclass(frozen=True)
+class ForceResult:
+    """Outcome of a calibration on forces.
+
+    ``left_out`` are agreements of a global model fitted without the recording that it predicts. ``held_out`` names the
+    recordings that were never fitted. RMS differences in N of the fitted outputs, before (nominal) and after.
+    """
+
+    genes: tuple[GeneResult, ...]
+    estimates: tuple[LocalEstimate, ...]
+    global_model: GlobalModel | None
+    agreements: tuple[Agreement, ...]
+    left_out: tuple[Agreement, ...]
+    held_out: tuple[str, ...]
+    before: float
+    after: float
+    held_out_before: float | None
+    held_out_after: float | None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ForceComparison:
+    """Recorded and modelled forces of one recording over the beat, and their power spectra.
+
+    ``phase`` [n] is t*, in [0, 1); ``recorded`` and ``modelled`` map quantities to [n] in N (recorded: mean beat);
+    ``spread`` [n] is the standard deviation between beats. ``frequency`` [m] in Hz, spectra in N^2/Hz per quantity.
+    """
+
+    recording: str
+    source: Source
+    phase: Array
+    recorded: Mapping[Quantity, Array]
+    spread: Mapping[Quantity, Array]
+    modelled: Mapping[Quantity, Array]
+    frequency: Array
+    recorded_spectrum: Mapping[Quantity, Array]
+    modelled_spectrum: Mapping[Quantity, Array]
+    remarks: tuple[str, ...] = ()

@@ -1,0 +1,66 @@
+"""A recording of forces cut into beats, and into pieces for spectra."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Recording
+
+Array = npt.NDArray[np.float64]
+
+EDGE = 1e-6  # beats by which a sample may miss the start of a beat and still be its first
+
+
+@dataclass(frozen=True)
+class Cut:
+    """``beat`` [T] number of the beat of each sample; ``gapless`` [B] numbers of the whole beats without a gap."""
+
+    beat: Array
+    gapless: Array
+
+    @classmethod
+    def of(cls, recording: Recording) -> Cut:
+        """Cut ``recording``; ValueError when no whole beat is without a gap."""
+        f, times = recording.condition.flap_frequency, recording.times
+        step = float(np.median(np.diff(times)))
+        beat = np.floor(f * times + EDGE)
+        whole = np.arange(np.ceil(f * times[0] - EDGE), np.floor(f * (times[-1] + step) + EDGE))
+        broken = beat[~recording.valid.all(axis=1)]
+        gapless = whole[np.isin(whole, beat) & ~np.isin(whole, broken)]
+        if not len(gapless):
+            lasts = times[-1] - times[0] + step
+            why = (
+                f"each of its {len(whole)} whole beats lacks samples; fill the gaps of all force axes, record longer"
+                if len(whole)
+                else f"no beat of {1 / f:.4g} s begins and ends in its {lasts:.4g} s; record at least one, better ten"
+            )
+            raise ValueError(
+                f"recording {recording.name!r} holds no whole beat without a gap: {why}, or leave the recording out"
+            )
+        return cls(beat, gapless)
+
+
+def pieces(recording: Recording, beats: int) -> npt.NDArray[np.int64]:
+    """Samples [pieces, length] of stretches of ``beats`` beats without a gap, fewer where there is no longer stretch.
+
+    They lie end to end in each run of samples without a gap, wherever in the beat that begins: a periodic force has the
+    same spectrum from there. [0, 0] where no run holds a beat.
+    """
+    runs = _runs(np.flatnonzero(recording.valid.all(axis=1)))
+    longest = max((len(run) for run in runs), default=0)
+    step = float(np.median(np.diff(recording.times)))
+    per_beat = 1.0 / (recording.condition.flap_frequency * step)
+    # A beat of 12.5 samples may have 12 or 13 of them.
+    length = min(round(min(beats, int((longest + 1) / per_beat)) * per_beat), longest)
+    if not length:
+        return np.empty((0, 0), np.int64)
+    found = [run[: len(run) // length * length].reshape(-1, length) for run in runs]
+    return np.concatenate(found)
+
+
+def _runs(rows: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
+    """``rows`` [n], increasing, in runs without a step beyond one."""
+    return [run for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(run)]

@@ -1,0 +1,122 @@
+"""Where Gauss-Newton looks first for an effect that is switched off.
+
+At size zero the genes that say where an effect acts, and how, have no slope: nothing would move them until the size
+has moved, and a place that is far off may push that back to zero. But there they have no meaning either, so they may be
+moved for nothing: to where a small size, all other genes adapting, would lower the misfit most. The size stays zero,
+and the start simulates to what it did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from wingfit.calibration.effects import effect_of, sizes
+from wingfit.calibration.estimates.covariance import Noise, whitened_sensitivity
+from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, residuals_of, values_at
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.sim.effects.contract import Effect
+
+Array = npt.NDArray[np.float64]
+
+PLACES = 15  # tried of an effect, besides where it stands; a batch of two groups of lanes with a single size
+SMALL = 0.02  # of a size's box
+INDEPENDENT = 1e-10  # of the largest direction of what the other genes can do; the rest is round-off
+
+
+def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, int]:
+    """Start [F] in unit coordinates with effects at zero moved to the best place, and the individuals evaluated."""
+    effects = _movable(problem, unit)
+    if not effects:
+        return unit, 0
+    linear = linearise(problem, evaluator, unit)
+    weighed = _Weighed.of(problem, linear, [effect_of(name) not in effects for name in problem.free])
+    start, evaluated = unit.copy(), linear.evaluations
+    for effect in effects:
+        own = [k for k, name in enumerate(problem.free) if effect_of(name) is effect]
+        size = [k for k in own if problem.free[k] in sizes(effect)]
+        tried = _tried(unit, [k for k in own if k not in size])
+        batch = _small(size, unit, tried)
+        evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), batch), residuals=True)
+        evaluated += len(batch)
+        one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
+        gains = weighed.gains(evaluation, len(size), one_sided=one_sided)
+        start[own] = tried[int(np.argmax(gains))][own]
+    return start, evaluated
+
+
+@dataclass(frozen=True)
+class _Weighed:
+    """Whitened residuals at the start [N], and an orthonormal basis [N, O] of what the other genes can do to them."""
+
+    noise: list[Noise]
+    white: Array
+    others: Array
+
+    @classmethod
+    def of(cls, problem: Problem, linear: Linearised, which: list[bool]) -> _Weighed:
+        noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
+        white = np.concatenate([n.whitened(v).ravel() for n, v in zip(noise, linear.residuals, strict=True)])
+        slopes = [
+            whitened_sensitivity(n, s[:, :, which]).reshape(-1, sum(which))
+            for n, s in zip(noise, linear.sensitivities, strict=True)
+        ]
+        basis, power, _ = np.linalg.svd(np.concatenate(slopes), full_matrices=False)
+        return cls(noise, white, basis[:, power > INDEPENDENT * power.max(initial=0.0)])
+
+    def gains(self, evaluation: Evaluation, size: int, *, one_sided: bool) -> list[float]:
+        """What each place, a block of ``size`` individuals, takes from the sum of squares beyond the other genes."""
+        parts = zip(self.noise, residuals_of(evaluation), strict=True)
+        after = np.concatenate([n.whitened(v).reshape(len(v), -1) for n, v in parts], axis=1)
+        blocks = (after - self.white).reshape(-1, size, len(self.white))
+        failed = np.array([reason is not None for reason in evaluation.reasons]).reshape(-1, size)
+        return [
+            0.0 if bad.any() else self._gain(block, one_sided=one_sided)
+            for bad, block in zip(failed, blocks, strict=True)
+        ]
+
+    def _gain(self, changes: Array, *, one_sided: bool) -> float:
+        """Of one place; a size that can only grow takes nothing where it would have to shrink."""
+        left, own = self._rest(self.white), self._rest(changes.T)
+        own = own / np.maximum(np.linalg.norm(changes, axis=1), 1e-300)
+        best, *_ = np.linalg.lstsq(own, -left, rcond=INDEPENDENT)
+        if one_sided and best[0] < 0.0:
+            return 0.0
+        return float(left @ left - np.sum((left + own @ best) ** 2))
+
+    def _rest(self, vectors: Array) -> Array:
+        """What the other genes cannot do."""
+        return np.asarray(vectors - self.others @ (self.others.T @ vectors))
+
+
+def _movable(problem: Problem, unit: Array) -> list[Effect]:
+    """Effects at zero of which both a size and another gene are searched."""
+    genes = free_genes(problem)
+    genome = problem.base.as_dict() | dict(zip(problem.free, values_at(genes, unit[None])[0].tolist(), strict=True))
+    found = {effect.name: effect for name in problem.free if (effect := effect_of(name))}
+    movable = []
+    for effect in found.values():
+        mine = [name for name in problem.free if effect_of(name) is effect]
+        kinds = {name in sizes(effect) for name in mine}
+        if kinds == {True, False} and all(genome[name] == 0.0 for name in sizes(effect)):
+            movable.append(effect)
+    return movable
+
+
+def _tried(unit: Array, shape: list[int]) -> Array:
+    """The start [1 + PLACES, F], first as it is, then with its columns ``shape`` spread evenly over their boxes."""
+    tried = np.tile(unit, (1 + PLACES, 1))
+    tried[1:, shape] = qmc.Halton(len(shape), scramble=False).random(PLACES + 1)[1:]  # the first of all is a corner
+    return tried
+
+
+def _small(size: list[int], unit: Array, tried: Array) -> Array:
+    """Each of ``tried`` with each of S sizes moved a little into its box [P x S, F]."""
+    moves = np.array([SMALL if unit[k] + SMALL <= 1.0 else -SMALL for k in size])
+    batch = np.repeat(tried, len(size), axis=0)
+    batch[np.arange(len(batch)), np.tile(size, len(tried))] += np.tile(moves, len(tried))
+    return batch

@@ -1,0 +1,65 @@
+"""``wingfit campaign`` and ``wingfit balance``: the virtual rig and the virtual balance."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wingfit.cli.output import progress, say
+from wingfit.client.client import WingfitError
+
+
+def campaign(
+    out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip).")],
+    division: Annotated[str, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = "24",
+    small: Annotated[bool, typer.Option("--small", help="A few recordings instead of the whole campaign.")] = False,
+    seed: Annotated[int, typer.Option(help="Of the true genome, the noise and the gaps.")] = 1,
+) -> None:
+    """Write the thesis's experiment as a dataset, recorded on a simulated rig whose genome is known.
+
+    The true genome lies in a separate file beside the dataset, which a calibration never reads.
+
+    Example: wingfit campaign my-campaign --division 11 --small --seed 7
+    """
+    _refuse_existing(out)
+    from wingfit.sim.virtual_rigs.campaign import write_campaign  # compiled kernels wait until they are needed
+
+    try:
+        with progress("simulating the campaign") as report:
+            write_campaign(out, division=division, small=small, seed=seed, progress=report)
+    except ValueError as error:
+        raise WingfitError("no campaign written", str(error)) from error
+    _written(out)
+
+
+def balance(
+    out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip or .nc).")],
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 1,
+) -> None:
+    """Write the DelFly's wind-tunnel tests as a dataset of forces, recorded on a simulated balance.
+
+    The true coefficients lie in a separate file beside the dataset, which a calibration never reads.
+
+    Example: wingfit balance my-balance --seed 7
+    """
+    _refuse_existing(out)
+    from wingfit.sim.virtual_rigs.balance import write_campaign  # as above
+
+    try:
+        write_campaign(out, seed)
+    except ValueError as error:
+        raise WingfitError("no campaign written", str(error)) from error
+    _written(out)
+
+
+def _refuse_existing(out: Path) -> None:
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
+
+
+def _written(out: Path) -> None:
+    say(f"campaign written to {out}")
+    say(f"next: wingfit datasets upload {shlex.quote(str(out))}")

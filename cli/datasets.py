@@ -1,0 +1,155 @@
+"""``wingfit datasets``: upload, look at and check recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wingfit.cli.output import AsJson, Url, moment, number, print_json, progress, say, table
+from wingfit.client import answers as a
+from wingfit.client.client import DEFAULT_URL, Client, WingfitError
+
+app = typer.Typer(no_args_is_help=True, help="Upload, list, fetch, delete and check datasets.")
+
+DatasetId = Annotated[str, typer.Argument(help="Id of a dataset, from 'wingfit datasets list'.")]
+Source = Annotated[Path, typer.Argument(help="Folder with dataset.yaml, a .zip of it, or a .nc file.")]
+
+
+@app.command("list")
+def list_(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
+    """List the datasets on the server.
+
+    Example: wingfit datasets list
+    """
+    with Client(url) as client:
+        datasets = client.datasets()
+    if as_json:
+        print_json(datasets)
+        return
+    rows = [
+        [d["id"], d["name"], str(len(d["recordings"])), size(d["size_bytes"]), moment(d["created_at"])]
+        for d in datasets
+    ]
+    table(
+        ["id", "name", ">recordings", ">size", "uploaded"],
+        rows,
+        "no datasets; upload one: wingfit datasets upload",
+    )
+
+
+@app.command()
+def upload(
+    path: Source,
+    name: Annotated[str | None, typer.Option(help="Name on the server; default: the dataset's own.")] = None,
+    url: Url = DEFAULT_URL,
+    as_json: AsJson = False,
+) -> None:
+    """Upload a dataset; a folder is zipped first.
+
+    Example: wingfit datasets upload examples/robird
+    """
+    with Client(url) as client, progress("uploading") as report:
+        dataset = client.upload_dataset(
+            path, name=name, on_bytes=lambda sent, total: report(sent / max(total, 1), note=size(total))
+        )
+    if as_json:
+        print_json(dataset)
+        return
+    say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
+    say(f"next: wingfit runs submit {dataset['id']} --watch")
+
+
+@app.command()
+def show(dataset_id: DatasetId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
+    """Show one dataset with its recordings and their conditions.
+
+    Example: wingfit datasets show ID
+    """
+    with Client(url) as client:
+        dataset = client.dataset(dataset_id)
+    if as_json:
+        print_json(dataset)
+        return
+    say(f"{dataset['name']}  {dataset['id']}")
+    say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
+    if dataset["description"]:
+        say(dataset["description"])
+    angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
+    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", f">{angle}", ">pressure", ">airspeed"]
+    table(columns, [_row(r) for r in dataset["recordings"]])
+
+
+@app.command()
+def download(
+    dataset_id: DatasetId,
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write to.")] = Path(),
+    url: Url = DEFAULT_URL,
+) -> None:
+    """Fetch the bytes that were uploaded.
+
+    Example: wingfit datasets download ID -o robird.zip
+    """
+    with Client(url) as client, progress("downloading") as report:
+        target = client.download(dataset_id, output, on_bytes=lambda got, total: report(got / total if total else None))
+    say(str(target))
+
+
+@app.command()
+def delete(dataset_id: DatasetId, url: Url = DEFAULT_URL) -> None:
+    """Delete a dataset; delete the runs that refer to it first.
+
+    Example: wingfit datasets delete ID
+    """
+    with Client(url) as client:
+        client.delete_dataset(dataset_id)
+    say(f"dataset {dataset_id} deleted")
+
+
+@app.command()
+def check(path: Source) -> None:
+    """Check a dataset on this machine, without a server.
+
+    Example: wingfit datasets check my-campaign/
+    """
+    from wingfit.records import load_dataset  # imports wait until they are needed
+
+    try:
+        dataset = load_dataset(path)
+    except ValueError as error:
+        faults = [vars(fault) for fault in getattr(error, "errors", [])]
+        detail = f"{len(faults)} errors" if faults else str(error)
+        raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
+    what = "wing" if dataset.kind == "tracks" else "vehicle"
+    say(f"{path} is valid: '{dataset.name}', {what} '{dataset.rig.name}'")
+    rows = [
+        [
+            r.name,
+            r.rig,
+            "held out" if r.name in dataset.held_out else "fitted",
+            str(len(r.times)),
+            f"{100 * float((~r.valid).mean()) if r.valid.size else 0:.1f} %",
+        ]
+        for r in dataset.recordings
+    ]
+    table(["recording", "rig", "use", ">frames", ">missing"], rows)
+
+
+def size(count: int) -> str:
+    """Bytes as kB or MB."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
+def _row(r: a.RecordingInfo) -> list[str]:
+    return [
+        r["name"],
+        r["rig"],
+        "held out" if r["held_out"] else "fitted",
+        str(r["frames"]),
+        f"{r['missing_percent']:.1f} %",
+        number(r["flap_frequency_hz"], unit="Hz"),
+        number(r["angle_of_attack_deg"] if r["channels"] else r["phase_lag_deg"], unit="deg"),
+        number(r["pressure_mbar"], unit="mbar"),
+        number(r["airspeed_m_s"], unit="m/s"),
+    ]

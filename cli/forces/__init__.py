@@ -1,0 +1,1 @@
+"""Commands about forces: results of force runs, kinematics, free flight."""

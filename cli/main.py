@@ -1,0 +1,62 @@
+"""The command line: ``wingfit serve | datasets | runs | simulate | models | effects``, and what prepares data.
+
+Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a wrong use of the command, 130 Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from wingfit.cli import backup, campaigns, datasets, diagnose, effects, keys, runs, serve, simulate
+from wingfit.cli.forces import free_flight, kinematics
+from wingfit.cli.forces import runs as force_runs
+from wingfit.cli.output import note
+from wingfit.client.client import WingfitError
+
+ERROR = 1
+
+app = typer.Typer(
+    name="wingfit",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Calibrate flapping-wing simulations on recordings of markers or of forces, and find what they left out.",
+    epilog="Example: wingfit serve, then wingfit datasets upload examples/robird",
+)
+app.command()(serve.serve)
+app.command()(campaigns.campaign)
+app.command()(campaigns.balance)
+app.command()(kinematics.kinematics)
+app.command()(free_flight.forces)
+app.add_typer(datasets.app, name="datasets")
+app.add_typer(runs.app, name="runs")
+app.command()(diagnose.diagnose)
+app.add_typer(diagnose.app, name="diagnoses")
+app.command()(simulate.simulate)
+app.command()(force_runs.models)
+app.command()(effects.effects)
+app.add_typer(keys.app, name="keys")
+app.command()(backup.backup)
+app.command()(backup.restore)
+
+
+def main() -> None:
+    """Run the command line; expected failures end as a message, not as a traceback."""
+    try:
+        app()
+    except WingfitError as error:
+        note(f"error: {error}")
+        sys.exit(ERROR)
+    except BrokenPipeError:
+        # The reader of the pipe has gone (as with "| head"); Python would complain again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(ERROR)
+    except OSError as error:
+        note(f"error: {error}")
+        sys.exit(ERROR)
+
+
+if __name__ == "__main__":
+    main()

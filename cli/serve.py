@@ -1,0 +1,47 @@
+"""``wingfit serve``: the server."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wingfit.client.client import WingfitError
+
+
+def serve(
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the database; default: $WINGFIT_DATA or ./wingfit-data.")
+    ] = None,
+    host: Annotated[str | None, typer.Option(help="Address to listen on; default 127.0.0.1.")] = None,
+    port: Annotated[int | None, typer.Option(help="TCP port; default 8321; 0 takes a free one.")] = None,
+    evaluator: Annotated[str | None, typer.Option(help="ray (default), processes or in_process.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes; default: one per core.")] = None,
+    ray_address: Annotated[str | None, typer.Option(help="A standing Ray cluster; default: start one.")] = None,
+) -> None:
+    """Serve the API and the page until Ctrl-C; runs under way go on at the next start.
+
+    Example: wingfit serve --data ~/wingfit-data --port 8321
+    """
+    from wingfit.service.server import ServeError  # the web framework waits until it is needed
+    from wingfit.service.server import serve as run_server
+    from wingfit.service.settings import Settings, SettingsError
+
+    chosen = {
+        "WINGFIT_DATA": data,
+        "WINGFIT_HOST": host,
+        "WINGFIT_PORT": port,
+        "WINGFIT_EVALUATOR": evaluator,
+        "WINGFIT_WORKERS": workers,
+        "WINGFIT_RAY_ADDRESS": ray_address,
+    }
+    try:
+        settings = Settings.from_env(dict(os.environ) | {k: str(v) for k, v in chosen.items() if v is not None})
+    except SettingsError as error:
+        raise typer.BadParameter(str(error)) from error
+    try:
+        run_server(settings)
+    except ServeError as error:
+        raise WingfitError("the server does not start", str(error)) from error

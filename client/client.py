@@ -1,0 +1,334 @@
+"""Python client of the wingfit server.
+
+>>> client = Client()                                               # doctest: +SKIP
+>>> dataset = client.upload_dataset("examples/robird")              # doctest: +SKIP
+>>> run = client.submit_run(dataset["id"], division="11")           # doctest: +SKIP
+>>> client.wait(run["id"], on_progress=lambda run: print(run["progress"]))  # doctest: +SKIP
+>>> client.result(run["id"])["after_mm"]                            # doctest: +SKIP
+
+Answers are plain dicts, typed in :mod:`wingfit.client.answers`. Every failure is a :class:`WingfitError`.
+"""
+
+from __future__ import annotations
+
+import io
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal, cast
+
+import httpx
+
+from wingfit.client import answers as a
+from wingfit.client import force_answers as f
+from wingfit.client.diagnosis_client import DiagnosisCalls
+from wingfit.client.effect_answers import Effect
+from wingfit.client.key_client import KeyCalls
+from wingfit.client.transport import (
+    DEFAULT_URL,
+    CountedFile,
+    Format,
+    OnBytes,
+    ServerAwayError,
+    WingfitError,
+    given,
+    part,
+    zip_folder,
+)
+
+__all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
+
+OnRun = Callable[[a.Run], None]
+
+
+class Client(DiagnosisCalls, KeyCalls):
+    """Talks to one server; usable as a context manager."""
+
+    def health(self) -> a.Health:
+        """Ask whether the server is up, for its version, evaluator and load."""
+        return cast(a.Health, self._json("GET", "/v1/health"))
+
+    def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
+        """Write a checked copy of everything on the server to ``path``, as :meth:`download` does.
+
+        Only its owner can read the file.
+        """
+        return self._file("/v1/backup", Path(path), "wingfit.sqlite3", on_bytes, private=True)
+
+    # -- datasets ------------------------------------------------------------
+
+    def upload_dataset(
+        self, path: str | Path, *, name: str | None = None, on_bytes: OnBytes | None = None
+    ) -> a.Dataset:
+        """Upload a dataset: a zip, a NetCDF file, or a folder, which is zipped first.
+
+        ``on_bytes(sent, total)`` is called as the bytes go out.
+        """
+        source = Path(path)
+        if not source.exists():
+            raise WingfitError("no such dataset", f"{source} does not exist; give a folder, a .zip or a .nc file")
+        with TemporaryDirectory(prefix="wingfit-") as scratch:
+            archive = zip_folder(source, Path(scratch) / f"{source.resolve().name}.zip") if source.is_dir() else source
+            key = str(uuid.uuid4())
+
+            def send() -> httpx.Response:
+                with CountedFile(archive, on_bytes) as stream:
+                    return self._http.post(
+                        "/v1/datasets",
+                        files={"file": (archive.name, cast(io.BufferedReader, stream))},
+                        data={"name": name} if name else {},
+                        headers={"Idempotency-Key": key},
+                    )
+
+            return cast(a.Dataset, self._repeat(send).json())
+
+    def datasets(self) -> list[a.Dataset]:
+        """List all datasets, newest first."""
+        return cast(list[a.Dataset], self._all("/v1/datasets"))
+
+    def dataset(self, dataset_id: str) -> a.Dataset:
+        """Fetch one dataset with its recordings."""
+        return cast(a.Dataset, self._json("GET", f"/v1/datasets/{part(dataset_id)}"))
+
+    def download(self, dataset_id: str, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
+        """Write the bytes that were uploaded to ``path``; into a folder under the server's name for them.
+
+        ``on_bytes(received, total)`` is called as they come in; total is 0 where the server does not say.
+        """
+        return self._file(f"/v1/datasets/{part(dataset_id)}/archive", Path(path), f"{dataset_id}.zip", on_bytes)
+
+    def delete_dataset(self, dataset_id: str) -> None:
+        """Delete a dataset; the server refuses while runs refer to it."""
+        self._call("DELETE", f"/v1/datasets/{part(dataset_id)}")
+
+    # -- runs ----------------------------------------------------------------
+
+    def submit_run(self, dataset_id: str, **spec: Any) -> a.Run:
+        """Submit a calibration.
+
+        ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
+        name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
+        peel_width_beats. What is left out takes the server's default.
+        """
+        return cast(a.Run, self._json("POST", "/v1/runs", json=_body(dataset_id, spec), key=str(uuid.uuid4())))
+
+    def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
+        """What :meth:`submit_run` would submit, or the error that it would raise; nothing is stored."""
+        return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=_body(dataset_id, spec)))
+
+    def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
+        """List all runs, newest first, optionally of one dataset or in one state."""
+        return cast(list[a.Run], self._all("/v1/runs", dataset_id=dataset_id, state=state))
+
+    def run(self, run_id: str) -> a.Run:
+        """Fetch one run with its progress."""
+        return cast(a.Run, self._json("GET", _run(run_id)))
+
+    def cancel(self, run_id: str) -> a.Run:
+        """Stop a run for good; what it has found so far stays."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/cancel"))
+
+    def pause(self, run_id: str) -> a.Run:
+        """Stop a run after its current generation."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/pause"))
+
+    def resume(self, run_id: str) -> a.Run:
+        """Go on with a paused run."""
+        return cast(a.Run, self._json("POST", f"{_run(run_id)}/resume"))
+
+    def delete_run(self, run_id: str) -> None:
+        """Delete a run that has ended."""
+        self._call("DELETE", _run(run_id))
+
+    def history(self, run_id: str, *, after: int | None = None) -> list[a.HistoryItem]:
+        """Fetch the generations so far, those after sequence number ``after``."""
+        items: list[Any] = []
+        while True:
+            page = self._json("GET", f"{_run(run_id)}/history", params=given(after=after, limit=1000))["items"]
+            items += page
+            if not page or page[-1]["sequence"] == after:
+                return cast(list[a.HistoryItem], items)
+            after = page[-1]["sequence"]
+
+    def export_run(
+        self,
+        run_id: str,
+        format: Format,  # noqa: A002
+        path: str | Path,
+        *,
+        on_bytes: OnBytes | None = None,
+    ) -> Path:
+        """Write a run to ``path``, as :meth:`download` does.
+
+        ``format``: json for all of it, csv for its history, netcdf for history, genome, and every recording simulated.
+        """
+        return self._export(_run(run_id), format, Path(path), run_id, on_bytes)
+
+    def genome(self, run_id: str) -> a.GenomeInfo:
+        """Fetch the best genome so far, beside the nominal one, with units and bounds."""
+        return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
+
+    def result(self, run_id: str) -> a.Result | f.ForceResult:
+        """Fetch misfits before and after and the genes of a finished run; ``kind`` says of tracks or of forces."""
+        return cast("a.Result | f.ForceResult", self._json("GET", f"{_run(run_id)}/result"))
+
+    def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
+        """Fetch recorded and modelled forces of one recording over the beat; ``source`` says whose coefficients."""
+        params = given(recording=recording, source=source)
+        return cast(f.Forces, self._json("GET", f"{_run(run_id)}/forces", params=params, timeout=self.simulating))
+
+    def predict(
+        self,
+        run_id: str,
+        *,
+        flap_frequency_hz: float,
+        body_pitch_deg: float,
+        airspeed_m_s: float,
+        pressure_mbar: float | None = None,
+        temperature_c: float | None = None,
+    ) -> f.Prediction:
+        """Predict the forces over a beat under any condition, from the global model of a finished run."""
+        condition: dict[str, float] = {
+            "flap_frequency_hz": flap_frequency_hz,
+            "body_pitch_deg": body_pitch_deg,
+            "airspeed_m_s": airspeed_m_s,
+        } | given(pressure_mbar=pressure_mbar, temperature_c=temperature_c)
+        return cast(f.Prediction, self._simulated(f"{_run(run_id)}/predictions", condition))
+
+    def models(self) -> f.Models:
+        """List the blade-element models of vehicles and their terms."""
+        return cast(f.Models, self._json("GET", "/v1/models"))
+
+    def effects(self) -> list[Effect]:
+        """List the effects that a run or a simulation can include."""
+        return cast(list[Effect], self._json("GET", "/v1/effects")["effects"])
+
+    def effect(self, name: str) -> Effect:
+        """Fetch one effect."""
+        return cast(Effect, self._json("GET", f"/v1/effects/{part(name)}"))
+
+    def comparison(
+        self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
+    ) -> a.Comparison:
+        """Fetch recorded and simulated markers of one recording."""
+        params = given(recording=recording, genome=genome)
+        return cast(
+            a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params, timeout=self.simulating)
+        )
+
+    def loads(
+        self,
+        run_id: str,
+        recording: str | None = None,
+        genome: Literal["best", "nominal"] = "best",
+        outputs: Sequence[str] | None = None,
+    ) -> a.Loads:
+        """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
+        params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
+        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+
+    def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
+        return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
+
+    def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
+        """Yield the server-sent events of a run until its final state.
+
+        A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
+        without a server.
+        """
+        return self._events(_run(run_id), lambda: self.run(run_id), last_event_id, patience_s)
+
+    def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
+        """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
+        return self._wait(_run(run_id), lambda: self.run(run_id), on_progress, patience_s)
+
+    def simulate(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        division: str = "11",
+        genome: Mapping[str, float] | None = None,
+        accuracy_mm: float | None = None,
+        outputs: bool | Sequence[str] = False,
+        effects: Sequence[str] = (),
+    ) -> a.Simulation:
+        """Simulate one recording of a wing; genes not named in ``genome`` keep their nominal value.
+
+        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; without it the server's, 0.1.
+        ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
+        power, energy, averages.
+        """
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "division": division,
+            "genome": dict(genome or {}),
+            "outputs": outputs if isinstance(outputs, bool) else list(outputs),
+            "effects": list(effects),
+        } | given(accuracy_mm=accuracy_mm)
+        return cast(a.Simulation, self._simulated("/v1/simulations", body))
+
+    def simulate_forces(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        genome: Mapping[str, float] | None = None,
+        preset: str = "proposed",
+        without: Sequence[str] = (),
+        low_pass_hz: float | None = None,
+        peel_width_beats: float = 0.0,
+        effects: Sequence[str] = (),
+    ) -> f.ForceSimulation:
+        """Compute the forces of one recording of a vehicle; genes not named in ``genome`` keep their nominal value.
+
+        ``preset`` and the terms ``without`` which it is computed are those of :meth:`models`; ``low_pass_hz`` filters
+        recorded and modelled forces: None at 3.2 times the flap frequency, 0 not at all.
+        """
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "genome": dict(genome or {}),
+            "preset": preset,
+            "without": list(without),
+            "peel_width_beats": peel_width_beats,
+            "effects": list(effects),
+        } | given(low_pass_hz=low_pass_hz)
+        return cast(f.ForceSimulation, self._simulated("/v1/simulations", body))
+
+    def loads_under(
+        self,
+        dataset_id: str,
+        recording: str,
+        *,
+        condition: Mapping[str, float] | None = None,
+        division: str = "11",
+        genome: Mapping[str, float] | None = None,
+        accuracy_mm: float | None = None,
+        outputs: Sequence[str] | None = None,
+        effects: Sequence[str] = (),
+    ) -> a.Loads:
+        """Simulate a genome for its loads, where ``condition`` may change the recording's.
+
+        Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
+        """
+        body = {
+            "dataset_id": dataset_id,
+            "recording": recording,
+            "condition": dict(condition or {}),
+            "division": division,
+            "genome": dict(genome or {}),
+            "outputs": True if outputs is None else list(outputs),
+            "effects": list(effects),
+        } | given(accuracy_mm=accuracy_mm)
+        return cast(a.Loads, self._simulated("/v1/loads", body))
+
+
+def _body(dataset_id: str, spec: Mapping[str, Any]) -> dict[str, Any]:
+    return {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
+
+
+def _run(run_id: str) -> str:
+    return f"/v1/runs/{part(run_id)}"

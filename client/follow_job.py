@@ -1,0 +1,80 @@
+"""Follows a job on the server through its events, over lost connections, until it ends."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar, cast
+
+import httpx
+
+from wingfit.client import answers as a
+from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.transport import ServerAwayError, Transport, WingfitError, is_passing
+
+JobT = TypeVar("JobT", a.Run, Diagnosis)
+
+# What a run counts its steps in, and a diagnosis.
+COUNTS = {"generation": "generations", "step": "steps"}
+KEPT = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
+
+
+class Watching(Transport):
+    """A server whose jobs can be followed."""
+
+    def _events(
+        self, path: str, fetch: Callable[[], JobT], last_event_id: str | None, patience_s: float
+    ) -> Iterator[a.Event]:
+        """The events of the job at ``path`` until its final state."""
+        away_since: float | None = None
+        while True:
+            try:
+                for event in self._events_once(f"{path}/events", last_event_id):
+                    away_since = None
+                    last_event_id = event["id"] or last_event_id
+                    yield event
+                    if _is_final(event):
+                        return
+                job = fetch()  # the stream ended early, or resumed after the final state
+                if job["state"] in a.FINAL:
+                    yield {"id": None, "event": "state", "data": dict(job)}
+                    return
+            except (httpx.TransportError, WingfitError) as error:
+                if isinstance(error, WingfitError) and not is_passing(error):
+                    raise
+                away_since = away_since or time.monotonic()
+                if time.monotonic() - away_since > patience_s:
+                    raise ServerAwayError(self.base_url, error) from error
+            time.sleep(self.retry_wait_s)
+
+    def _wait(
+        self, path: str, fetch: Callable[[], JobT], on_progress: Callable[[JobT], None] | None, patience_s: float
+    ) -> JobT:
+        """The job when it has ended; ``on_progress`` gets it after each change."""
+        job = fetch()
+        report = on_progress or (lambda _: None)
+        report(job)
+        if job["state"] in a.FINAL:
+            return job
+        for event in self._events(path, fetch, None, patience_s):
+            job = merge(job, event)
+            report(job)
+        return job
+
+
+def merge(job: JobT, event: a.Event) -> JobT:
+    """Return the job as it stands after ``event``."""
+    data = event["data"]
+    if event["event"] == "state":
+        return cast(JobT, dict(job) | data)
+    count = COUNTS.get(event["event"])
+    now: Mapping[str, Any] = job
+    # After a reconnection the server repeats what the job already counts.
+    if count is None or data["sequence"] <= now[count]:
+        return job
+    known = {key: data[key] for key in KEPT if key in data}
+    return cast(JobT, dict(job) | known | {count: data["sequence"]})
+
+
+def _is_final(event: a.Event) -> bool:
+    return event["event"] == "state" and event["data"].get("state") in a.FINAL

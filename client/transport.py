@@ -1,0 +1,328 @@
+"""The way to the server: retries, server-sent events, problem details as exceptions, folders as archives."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import math
+import os
+import time
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Self
+from urllib.parse import quote
+
+import httpx
+
+from wingfit.client import answers as a
+from wingfit.records.files.permissions import open_new
+
+DEFAULT_URL = "http://127.0.0.1:8321"
+KEY_VARIABLE = "WINGFIT_API_KEY"
+LOOPBACK = {"127.0.0.1", "localhost", "::1"}
+# A fixed time stamp makes the archive of an unchanged folder the same bytes, hence the same digest.
+ZIP_TIME = (1980, 1, 1, 0, 0, 0)
+SENT_TWICE_IS_HARMLESS = {"GET", "DELETE"}
+
+OnBytes = Callable[[int, int], None]
+Format = Literal["json", "csv", "netcdf"]
+ENDINGS: dict[Format, str] = {"json": ".json", "csv": ".csv", "netcdf": ".nc"}
+
+
+class WingfitError(Exception):
+    """What the server (or the way to it) answered instead of a result.
+
+    Attributes:
+        status: HTTP status, or None when no answer came.
+        title: short name of the problem.
+        detail: the server's own explanation.
+        errors: for invalid input, where it is wrong: ``{"where", "value", "message"}`` each.
+
+    """
+
+    def __init__(
+        self,
+        title: str,
+        detail: str = "",
+        *,
+        status: int | None = None,
+        errors: list[dict[str, Any]] | None = None,
+    ) -> None:
+        self.title, self.detail, self.status, self.errors = title, detail, status, errors or []
+        super().__init__(title, detail)
+
+    def __str__(self) -> str:
+        # The server's titles are the names of HTTP statuses; its details say all that they say.
+        titled = self.status is None and self.detail
+        head = f"{self.title}: {self.detail}" if titled else self.detail or self.title
+        return "\n".join([head, *(f"  {_described(error)}" for error in self.errors)])
+
+
+class ServerAwayError(WingfitError):
+    """No server answered at the address."""
+
+    def __init__(self, base_url: str, cause: Exception) -> None:
+        self.base_url = base_url
+        super().__init__(
+            f"no wingfit server answers at {base_url}",
+            f"{_reason(cause)}. Start one with 'wingfit serve', or name another with --url or WINGFIT_URL.",
+        )
+
+
+class Transport:
+    """Sends requests to one server.
+
+    ``retries`` is how often a call is repeated when the connection fails or the server says 502, 503 or 504.
+    A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
+    Answers that the server simulates for may take ``simulating_s``: one given up too early would be computed again.
+    ``api_key`` is by default that of the environment (``WINGFIT_API_KEY``).
+    """
+
+    def __init__(
+        self,
+        base_url: str = DEFAULT_URL,
+        *,
+        api_key: str | None = None,
+        timeout_s: float = 60.0,
+        simulating_s: float = 600.0,
+        retries: int = 2,
+        retry_wait_s: float = 0.3,
+    ) -> None:
+        self.base_url = base_url.rstrip("/")
+        self.retries, self.retry_wait_s = retries, retry_wait_s
+        self.simulating = httpx.Timeout(timeout_s, read=simulating_s)
+        try:
+            url = httpx.URL(self.base_url)
+        except httpx.InvalidURL as error:
+            raise WingfitError("bad server address", f"{base_url!r}: {error}") from error
+        if url.scheme not in ("http", "https") or not url.host:
+            raise WingfitError("bad server address", f"{base_url!r}; it must look like {DEFAULT_URL}")
+        # A proxy from the environment must not catch calls to a server on this machine.
+        self._http = httpx.Client(
+            base_url=self.base_url,
+            timeout=timeout_s,
+            trust_env=url.host not in LOOPBACK,
+            headers=_authorization(api_key or os.environ.get(KEY_VARIABLE, "").strip()),
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connections."""
+        self._http.close()
+
+    def _json(self, method: str, path: str, **options: Any) -> Any:
+        return self._call(method, path, **options).json()
+
+    def _call(self, method: str, path: str, *, key: str | None = None, **options: Any) -> httpx.Response:
+        headers = {"Idempotency-Key": key} if key else {}
+        if "json" in options:
+            _refuse_not_finite(options["json"])
+        safe = key is not None or method in SENT_TWICE_IS_HARMLESS
+        return self._repeat(lambda: self._http.request(method, path, headers=headers, **options), safe=safe)
+
+    def _repeat(self, send: Callable[[], httpx.Response], *, safe: bool = True) -> httpx.Response:
+        """Send, again after passing failures; when not ``safe``, only if the request reached no server."""
+        for attempt in range(self.retries + 1):
+            last = attempt == self.retries
+            try:
+                response = send()
+            except httpx.TransportError as error:
+                if last or not (safe or isinstance(error, httpx.ConnectError)):
+                    raise ServerAwayError(self.base_url, error) from error
+            else:
+                if last or not safe or response.status_code not in (502, 503, 504):
+                    return _checked(response)
+            time.sleep(self.retry_wait_s * 2**attempt)
+        raise AssertionError("unreachable")
+
+    def _all(self, path: str, **filters: str | None) -> list[Any]:
+        items: list[Any] = []
+        cursor: str | None = None
+        while True:
+            page = self._json("GET", path, params=given(cursor=cursor, **filters))
+            items += page["items"]
+            cursor = page["next_cursor"]
+            if not cursor:
+                return items
+
+    @contextlib.contextmanager
+    def _stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
+        try:
+            context = self._http.stream(method, path, **options)
+            response = context.__enter__()
+        except httpx.TransportError as error:
+            raise ServerAwayError(self.base_url, error) from error
+        try:
+            if response.is_error:
+                response.read()
+            yield _checked(response)
+        finally:
+            context.__exit__(None, None, None)
+
+    def _file(
+        self, path: str, target: Path, name: str, on_bytes: OnBytes | None, *, private: bool = False, **options: Any
+    ) -> Path:
+        """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it.
+
+        Other users cannot read a ``private`` file.
+        """
+        with self._stream("GET", path, **options) as response:
+            if target.is_dir():
+                target = target / _attachment_name(response, name)
+            partial = target.with_name(target.name + ".part")
+            try:
+                with open_new(partial) if private else partial.open("wb") as stream:
+                    for block in response.iter_bytes():
+                        stream.write(block)
+                        if on_bytes:
+                            on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
+            except BaseException as error:
+                partial.unlink(missing_ok=True)
+                if isinstance(error, httpx.TransportError):
+                    raise ServerAwayError(self.base_url, error) from error
+                raise
+        partial.replace(target)
+        return target
+
+    def _export(self, path: str, format: Format, target: Path, name: str, on_bytes: OnBytes | None) -> Path:  # noqa: A002
+        params, name = {"format": format}, f"{name}{ENDINGS[format]}"
+        return self._file(f"{path}/export", target, name, on_bytes, params=params, timeout=self.simulating)
+
+    def _events_once(self, path: str, last_event_id: str | None) -> Iterator[a.Event]:
+        headers = {"Accept": "text/event-stream"} | given(**{"Last-Event-ID": last_event_id})
+        with self._stream("GET", path, headers=headers) as response:
+            yield from parse_events(response.iter_lines())
+
+
+def _refuse_not_finite(body: Any, where: str = "") -> None:
+    """JSON has no infinity and no NaN; say which value it was."""
+    if isinstance(body, dict):
+        for name, value in body.items():
+            _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
+    elif isinstance(body, float) and not math.isfinite(body):
+        raise WingfitError("not sent", f"{where} is {body}; it must be a finite number")
+
+
+def _attachment_name(response: httpx.Response, fallback: str) -> str:
+    """File name from Content-Disposition, without any folder that it may name."""
+    disposition = response.headers.get("content-disposition", "")
+    _, found, rest = disposition.partition('filename="')
+    name = Path(rest.partition('"')[0].replace("\\", "/")).name if found else ""
+    return name if name and not name.startswith(".") else fallback
+
+
+class CountedFile(io.FileIO):
+    """A file that tells how much of it has been read."""
+
+    def __init__(self, path: Path, on_bytes: OnBytes | None) -> None:
+        super().__init__(path)
+        self._on_bytes, self._total = on_bytes, path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Read, and report how far."""
+        block = super().read(-1 if size is None else size) or b""
+        if self._on_bytes:
+            self._on_bytes(self.tell(), self._total)
+        return block
+
+
+def parse_events(lines: Iterator[str]) -> Iterator[a.Event]:
+    """Yield server-sent events from the lines of a stream; one that the end cuts off is dropped."""
+    fields: dict[str, str] = {}
+    for line in lines:
+        if line:
+            name, _, value = line.partition(":")
+            value = value.removeprefix(" ")
+            # A line that starts with a colon is a comment that keeps the connection alive.
+            if name:
+                fields[name] = f"{fields['data']}\n{value}" if name == "data" and "data" in fields else value
+        else:
+            if "data" in fields:
+                data = json.loads(fields["data"])
+                yield {"id": fields.get("id"), "event": fields.get("event", "message"), "data": data}
+            fields = {}
+
+
+def zip_folder(folder: Path, target: Path) -> Path:
+    """Zip ``folder`` (hidden files left out) into ``target``: the same bytes for the same files."""
+    files = sorted(p for p in folder.rglob("*") if p.is_file() and not _hidden(p.relative_to(folder)))
+    if not any(p.relative_to(folder).as_posix() == "dataset.yaml" for p in files):
+        raise WingfitError("not a dataset", f"{folder} holds no dataset.yaml; give the folder that holds it")
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in files:
+            entry = zipfile.ZipInfo(path.relative_to(folder).as_posix(), ZIP_TIME)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, path.read_bytes())
+    return target
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith((".", "__MACOSX")) for part in path.parts)
+
+
+def _checked(response: httpx.Response) -> httpx.Response:
+    """Return the response, or raise the server's problem details as an exception."""
+    if not response.is_error:
+        return response
+    try:
+        problem = response.json()
+    except ValueError:
+        problem = None
+    if not isinstance(problem, dict):
+        problem = {"title": response.reason_phrase, "detail": response.text[:500]}
+    raise WingfitError(
+        str(problem.get("title") or response.reason_phrase),
+        str(problem.get("detail") or ""),
+        status=response.status_code,
+        errors=problem.get("errors"),
+    )
+
+
+def is_passing(error: WingfitError) -> bool:
+    """Whether the same call may succeed in a moment."""
+    return isinstance(error, ServerAwayError) or error.status in (502, 503, 504)
+
+
+def _authorization(api_key: str) -> dict[str, str]:
+    if not api_key:
+        return {}
+    if not (api_key.isascii() and api_key.isprintable() and " " not in api_key):
+        raise WingfitError("bad API key", f"{KEY_VARIABLE} must be a key as 'wingfit keys create' prints it")
+    return {"Authorization": f"Bearer {api_key}"}
+
+
+def _reason(cause: Exception) -> str:
+    if isinstance(cause, httpx.ConnectError):
+        return "the connection was refused"
+    if isinstance(cause, httpx.TimeoutException):
+        return "it did not answer in time"
+    return f"the connection broke ({cause or type(cause).__name__})"
+
+
+def _described(error: dict[str, Any]) -> str:
+    """Say one entry of a problem's ``errors``: where, what, and the value that was given."""
+    where = f"{error['where']}: " if error.get("where") else ""
+    value = error.get("value")
+    return f"{where}{error.get('message', '')}" + ("" if value is None else f" (given: {value!r})")
+
+
+def given(**values: Any) -> dict[str, Any]:
+    """Keep the values that are not None."""
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def part(identifier: str) -> str:
+    """Quote an id as one segment of a path, whatever characters were typed."""
+    if not identifier:
+        raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
+    return quote(identifier, safe="").replace(".", "%2E")

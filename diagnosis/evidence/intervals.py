@@ -1,0 +1,63 @@
+"""How well each gene is told: intervals from noise, and from what a model that is not perfect leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
+
+from wingfit.calibration.estimates.linearised import free_genes
+from wingfit.diagnosis.evidence.fit import PRIOR, Fit
+from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.finding import GeneValue, Interval
+
+Array = npt.NDArray[np.float64]
+
+CONFIDENCE = 0.9
+
+
+def reach(freedom: float = np.inf) -> float:
+    """Standard errors to either side that an interval of CONFIDENCE has, if they are known with so much ``freedom``."""
+    return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
+
+
+def covariance(stack: Stack, fit: Fit) -> Array:
+    """[F, F] of the genes in parts of their boxes.
+
+    By noise, by what the model misses in a few independent pieces
+    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`), which is taken to be no less than the
+    tolerance, and the box as a weak prior. Of forces also the scatter of what each recording by itself asks for (a
+    sandwich with recordings as clusters: Liang and Zeger 1986).
+    """
+    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    trust, recordings = min(stack.trust(fit.coefficients), stack.most_trust), len(stack.recordings)
+    prior = np.eye(len(fit.unit)) / PRIOR**2
+    meat = trust * slopes.T @ slopes + prior
+    bread = np.linalg.inv(meat)
+    if _clustered(stack) and recordings > 1:
+        scores = trust * np.array([slopes[part].T @ white[part] for part in stack.parts])
+        scores -= scores.mean(axis=0)
+        meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
+    return np.asarray(bread @ meat @ bread)
+
+
+def _clustered(stack: Stack) -> bool:
+    """Whether recordings are the only independent pieces: beats of a force differ in size with all their harmonics."""
+    return any(recording.kind == "forces" for recording in stack.recordings)
+
+
+def gene_values(stack: Stack, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
+    """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
+    errors = np.sqrt(np.diag(covariance(stack, fit)))
+    freedom = max(len(stack.recordings) - 1, 1) if _clustered(stack) else np.inf
+    wide = reach(freedom)
+    off = sizes or {}
+    found = []
+    for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):
+        low, high = unit - wide * error, unit + wide * error
+        ends = [float(gene.from_unit(x)) if 0.0 <= x <= 1.0 else None for x in (low, high)]
+        value = Interval(float(gene.from_unit(unit)), ends[0], ends[1])
+        found.append(GeneValue(gene.name, gene.unit, gene.description, value, off.get(gene.name)))
+    return tuple(found)

@@ -1,0 +1,273 @@
+"""Full refits of the strongest suspects, alone and together, and what they predict of recordings left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.fit import PRIOR, UNFIT, Fit, fitted, measured, thoroughly
+from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns, taken
+from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.subject import Subject
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 6  # of a refit
+FURTHER = 10  # of one that is continued
+LAST = 20  # of the best, to its end
+WORTH = 0.25  # of the best gain: a suspect with less is not refitted
+PARTNERS = 4  # tried beside the best, and as pairs without it
+HELPS = 0.5  # of what an explanation leaves: a partner that would take less is not tried
+ALIKE = 0.8  # of what a suspect does: another that can do as much is tried in its place
+FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
+BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
+CHANCE = 4.0  # times what noise makes of a prediction on average: so much it makes by chance (chi-squared of one)
+RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival
+HALVINGS = 3  # of a start that cannot be simulated
+
+
+@dataclass(frozen=True)
+class Refit:
+    """The nominal model with suspects put in, fitted in full.
+
+    Attributes:
+        trials: the trial that each suspect began from; empty for the nominal model.
+        fit: the fit.
+        excess: mean square beyond the noise that it leaves, m^2 or N^2.
+        predicted: the same for each recording when the others were fitted, averaged; None with a single recording.
+    """
+
+    trials: tuple[Trial, ...]
+    fit: Fit
+    excess: float
+    predicted: float | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the suspects."""
+        return tuple(trial.suspect.name for trial in self.trials)
+
+    @property
+    def freedom(self) -> int:
+        """Genes that the suspects add."""
+        return sum(trial.freedom for trial in self.trials)
+
+
+def judged(stack: Stack, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
+    """``fit`` with what it leaves and predicts."""
+    return Refit(tuple(trials), fit, stack.excess(fit.coefficients), left_out(stack, fit))
+
+
+def left_out(stack: Stack, fit: Fit) -> float | None:
+    """Mean square beyond the noise in each recording when the others alone were fitted, by the linearised model.
+
+    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation, nor is what
+    noise in the others makes of a prediction.
+    """
+    if len(stack.recordings) < 2:
+        return None
+    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
+    grams = [slopes[part].T @ slopes[part] for part in stack.parts]
+    scores = [slopes[part].T @ white[part] for part in stack.parts]
+    trust, prior = stack.trust(fit.coefficients), (fit.unit - 0.5) / PRIOR**2
+    gram = trust * sum(grams) + np.eye(len(fit.unit)) * (FREE**-2 + PRIOR**-2)
+    score = trust * sum(scores) + prior
+    total = 0.0
+    for r, part in enumerate(stack.parts):
+        others, spread = sum(grams) - grams[r], np.linalg.inv(gram - trust * grams[r])
+        move = np.clip(fit.unit - spread @ (score - trust * scores[r]), 0.0, 1.0) - fit.unit
+        here, own = fit.coefficients[part], fit.jacobian[part]
+        weight = stack.weight[part]
+        worse = float(weight @ ((here + own @ move) ** 2 - here**2))
+        noisy = trust**2 * spread @ others @ spread
+        by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
+        total += float(weight @ (here**2 - stack.variance[part])) + max(worse - CHANCE * by_noise, 0.0)
+    return total
+
+
+def refitted(
+    subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, trials: Sequence[Trial], base: Fit | None = None
+) -> Refit | None:
+    """Fit the nominal model with the suspects of ``trials``, each beginning at its trial's place and size.
+
+    ``base`` is a fit that contains all but the last of them already. None where no start can be simulated.
+    """
+    before = base or nominal
+    model = subject.extended([trial.suspect.name for trial in trials])
+    added = [trials[-1]] if base else list(trials)
+    genes = [(gene.name, trial) for trial in added for gene in trial.suspect.genes]
+    values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
+    problem = Problem(
+        model, stack.recordings, (*before.problem.free, *(g for g, _ in genes)), base_genome(model, values), stack.axes
+    )
+    for part in 0.5 ** np.arange(HALVINGS):
+        start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
+        try:
+            fit = _widened(subject, stack, problem, evaluator, start, before)
+        except UNFIT:
+            continue
+        sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
+        astray = stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves
+        if len(trials) == 1 and astray and not sizes.all():
+            with suppress(*UNFIT):
+                first = _some(subject, stack, problem, evaluator, start, before, sizes)
+                first = _widened(subject, stack, problem, evaluator, first.unit, first)
+                fit = min((fit, first), key=lambda one: one.cost)
+        return judged(stack, fit, trials)
+    return None
+
+
+def _widened(subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, before: Fit) -> Fit:
+    """Fit all genes of ``problem``; the slopes of the first of them are those of ``before``."""
+    known = np.arange(len(start)) < before.jacobian.shape[1]
+    jacobian = np.zeros((len(before.jacobian), len(start)))
+    jacobian[:, known] = before.jacobian[:, : known.sum()]
+    return fitted(subject, stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+
+
+def _some(
+    subject: Subject,
+    stack: Stack,
+    problem: Problem,
+    evaluator: Evaluator,
+    start: Array,
+    before: Fit,
+    which: npt.NDArray[np.bool_],
+) -> Fit:
+    """Fit the genes ``which`` [F] of ``problem`` alone; the others stay where they start, with slopes of zero.
+
+    A shape that moves before its size is known may be led astray.
+    """
+    genes = free_genes(problem)
+    base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
+    free = tuple(name for name, one in zip(problem.free, which, strict=True) if one)
+    part = Problem(problem.model, problem.recordings, free, base, problem.axes)
+    found = _widened(subject, stack, part, evaluator, start[which], before)
+    unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
+    unit[which], jacobian[:, which] = found.unit, found.jacobian
+    return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
+
+
+def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:
+    """The same fitted with another subject's model, from where it ended; None where that cannot be simulated."""
+    before = refit.fit
+    model = subject.extended(refit.names)
+    problem = Problem(model, stack.recordings, before.problem.free, before.problem.base, stack.axes)
+    known = np.ones(len(before.unit), bool)
+    try:
+        fit = fitted(subject, stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
+    except UNFIT:
+        return None
+    return judged(stack, fit, refit.trials)
+
+
+def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, steps: int = FURTHER) -> Refit:
+    """``refit`` fitted further, with all slopes measured at every step; as it is where that cannot be simulated.
+
+    An individual that was reached beside another may flutter when it begins from rest.
+    """
+    fit = refit.fit
+    try:
+        for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
+            fit = better
+    except UNFIT:
+        return refit
+    return judged(stack, fit, refit.trials)
+
+
+def ended(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit:
+    """``refit`` to its end, with all slopes measured there: what suspects are tried about."""
+    if not refit.fit.converged:
+        refit = continued(subject, stack, evaluator, refit)
+    return judged(stack, measured(subject, stack, evaluator, refit.fit), refit.trials)
+
+
+def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
+    """``refit`` fitted anew from other genes ``start`` [F]; None where these cannot be simulated."""
+    try:
+        return judged(stack, fitted(subject, stack, refit.fit.problem, evaluator, start, steps=STEPS), refit.trials)
+    except UNFIT:
+        return None
+
+
+def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
+    """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
+    best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
+    return [trial for trial in best[:most] if trial.gain >= WORTH * best[0].gain and trial.gain > 0.0]
+
+
+def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
+    """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
+    nuisance = Nuisance(stack, base.fit)
+    left = nuisance.left
+    worth = HELPS * (float(left @ left) - len(left))
+    return [trial for gain, trial in _takers(nuisance, left, found, base.names)[:most] if gain > worth]
+
+
+def action(stack: Stack, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
+    """What switching off the suspects of ``trials`` (all, if none is given) changes of the coefficients [D].
+
+    All other genes stay as they are. None where that cannot be simulated.
+    """
+    fit, off = refit.fit, dict(refit.fit.values)
+    for trial in trials or refit.trials:
+        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.sizes}
+    found, reasons, _ = stack.evaluate(fit.problem, evaluator, np.array([list(off.values())]))
+    return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
+
+
+def substitutes(
+    stack: Stack, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], most: int
+) -> list[Trial]:
+    """Trials of other suspects that can do nearly all of what one of those of ``refit`` does; the likest first."""
+    change = action(stack, evaluator, refit, [trial])
+    if change is None:
+        return []
+    own = {gene.name for gene in trial.suspect.genes}
+    kept = np.array([name not in own for name in refit.fit.problem.free])
+    nuisance = Nuisance(stack, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
+    done = nuisance.rest(change)
+    worth = ALIKE * float(done @ done)
+    return [one for gain, one in _takers(nuisance, done, found, refit.names)[:most] if gain > worth]
+
+
+def _takers(
+    nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
+) -> list[tuple[float, Trial]]:
+    """Of each suspect but the ``known`` the trial that takes most of a ``misfit``, with how much; strongest first."""
+    best = []
+    for trials in found:
+        if trials and trials[0].suspect.name not in known:
+            gains = [taken(nuisance.rest(trial.fields), misfit) for trial in trials]
+            k = int(np.argmax(gains))
+            best.append((gains[k], trials[k]))
+    return sorted(best, key=lambda pair: -pair[0])
+
+
+def pairs(
+    stack: Stack, nominal: Fit, found: Sequence[list[Trial]], beyond: float, most: int = PARTNERS
+) -> Iterator[tuple[Trial, Trial]]:
+    """Pairs of suspects that together would leave less than a chi-squared of ``beyond``, best first."""
+    nuisance = Nuisance(stack, nominal)
+    left = nuisance.left
+    best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
+    own = [nuisance.rest(trial.fields) for trial in best]
+    scored = [(taken(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
+    scored.sort(key=lambda triple: -triple[0])
+    for gain, one, other in scored[:most]:
+        if float(left @ left) - gain < beyond:
+            yield (one, other) if one.gain >= other.gain else (other, one)
+
+
+def _scaled(trial: Trial, part: float) -> Array:
+    """Start of the suspect's genes with its size at ``part`` of what the trial says."""
+    start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
+    start[size] = off[size] + part * (start[size] - off[size])
+    return start

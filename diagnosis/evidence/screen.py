@@ -1,0 +1,211 @@
+"""The score test of every suspect: how much of the misfit it would take, the nominal genes free to adapt.
+
+A suspect is put in at the sizes at which it is met in practice, at several places and shapes, and the changes that this
+makes to the simulated recordings are fitted to what is left, after what the nominal genes can do has been taken out of
+both (a score test with nuisance parameters: Rao 1948; here with finite sizes: many effects have no slope at zero).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.fit import PRIOR, Fit
+from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.subject import Subject, Suspect
+
+Array = npt.NDArray[np.float64]
+
+PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
+SHAPES = 7  # of one with other shape genes
+SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One size (or several, one by one) of a suspect at one place: what it does.
+
+    Attributes:
+        suspect: which.
+        unit: [S, E] its genes in parts of their boxes, one row for each size.
+        fields: [S, D] what each changes of the coefficients.
+        gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
+        amounts: [S] by how much each must be multiplied.
+        freedom: degrees of freedom, genes of place and shape included.
+        leaves: chi-squared that is then left, by the linearised model.
+    """
+
+    suspect: Suspect
+    unit: Array
+    fields: Array
+    gain: float
+    amounts: Array
+    freedom: int
+    leaves: float
+
+    @property
+    def start(self) -> Array:
+        """Genes [E] of the suspect, in parts of their boxes, where the fit puts them."""
+        off = off_units(self.suspect)
+        size = size_columns(self.suspect)
+        start = self.unit[0].copy()
+        start[size] = off[size] + self.amounts @ (self.unit[:, size] - off[size])
+        return np.asarray(np.clip(start, 0.0, 1.0), float)
+
+
+class Nuisance:
+    """What the nominal genes can do about a fit: projections of whitened vectors [..., D] on what they cannot.
+
+    Their prior counts as F further samples, as much as it does beside the misfit
+    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`).
+    """
+
+    def __init__(self, stack: Stack, fit: Fit) -> None:
+        weight = 1.0 / (PRIOR * np.sqrt(stack.trust(fit.coefficients)))
+        slopes = fit.jacobian / stack.scale[:, None]
+        self.basis: Array = np.linalg.qr(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))[0]
+        self.scale = stack.scale
+        self.left: Array = np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)])
+        self.left = self.left - self.basis @ (self.basis.T @ self.left)
+
+    def rest(self, changes: Array) -> Array:
+        """Whitened changes [..., D + F] of coefficients, without what the genes can do."""
+        white = changes / self.scale
+        inside = (white @ self.basis[: white.shape[-1]]) @ self.basis.T
+        inside[..., : white.shape[-1]] -= white
+        return np.asarray(-inside)
+
+
+def taken(fields: Array, misfit: Array) -> float:
+    """By how much whitened ``fields`` [S, D] of free sizes lower the sum of squares of a ``misfit`` [D]."""
+    inner, score = fields @ fields.T, fields @ misfit
+    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
+
+
+def off_units(suspect: Suspect) -> Array:
+    """Genes [E] in parts of their boxes with the suspect switched off."""
+    return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
+
+
+def size_columns(suspect: Suspect) -> list[int]:
+    """Columns of the genes that are its size."""
+    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.sizes]
+
+
+def screened(
+    subject: Subject,
+    stack: Stack,
+    nominal: Fit,
+    evaluator: Evaluator,
+    suspects: Sequence[Suspect],
+    known: Sequence[str] = (),
+) -> Iterator[tuple[Suspect, list[Trial]]]:
+    """Try every suspect about a fit; yields its trials, best first (none where it cannot be simulated).
+
+    The fit is the nominal one, or has in it the suspects that are ``known``; all its genes may adapt.
+    """
+    nuisance = Nuisance(stack, nominal)
+    values = nominal.problem.base.replace(nominal.values).as_dict()
+    for suspect in suspects:
+        genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
+        model = subject.beside(subject.extended([*known, suspect.name]), genome)
+        free = tuple(gene.name for gene in suspect.genes)
+        problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
+        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance)
+
+
+def _tried(
+    stack: Stack,
+    problem: Problem,
+    nominal: Fit,
+    evaluator: Evaluator,
+    suspect: Suspect,
+    nuisance: Nuisance,
+) -> list[Trial]:
+    blocks = list(_blocks(suspect))
+    units = np.concatenate(blocks)
+    found, reasons, _ = stack.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    bad = np.array([reason is not None for reason in reasons])
+    changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
+    trials, row = [], 0
+    for block in blocks:
+        rows = slice(row, row + len(block))
+        row += len(block)
+        if not bad[rows].any():
+            trials.append(_trial(suspect, block, changes[rows], nuisance))
+    return sorted(trials, key=lambda trial: -trial.gain)
+
+
+def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
+    own, left = nuisance.rest(fields), nuisance.left
+    amounts = _amounts(own, left, _limits(suspect, block), seen=SEEN * np.sqrt(len(left)))
+    leaves = float(np.sum((left + amounts @ own) ** 2))
+    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), amounts, len(suspect.genes), leaves)
+
+
+def _amounts(own: Array, left: Array, limits: tuple[Array, Array], *, seen: float) -> Array:
+    """Multiples [S] of the fields ``own`` [S, D] that fit -left best within ``limits``."""
+    length = np.linalg.norm(own, axis=1)
+    told = length > seen
+    amounts = np.zeros(len(own))
+    if not told.any():
+        return amounts
+    part = own[told]
+    inner = part @ part.T + 1e-9 * np.diag(length[told] ** 2)
+    best = -np.linalg.solve(inner, part @ left)
+    low, high = limits[0][told], limits[1][told]
+    if ((best < low) | (best > high)).any() and len(best) == 1:
+        best = np.clip(best, low, high)
+    elif ((best < low) | (best > high)).any():
+        best = best * min(
+            1.0,
+            float(np.min(np.where(best > 0, high / np.maximum(best, 1e-300), 1.0))),
+            float(np.min(np.where(best < 0, low / np.minimum(best, -1e-300), 1.0))),
+        )
+    amounts[told] = best
+    return amounts
+
+
+def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
+    """Least and largest multiples [S] of each size that stay in the box."""
+    off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
+    for row, unit in enumerate(block):
+        column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
+        move = unit[column] - off[column]
+        ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
+        low[row], high[row] = ends
+    return low, high
+
+
+def _spots(suspect: Suspect, typical: Array) -> list[Array]:
+    """Shapes [E'] in parts of their boxes to be tried: its spots if it has any, else the ``typical`` one and others."""
+    if suspect.spots:
+        genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
+        return [unit_at(genes, np.array(spot)) for spot in suspect.spots]
+    count = PLACES if suspect.places else SHAPES
+    return [typical, *qmc.Halton(len(typical), scramble=False).random(count + 1)[1:]]
+
+
+def _blocks(suspect: Suspect) -> Iterator[Array]:
+    """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
+    off, size = off_units(suspect), size_columns(suspect)
+    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    shape = [k for k in range(len(off)) if k not in size]
+    for spot in _spots(suspect, typical[shape]) if shape else [typical[shape]]:
+        for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
+            block = []
+            for k in size:
+                row = off.copy()
+                row[shape] = spot
+                row[k] = np.clip(off[k] + part * (typical[k] - off[k]), 0.0, 1.0)
+                if row[k] != off[k]:
+                    block.append(row)
+            if len(block) == len(size):
+                yield np.array(block)

@@ -1,0 +1,182 @@
+"""A free-form law for a load that nothing in the library explains, found so that it predicts other recordings.
+
+The missing load of every recording is a sum of few terms, each a coefficient, the same for all recordings, times a
+product of the local motion, the air and the wing (:mod:`wingfit.diagnosis.location.law_features`). Terms are taken one
+by one (forward selection), each time the one with which recordings left out one by one are predicted best; the law is
+fitted to the tracks themselves, through their responses to loads, and not to an inferred load, which a prior has
+smoothed. What is reported as explained is predicted by laws that were selected without the recording in question; the
+nominal genes, as refitted to all recordings, are projected out first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.diagnosis.evidence.intervals import reach
+from wingfit.diagnosis.finding import FreeLaw, Interval, Term
+from wingfit.diagnosis.location.law_features import Candidate, Motion, candidates
+from wingfit.diagnosis.location.missing_load import GENES, Case
+from wingfit.sim.effects.probe import Probe
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+MOST = 3  # terms
+GAIN = 0.02  # of the excess misfit, that a term must take away of recordings left out
+PLAIN = 0.02  # of it: a plainer term is taken before a better one, if no more is lost
+PREDICTS = 0.1  # of the excess misfit: a law that takes less is none
+FEWEST = 3  # recordings
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Normal equations of R recordings in M coefficients, the nominal genes refitted to all of them projected out.
+
+    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R]: sum of squares of what is lacking, ``count`` [R] of
+    samples. ``size`` [M] by which coefficients were multiplied to be comparable.
+    """
+
+    curvature: Array
+    slope: Array
+    power: Array
+    count: Array
+    size: Array
+
+    def without(self, left: int) -> _Sums:
+        """All recordings but one."""
+        kept = np.arange(len(self.power)) != left
+        return _Sums(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
+
+    def fit(self, terms: Index, which: npt.NDArray[np.bool_]) -> Array:
+        """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
+        matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
+        ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
+        slope = self.slope[which].sum(axis=0)[terms]
+        return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
+
+    def left(self, recording: int, terms: Index, found: Array) -> Array:
+        """Sum of squares [B] that coefficients ``found`` [B, N] of ``terms`` [B, N] leave of a recording."""
+        matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
+        along = (found * self.slope[recording][terms]).sum(axis=1)
+        return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
+
+    def explained(self, terms: Index) -> Array:
+        """Part [B] of the excess misfit that ``terms`` [B, N] take away of recordings left out one by one."""
+        after = np.zeros(len(terms))
+        for r in range(len(self.power)):
+            after += self.left(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]
+        return np.asarray(1.0 - after / self.excess)
+
+    @property
+    def excess(self) -> float:
+        """Sum of squares beyond the noise."""
+        return max(float((self.power - self.count).sum()), 1e-9)
+
+
+def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> FreeLaw | None:
+    """The law of the load that ``cases`` lack, from the ``motions`` of the nominal model at the stations of ``probe``.
+
+    None for fewer than three recordings, or where there is no misfit beyond the noise. A law without terms says that
+    none was found that predicts another recording.
+    """
+    dictionary = list(candidates())
+    if len(cases) < FEWEST:
+        return None
+    sums = _sums(cases, probe, motions, dictionary)
+    if sums.excess <= 1e-6:
+        return None
+    terms = _selected(sums)
+    explained = _predicted(sums)
+    if not len(terms) or explained < PREDICTS:
+        part = f"the best takes {100 * max(explained, 0.0):.0f} % of the excess misfit of recordings left out"
+        return FreeLaw(f"no simple law of the local motion predicts another recording: {part}", (), explained)
+    return _told(sums, dictionary, terms, explained)
+
+
+def _sums(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]) -> _Sums:
+    M, F = len(dictionary), cases[0].sensitivities.shape[1]
+    loads = [_loads(probe, case.crossing, motion, dictionary) for case, motion in zip(cases, motions, strict=True)]
+    every = np.array([_products(case, U) for case, U in zip(cases, loads, strict=True)])
+    size = np.sqrt(np.einsum("rmm->m", every[:, :M, :M]) / sum(len(case.lacking) for case in cases))
+    size = np.where(size > 0, size, 1.0)
+    genes = slice(M, M + F)
+    total = every.sum(axis=0)
+    taken = np.linalg.solve(total[genes, genes] + np.eye(F) / GENES**2, total[genes])  # by a refit of the genes
+    project = np.eye(M + F + 1)
+    project[genes] -= taken
+    project = np.delete(project, np.arange(M, M + F), axis=1)
+    project[:, :M] /= size
+    left = np.einsum("ap,rab,bq->rpq", project, every, project, optimize=True)
+    count = np.array([float(len(case.lacking)) for case in cases])
+    return _Sums(left[:, :M, :M], left[:, :M, M], left[:, M, M], count, size)
+
+
+def _products(case: Case, loads: Array) -> Array:
+    """All products [M + F + 1, M + F + 1] of what a recording shows of the dictionary, of the genes, and lacks."""
+    both = np.concatenate([case.responses[:, : len(loads)], case.sensitivities, case.lacking[:, None]], axis=1)
+    others = both.shape[1] - len(loads)
+    shown = np.zeros((both.shape[1], loads.shape[1] + others))
+    shown[: len(loads), : loads.shape[1]] = loads
+    shown[len(loads) :, loads.shape[1] :] = np.eye(others)
+    return np.asarray(shown.T @ (both.T @ both) @ shown)
+
+
+def _loads(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
+    """Sizes of the probe's unit forces [P, M] that make each of the dictionary's loads, as well as they can."""
+    series = np.linalg.pinv(probe.terms(motion.phase + crossing))
+    hats = np.linalg.pinv(probe.hats(motion.stations))
+    fields = np.array([candidate.field(motion) for candidate in dictionary])
+    return np.asarray(np.einsum("sj,mjn,kn->skm", hats, fields, series, optimize=True).reshape(probe.forces, -1))
+
+
+def _selected(sums: _Sums) -> Index:
+    """Terms, each earning its place by what recordings left out are predicted better; plain ones come first."""
+    terms, before = np.zeros(0, np.int64), 0.0
+    told = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
+    while len(terms) < MOST:
+        tried = np.array([[*terms, k] for k in told if k not in terms])
+        explained = sums.explained(tried)
+        if not explained.max() > before + GAIN:
+            break
+        best = int(np.argmax(explained >= explained.max() - PLAIN))
+        terms, before = tried[best], float(explained[best])
+    return terms
+
+
+def _predicted(sums: _Sums) -> float:
+    """Part of the excess misfit of each recording that a law takes away which was selected and fitted without it."""
+    after = 0.0
+    for r in range(len(sums.power)):
+        terms = _selected(sums.without(r))[None]
+        found = sums.fit(terms, np.arange(len(sums.power)) != r)
+        after += float(sums.left(r, terms, found)[0] - sums.count[r])
+    return 1.0 - after / sums.excess
+
+
+def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: Index, explained: float) -> FreeLaw:
+    every = np.ones(len(sums.power), bool)
+    size = sums.size[terms]
+    value = sums.fit(terms[None], every)[0] / size
+    error = reach(len(sums.power) - 1) * _jackknife(sums, terms) / size
+    found = tuple(
+        Term(
+            dictionary[k].name,
+            Interval(float(v), float(v - e), float(v + e)),
+            dictionary[k].feature.unit,
+        )
+        for k, v, e in zip(terms, value, error, strict=True)
+    )
+    said = "; and ".join(dictionary[k].words for k in terms)
+    share = f"{100 * explained:.0f} % of the excess misfit of recordings left out"
+    return FreeLaw(f"{said}: it predicts {share}", found, explained)
+
+
+def _jackknife(sums: _Sums, terms: Index) -> Array:
+    """Standard errors [N] from what each recording changes (Efron, The Jackknife, 1982, Eq. 3.1)."""
+    count = len(sums.power)
+    each = np.array([sums.fit(terms[None], np.arange(count) != r)[0] for r in range(count)])
+    return np.asarray(np.sqrt((count - 1) / count * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))

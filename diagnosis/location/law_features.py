@@ -1,0 +1,175 @@
+"""What a load on a wing may be made of: products of the local motion, the air and the wing, of physical meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+OUTER, INNER = 0.6, 0.4  # of the span: where the outer part begins and the inner part ends
+
+
+class Motion(Protocol):
+    """How J stations of a wing move over N instants of a beat, as :class:`sim.wing.probing.StationMotion` has it."""
+
+    @property
+    def stations(self) -> Array: ...  # noqa: D102
+    @property
+    def phase(self) -> Array: ...  # noqa: D102
+    @property
+    def velocity(self) -> Array: ...  # noqa: D102
+    @property
+    def forward(self) -> Array: ...  # noqa: D102
+    @property
+    def acceleration(self) -> Array: ...  # noqa: D102
+    @property
+    def deflection(self) -> Array: ...  # noqa: D102
+    @property
+    def pitch_rate(self) -> Array: ...  # noqa: D102
+    @property
+    def chord(self) -> Array: ...  # noqa: D102
+    @property
+    def mass(self) -> Array: ...  # noqa: D102
+    @property
+    def density(self) -> float: ...  # noqa: D102
+    @property
+    def airspeed(self) -> float: ...  # noqa: D102
+    @property
+    def flap_frequency(self) -> float: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A load per metre of span: a coefficient in ``unit`` times ``field`` [J, N] of a motion. ``words``: what it is."""
+
+    name: str
+    unit: str
+    words: str
+    field: Callable[[Motion], Array]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A part of the wing or of the beat: 1 inside, 0 outside [J, N]. ``words`` are empty for the whole."""
+
+    words: str
+    field: Callable[[Motion], Array]
+
+
+def _wave(order: int, power: int, sine: bool) -> Feature:
+    turn = np.sin if sine else np.cos
+    name = f"f^{power} {'sin' if sine else 'cos'} {order} psi" if power else f"{'sin' if sine else 'cos'} {order} psi"
+    unit = {0: "N/m", 2: "N s^2/m"}[power]
+    grows = " and grows with the square of the flap frequency" if power else " whatever the flap frequency"
+    return Feature(
+        name,
+        unit,
+        f"that beats {'once' if order == 1 else 'twice'} a beat{grows}",
+        lambda m: m.flap_frequency**power * turn(2 * np.pi * order * m.phase) + 0.0 * m.velocity,
+    )
+
+
+FEATURES: tuple[Feature, ...] = (
+    Feature(
+        "rho c |V_n| V_n",
+        "1",
+        "that grows with air density and the square of the local normal velocity",
+        lambda m: m.density * m.chord[:, None] * np.abs(m.velocity) * m.velocity,
+    ),
+    Feature(
+        "rho c |V| V_n",
+        "1",
+        "that grows with air density, the speed through the air and the local normal velocity",
+        lambda m: m.density * m.chord[:, None] * np.hypot(m.velocity, m.forward) * m.velocity,
+    ),
+    Feature(
+        "rho c V_n^2",
+        "1",
+        "that grows with air density and the square of the local normal velocity, to the same side on both strokes",
+        lambda m: m.density * m.chord[:, None] * m.velocity**2,
+    ),
+    Feature(
+        "rho c^2 V_c theta'",
+        "1",
+        "that grows with air density, the speed along the chord and the pitch rate",
+        lambda m: m.density * m.chord[:, None] ** 2 * m.forward * m.pitch_rate,
+    ),
+    Feature(
+        "rho c^2 a_n",
+        "1",
+        "that grows with air density and the local normal acceleration",
+        lambda m: m.density * m.chord[:, None] ** 2 * m.acceleration,
+    ),
+    Feature(
+        "rho c U^2",
+        "1",
+        "that grows with air density and the square of the airspeed",
+        lambda m: m.density * m.chord[:, None] * m.airspeed**2 + 0.0 * m.velocity,
+    ),
+    Feature(
+        "m a_n",
+        "1",
+        "that grows with the wing's own mass and the local normal acceleration",
+        lambda m: m.mass[:, None] * m.acceleration,
+    ),
+    Feature(
+        "V_n", "N s/m^2", "that grows with the local normal velocity, whatever the air", lambda m: 1.0 * m.velocity
+    ),
+    Feature("sign V_n", "N/m", "of constant size that turns with the local velocity", lambda m: np.sign(m.velocity)),
+    Feature("w", "N/m^2", "that grows with how far the wing is bent there", lambda m: 1.0 * m.deflection),
+    Feature("w^3", "N/m^4", "that grows with the cube of how far the wing is bent there", lambda m: m.deflection**3),
+    Feature("1", "N/m", "that is constant", lambda m: np.ones_like(m.velocity)),
+    *(_wave(order, power, sine) for order in (1, 2) for power in (0, 2) for sine in (False, True)),
+)
+
+SPAN_WINDOWS: tuple[Window, ...] = (
+    Window("", lambda m: np.ones_like(m.velocity)),
+    Window(f"outer {100 * (1 - OUTER):.0f} % of the span", lambda m: _where(m, m.stations[:, None] >= OUTER)),
+    Window(f"inner {100 * INNER:.0f} % of the span", lambda m: _where(m, m.stations[:, None] <= INNER)),
+)
+BEAT_WINDOWS: tuple[Window, ...] = (
+    Window("", lambda m: np.ones_like(m.velocity)),
+    Window("on the upstroke", lambda m: _where(m, m.velocity[-1] > 0)),
+    Window("on the downstroke", lambda m: _where(m, m.velocity[-1] < 0)),
+)
+
+
+def _where(motion: Motion, inside: npt.NDArray[np.bool_]) -> Array:
+    return np.where(np.broadcast_to(inside, motion.velocity.shape), 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A feature in windows of the span and of the beat."""
+
+    feature: Feature
+    span: Window
+    beat: Window
+
+    def field(self, motion: Motion) -> Array:
+        """Load per coefficient [J, N]."""
+        return self.feature.field(motion) * self.span.field(motion) * self.beat.field(motion)
+
+    @property
+    def name(self) -> str:
+        """Such as ``rho c |V_n| V_n (outer 40 % of the span)``."""
+        where = ", ".join(window.words for window in (self.span, self.beat) if window.words)
+        return f"{self.feature.name} ({where})" if where else self.feature.name
+
+    @property
+    def words(self) -> str:
+        """What it is, for people."""
+        return ", ".join(text for text in (f"a load {self.feature.words}", self.span.words, self.beat.words) if text)
+
+
+def candidates() -> Iterator[Candidate]:
+    """All features in all windows, plain ones first."""
+    for span in SPAN_WINDOWS:
+        for beat in BEAT_WINDOWS:
+            for feature in FEATURES:
+                yield Candidate(feature, span, beat)

@@ -1,0 +1,104 @@
+"""Kinds of load that a wing may bear which its model does not know: smooth ones, those of one place; and of drive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.probe import Probe
+
+Array = npt.NDArray[np.float64]
+
+_LENGTHS = (0.25, 0.5)  # of the span, over which smooth loads are alike
+_CENTRES = np.linspace(0.0, 1.0, 41)  # of loads of one place, parts of the span
+_WIDTHS = (0.07, 0.15, 0.3)  # their standard deviation
+_CHORDS = np.linspace(0.0, 1.0, 9)  # where along the chord they may act, parts of it
+_TURNING = 0.25  # of the chord: standard deviation of the lever of smooth loads about its middle
+_DECAYS = (0.0, 1.0, 2.0)  # powers of the harmonic by which the standard deviation of loads falls
+_SMOOTH = 0.1  # probability a priori of smooth loads; that of loads of one place is the rest
+_DRIVEN = 0.1  # of a drive that moves otherwise
+_RODS = (((1.0, 1.0),), ((1.0, 0.0),), ((0.0, 1.0),), ((1.0, 0.0), (0.0, 1.0)))  # alike, one, or each by itself
+
+
+class Family(NamedTuple):
+    """Shapes of loads, forces and moments; ``places``: centre, width and chord of each, if any.
+
+    ``shapes``: K of them, [Z, stations] each, whose sum with independent sizes it is. ``share``: probability a priori
+    of each. ``driven``: the motion of two rods, which stand behind the stations.
+    """
+
+    shapes: tuple[Array, ...]
+    places: tuple[tuple[float | None, float | None, float | None], ...]
+    share: float
+    driven: bool = False
+
+    def __len__(self) -> int:
+        return len(self.shapes)
+
+
+class Form(NamedTuple):
+    """One shape of a family, with a spread [M] over the terms of the beat."""
+
+    family: Family
+    number: int
+    spread: Array
+
+    @property
+    def root(self) -> Array:
+        """[P, Z M] of the covariance at strength one."""
+        return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
+
+
+def spreads(probe: Probe) -> list[Array]:
+    """Standard deviations [M] of the terms of a load over the beat, several possible ones."""
+    order = np.arange(1, probe.harmonics + 1)
+    return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
+
+
+def smooth(probe: Probe, chord: Array | None) -> Family:
+    """Loads that are alike over a length of the span, forces and moments by themselves."""
+    y, shapes = np.array(probe.stations), []
+    for length in _LENGTHS:
+        root = np.linalg.cholesky(np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))).T
+        if probe.turning and chord is not None:
+            nothing = np.zeros_like(root)
+            root = np.block([[root, nothing], [nothing, _TURNING * chord * root]])
+        shapes.append(root)
+    return Family(_beside_rods(probe, shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
+
+
+def placed(probe: Probe, chord: Array | None) -> Family:
+    """Loads of one place: forces as of bumps along the span, and moments about the span as their chord says."""
+    span = np.linspace(0.0, 1.0, 401)
+    hats, shapes = probe.hats(span), []
+    places: list[tuple[float | None, float | None, float | None]] = []
+    for centre, width in product(_CENTRES, _WIDTHS):
+        bump = np.exp(-0.5 * ((span - centre) / width) ** 2)
+        force = np.linalg.lstsq(hats, bump, rcond=None)[0]
+        if not probe.turning or chord is None:
+            shapes.append(force[None])
+            places.append((float(centre), width, None))
+            continue
+        for part in _CHORDS:
+            shapes.append(np.concatenate([force, (0.5 - part) * chord * force])[None])
+            places.append((float(centre), width, float(part)))
+    rest = 1.0 - _SMOOTH - (_DRIVEN if probe.driving else 0.0)
+    return Family(_beside_rods(probe, shapes), tuple(places), rest / len(shapes))
+
+
+def driven(probe: Probe) -> Family:
+    """Rods that move otherwise than they are said to; none for a probe that does not drive."""
+    if not probe.driving:
+        return Family((), (), 0.0, driven=True)
+    still = np.zeros((2, probe.loads // (1 + 2 * probe.harmonics)))
+    shapes = tuple(np.hstack([still[: len(rods)], np.array(rods)]) for rods in _RODS)
+    return Family(shapes, ((None, None, None),) * len(shapes), _DRIVEN / len(shapes), driven=True)
+
+
+def _beside_rods(probe: Probe, shapes: Sequence[Array]) -> tuple[Array, ...]:
+    """Loads beside which rods move as they are said to."""
+    return tuple(np.pad(shape, ((0, 0), (0, 2 * probe.driving))) for shape in shapes)

@@ -1,0 +1,376 @@
+"""The load that a model lacks, from what its tracks answer to known loads: Bayesian linear inversion.
+
+A recording shows y = H w + S g + noise: y what was recorded less what the nominal model says, H the responses to unit
+loads (a :class:`wingfit.sim.effects.probe.Probe`), w their sizes under this condition, S the sensitivities to the
+nominal genes and g what the genes are wrong by, the same for all recordings. Tracks tell well when a load acts, and its
+moment about the root, but hardly how it is spread along the span. So several kinds of load are possible a priori,
+smooth ones and those of one place, of free shape in the beat; the evidence (MacKay, Neural Computation 4, 1992, Eqs.
+2.8-2.14) says how probable each kind is and how strong the load under each condition, and all that is told is averaged
+over the kinds. Genes may be wrong by a good part of their box.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.diagnosis.finding import Interval, MissingLoad, table
+from wingfit.diagnosis.location.load_kinds import Form, driven, placed, smooth, spreads
+from wingfit.sim.effects.probe import Probe
+
+Array = npt.NDArray[np.float64]
+
+PHASES = 36  # instants of a beat that loads are told at
+GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
+LINEAR = 0.03  # of a response: what is not proportional to the load
+TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is none
+_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
+_LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
+_MOST = 60  # kinds to average over
+DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
+_DRAWS = 400
+_SPAN = np.linspace(0.0, 1.0, 41)
+SPREAD = 0.3  # mean direction of the phase: less, and the load is spread over the beat
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording, whitened: every number in standard deviations of independent noise.
+
+    Attributes:
+        name: of the recording.
+        lacking: [D] recorded less simulated by the refitted nominal model.
+        responses: [D, P] to unit loads, in the order of the probe's genes.
+        sensitivities: [D, F] to the nominal genes, unit coordinates.
+        crossing: drive phase (beats) at which the recorded beat starts.
+    """
+
+    name: str
+    lacking: Array
+    responses: Array
+    sensitivities: Array
+    crossing: float
+
+
+def decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
+    """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
+    if not len(values):
+        return values
+    kept = memory ** np.diff(place)[:, None]
+    return np.concatenate([values[:1], (values[1:] - kept * values[:-1]) / np.sqrt(1.0 - kept**2)])
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P].
+
+    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span, and where along the chord
+    they act; None for smooth loads, and without a probe that turns. ``driven``: a motion of the rods instead.
+    """
+
+    probability: float
+    centre: float | None
+    width: float | None
+    chord: float | None
+    driven: bool
+    sizes: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class Inferred:
+    """Loads under each of R conditions.
+
+    Attributes:
+        probe: whose unit loads they are made of.
+        names: of the recordings.
+        crossings: of the recordings, :attr:`Case.crossing`.
+        kinds: of load, the most probable first.
+        evidence: [R] natural logarithm, for a load in this recording over none.
+        floor: [R], by which the noise was taken to be larger than told, because no load explains the rest.
+    """
+
+    probe: Probe
+    names: tuple[str, ...]
+    crossings: tuple[float, ...]
+    kinds: tuple[Kind, ...]
+    evidence: Array
+    floor: Array
+
+    @property
+    def placed(self) -> float:
+        """Probability of loads of one place."""
+        return sum(kind.probability for kind in self.kinds if kind.centre is not None)
+
+    @property
+    def driven(self) -> bool:
+        """Whether the rods move otherwise, and no load acts."""
+        return self.kinds[0].driven
+
+    def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
+        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat.
+
+        Of rods that move otherwise their turns, deg, [R, 2, phase].
+        """
+        values, errors = [], []
+        weight = np.array([kind.probability for kind in self.kinds])
+        places = np.eye(2) if self.driven else self.probe.hats(span)
+        for r, crossing in enumerate(self.crossings):
+            basis = np.kron(places, self.probe.terms(phase + crossing))
+            each = np.array([basis @ kind.sizes[r, self.told] for kind in self.kinds])
+            covariances = [kind.covariance[r, self.told, self.told] for kind in self.kinds]
+            own = [np.einsum("np,pq,nq->n", basis, one, basis, optimize=True) for one in covariances]
+            mean = weight @ each
+            values.append(mean)
+            errors.append(np.sqrt(weight @ (np.array(own) + (each - mean) ** 2)))
+        shape = (len(self.names), len(places), len(phase))
+        return np.reshape(values, shape), np.reshape(errors, shape)
+
+    @property
+    def told(self) -> slice:
+        """The forces among the sizes, or the turns of the rods."""
+        return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
+
+    @property
+    def left(self) -> float:
+        """Mean square of what is left, in parts of the noise's: of two models, the one with less is nearer."""
+        return float(np.mean(self.floor**2))
+
+
+@dataclass(frozen=True)
+class LoadPlace:
+    """Where and when the missing load acts: centres with 90 % intervals, and the parts in which it mostly acts.
+
+    ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
+    the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
+    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start); ``chord`` in parts of
+    it from the leading edge, None where the load is spread smoothly, or the probe does not turn. Of rods that move
+    otherwise there is a phase only.
+    """
+
+    span: Interval | None
+    reach: tuple[float, float]
+    phase: Interval | None
+    lasts: tuple[float, float]
+    chord: Interval | None = None
+
+
+class _Normal:
+    """Normal equations of one recording, the noise raised to what no load and no gene explains."""
+
+    def __init__(self, case: Case) -> None:
+        H, S, y = case.responses, case.sensitivities, case.lacking
+        both = np.concatenate([H, S], axis=1)
+        left = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
+        size, left_over = both.shape[1], float(left @ left)
+        told = max(float(y @ y) - left_over - size, 0.0) / size  # mean square, in the directions of loads and genes
+        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + LINEAR**2 * told))
+        scale = self.floor**-2
+        self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
+        self.h, self.s = scale * (H.T @ y), scale * (S.T @ y)
+        genes = np.linalg.inv(self.C + np.eye(len(self.C)) / GENES**2)
+        self.alone = self.A - self.B @ genes @ self.B.T
+        self.force = self.h - self.B @ genes @ self.s
+
+    def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
+        """Logarithm of the evidence over that of no load, [K, strengths].
+
+        Of loads that are sums of ``shapes``, K times [Z, stations], each times independent normal numbers for every one
+        of M terms, with standard deviations ``spread`` [M] times the strength.
+        """
+        return np.concatenate(
+            [self._evidence(np.array(list(alike)), spread) for _, alike in groupby(shapes, key=len)]
+            or [np.zeros((0, len(_STRENGTHS)))]
+        )
+
+    def _evidence(self, shapes: Array, spread: Array) -> Array:
+        M = len(spread)
+        Q = len(self.force) // M
+        inner = self.alone.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
+        K, Z = shapes.shape[:2]
+        pairs = np.einsum("kyq,kzr->kyzqr", shapes, shapes).reshape(K * Z * Z, Q * Q)
+        blocks = (pairs @ inner).reshape(K, Z, Z, M, M).transpose(0, 1, 3, 2, 4)
+        whole = (blocks * spread[:, None, None] * spread).reshape(K, Z * M, Z * M)
+        along = ((shapes @ self.force.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
+        size, turn = np.linalg.eigh(whole)
+        told = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
+        along = (along @ turn) * _STRENGTHS[:, None]
+        return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
+
+
+def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt: float = DOUBT) -> Inferred:
+    """Invert ``cases``, which share the nominal genes; ValueError where there is none.
+
+    Kinds of load are averaged over; rods that move otherwise are told where nothing else does as well.
+    ``chord`` [stations] of the wing at the probe's (m), for one that turns; ``doubt`` about the model's responses, as a
+    part of the evidence.
+    """
+    if not cases:
+        raise ValueError("no recording to infer a load from; give at least one")
+    if probe.turning and (chord is None or len(chord) != len(probe.stations)):
+        raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
+    normals = [_Normal(case) for case in cases]
+    families = [smooth(probe, chord), placed(probe, chord), driven(probe)]
+    forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
+    evidence = np.array(
+        [
+            np.concatenate([normal.evidence(family.shapes, s) for family in families for s in spreads(probe)])
+            for normal in normals
+        ]
+    ).transpose(1, 0, 2)  # [forms, R, strengths]
+    best = evidence.max(axis=2)
+    total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
+    weight = np.exp((total - total.max()) / max(doubt * float(total.max()), 1.0))
+    driving = np.array([form.family.driven for form in forms])
+    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that do as well as rods are huge ones at the root
+    kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
+    kinds = []
+    for k in kept:
+        family, number, _ = form = forms[k]
+        strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
+        solved = _solved(normals, [strength * form.root for strength in strengths])
+        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], family.driven, *solved))
+    return Inferred(
+        probe,
+        tuple(case.name for case in cases),
+        tuple(case.crossing for case in cases),
+        tuple(kinds),
+        best[kept[0]],
+        np.array([normal.floor for normal in normals]),
+    )
+
+
+def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array]:
+    """Loads [R, P] and their covariance [R, P, P], the genes free: the loads are eliminated first."""
+    F = len(normals[0].s)
+    precision, slope = np.eye(F) / GENES**2, np.zeros(F)
+    inner = []
+    for one, root in zip(normals, roots, strict=True):
+        V = root @ np.linalg.solve(np.eye(root.shape[1]) + root.T @ one.A @ root, root.T)
+        inner.append(V)
+        precision = precision + one.C - one.B.T @ V @ one.B
+        slope = slope + one.s - one.B.T @ V @ one.h
+    spread = np.linalg.inv(precision)
+    genes = spread @ slope
+    sizes = [V @ (one.h - one.B @ genes) for one, V in zip(normals, inner, strict=True)]
+    covariance = [V + V @ one.B @ spread @ one.B.T @ V for one, V in zip(normals, inner, strict=True)]
+    return np.array(sizes), np.array(covariance)
+
+
+def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
+    """The load under each condition at the probe's stations and PHASES instants from the start of the beat on.
+
+    Of rods that move otherwise, what each of these turns further, rad.
+    """
+    phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
+    values, errors = inferred.fields(np.array(stations), phase)
+    at = tuple(phase.tolist())
+    if not inferred.driven:
+        every = zip(inferred.names, values, errors, strict=True)
+        return tuple(MissingLoad(name, stations, at, table(v), table(e), "N/m") for name, v, e in every)
+    values, errors = np.radians(values), np.radians(errors)
+    return tuple(
+        MissingLoad(name, (0.0,), at, table(v[k : k + 1]), table(e[k : k + 1]), "rad", rod)
+        for k, rod in enumerate(("front", "rear"))
+        if values[:, k].any()
+        for name, v, e in zip(inferred.names, values, errors, strict=True)
+    )
+
+
+def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
+    """Where and when the load acts, over all recordings that show one; None where none does.
+
+    From draws of what the data leave possible. The centre in the beat is that of what is larger than half of the most.
+    """
+    shown = np.flatnonzero(inferred.evidence > TOLD)
+    if not len(shown):
+        return None
+    rng = np.random.default_rng(seed)
+    phase = np.arange(2 * PHASES) / (2 * PHASES)
+    draws = rng.multinomial(_DRAWS, [kind.probability for kind in inferred.kinds])
+    along, during, chords = [], [], list[float]()
+    for kind, count in zip(inferred.kinds, draws, strict=True):
+        if not count:
+            continue
+        fields = _drawn(inferred, kind, shown, phase, int(count), rng)
+        if kind.driven:
+            pass
+        elif kind.centre is not None and kind.width is not None:
+            bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
+            along.append(np.tile(bump, (count, 1)))
+        else:
+            along.append(np.abs(fields).sum(axis=(0, 3)))
+        over = fields - fields.mean(axis=3, keepdims=True) if kind.driven else fields.sum(axis=2, keepdims=True)
+        during.append(np.abs(over).sum(axis=(0, 2)))
+        chords += [kind.chord] * int(count) if kind.chord is not None else []
+    if inferred.driven:
+        return LoadPlace(None, (0.0, 1.0), *_during(phase, np.concatenate(during)))
+    span, reach = _along(np.concatenate(along))
+    likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
+    chord = None
+    if likeliest is not None and inferred.placed > 0.5:  # the mean of all places lies between root and tip
+        span = _told(likeliest.centre, span)
+        chord = _told(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
+    return LoadPlace(span, reach, *_during(phase, np.concatenate(during)), chord)
+
+
+def _told(value: float | None, draws: Interval) -> Interval:
+    """``value`` with the interval of draws, which it may lie at an end of."""
+    if value is None or draws.low is None or draws.high is None:
+        return draws
+    return Interval(value, min(draws.low, value), max(draws.high, value))
+
+
+def _drawn(
+    inferred: Inferred,
+    kind: Kind,
+    shown: npt.NDArray[np.int64],
+    phase: Array,
+    count: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square.
+
+    Of rods that move otherwise [shown, count, 2, phase].
+    """
+    places, found = np.eye(2) if kind.driven else inferred.probe.hats(_SPAN), []
+    for r in shown:
+        size, turn = np.linalg.eigh(kind.covariance[r])
+        off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
+        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.told].reshape(count, places.shape[1], -1)
+        series = inferred.probe.terms(phase + inferred.crossings[r])
+        field = np.einsum("sj,cjk,pk->csp", places, sizes, series, optimize=True)
+        found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))
+    return np.array(found)
+
+
+def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
+    """Centre of loads of sizes [draws, span] with its interval, and the part of the span with 90 % of them."""
+    share = size / size.sum(axis=1, keepdims=True)
+    centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
+    total = np.cumsum(share.mean(axis=0))
+    first, last = np.interp([0.05, 0.95], total, _SPAN)
+    return Interval(*centre.tolist()), (float(first), float(last))
+
+
+def _during(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
+    """The same in the beat, for sizes [draws, phase]."""
+    peak = np.where(size > 0.5 * size.max(axis=1, keepdims=True), size, 0.0)
+    turns = peak @ np.exp(2j * np.pi * phase) / peak.sum(axis=1)
+    middle = turns.mean()
+    if np.abs(middle) < SPREAD:
+        return None, (0.0, 1.0)
+    centre = float(np.angle(middle) / (2 * np.pi)) % 1.0
+    off = np.quantile(np.angle(turns / middle) / (2 * np.pi), [0.05, 0.95])
+    apart = (phase - centre + 0.5) % 1.0 - 0.5
+    order = np.argsort(apart)
+    total = np.cumsum((peak / peak.sum(axis=1, keepdims=True)).mean(axis=0)[order])
+    first, last = np.interp([0.05, 0.95], total, apart[order])
+    return Interval(centre, centre + float(off[0]), centre + float(off[1])), (
+        centre + float(first),
+        centre + float(last),
+    )

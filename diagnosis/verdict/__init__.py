@@ -1,0 +1,1 @@
+"""From fitted hypotheses to probabilities, a verdict, its validation, and the next experiment."""

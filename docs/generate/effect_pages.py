@@ -1,0 +1,119 @@
+"""Parts of docs/effects that follow from the code: ``python -m docs.generate.effect_pages`` writes them.
+
+A page is written by hand but for what stands between ``<!-- NAME -->`` and ``<!-- end of NAME -->``: that is taken from
+the effect's declaration, and a test says where it is stale.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from wingfit.sim.effects.contract import Effect, Measure, Parameter
+from wingfit.sim.effects.registry import EFFECTS
+
+FOLDER = Path(__file__).parents[2] / "docs" / "effects"
+INDEX = FOLDER.parent / "effects.md"
+_MEASURES: dict[Measure, str] = {"span": "spans", "chord": "mean chords", "mass": "wing masses"}
+_POWERS = {
+    "conservative": "It keeps energy: over a beat it neither gives nor takes any.",
+    "dissipative": "It only takes energy.",
+    "any": "It may give energy or take it.",
+}
+
+
+def page_of(name: str) -> Path:
+    """The page of an effect."""
+    return FOLDER / f"{name}.md"
+
+
+def filled(text: str, blocks: dict[str, str]) -> str:
+    """``text`` with its ``blocks``, by their names, up to date; ValueError for one that has no place in it."""
+    for name, block in blocks.items():
+        opening, closing = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+        before, found, rest = text.partition(opening)
+        _, ended, after = rest.partition(closing)
+        if not found or not ended:
+            raise ValueError(f"no place for {name!r}: put '{opening.strip()}' and '{closing}' on lines of their own")
+        text = f"{before}{opening}{block}\n{closing}{after}"
+    return text
+
+
+def blocks_of(effect: Effect) -> dict[str, str]:
+    """What follows from an effect's declaration, by the names of the blocks of its page."""
+    return {"genes": genes(effect), "signature": signature(effect), "power": power(effect), "source": source(effect)}
+
+
+def genes(effect: Effect) -> str:
+    """Table of the genes. Bounds that grow with the rig are told in parts of it."""
+    lines = ["| gene | kind | unit | bounds | typical | what it is |", "|---|---|---|---|---|---|"]
+    for one in effect.parameters:
+        kind = "size" if one in effect.size else "place" if one.place else "shape"
+        bounds = f"{one.lower:g} to {one.upper:g}{_of(one)}{', log' if one.scale == 'log' else ''}"
+        cells = (f"`{effect.name}.{one.name}`", kind, one.unit, bounds, f"{one.typical:g}{_of(one)}", one.description)
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def _of(parameter: Parameter) -> str:
+    return f" {_MEASURES[parameter.of]}" if parameter.of else ""
+
+
+def signature(effect: Effect) -> str:
+    """How to know it in a recording, and what for it may be taken."""
+    others = ", ".join(f"[{EFFECTS[name].title}]({name}.md)" for name in effect.confused_with)
+    return f"{effect.signature[0].upper()}{effect.signature[1:]}. Easily confused with: {others}."
+
+
+def power(effect: Effect) -> str:
+    """Where it acts, what it does with energy, and what it remembers."""
+    memory = f"It remembers {effect.memory}." if effect.memory else "It has no memory."
+    if effect.port == "observation":
+        return f"Acts on what is observed, after the simulation: it has no part in the energy. {memory}"
+    return f"Port: {effect.port}. {_POWERS[effect.power]} {memory}"
+
+
+def source(effect: Effect) -> str:
+    """Where the law is from, and where it is tested."""
+    return f"{effect.source}.\n\nTests: `tests/sim/effects/test_{effect.name}.py`."
+
+
+def index() -> str:
+    """Table of all effects."""
+    lines = ["| effect | family | acts on | looks like | confused with |", "|---|---|---|---|---|"]
+    for effect in EFFECTS.values():
+        others = ", ".join(f"[{name}](effects/{name}.md)" for name in effect.confused_with)
+        cells = (
+            f"[{effect.name}](effects/{effect.name}.md)",
+            effect.family,
+            ", ".join(effect.rigs),
+            effect.signature,
+            others,
+        )
+        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def files(names: Iterable[str]) -> dict[Path, dict[str, str]]:
+    """Blocks of every file: the index and the pages of ``names``."""
+    return {INDEX: {"effects": index()}} | {page_of(name): blocks_of(EFFECTS[name]) for name in names}
+
+
+def main() -> None:
+    """Command line."""
+    argparse.ArgumentParser(prog="python -m docs.generate.effect_pages", description=__doc__).parse_args()
+    for file, blocks in files(EFFECTS).items():
+        text = file.read_text(encoding="utf-8")
+        try:
+            fresh = filled(text, blocks)
+        except ValueError as error:
+            sys.exit(f"{file}: {error}")
+        if fresh != text:
+            file.write_text(fresh, encoding="utf-8")
+            print(file)
+
+
+if __name__ == "__main__":
+    main()

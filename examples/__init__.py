@@ -1,0 +1,1 @@
+"""Small campaigns, and a demonstration that calibrates one of them over HTTP."""

@@ -1,0 +1,1 @@
+"""The layout of ``dataset.yaml``: its models, units and checks, and its JSON Schema."""

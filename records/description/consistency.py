@@ -1,0 +1,149 @@
+"""What takes several values to judge: references between names, order, markers on the planform, masses, motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
+from wingfit.records.description.fields import FourierFile
+from wingfit.records.description.vehicle_file import MotionFile
+from wingfit.records.description.wing_file import StationFile, WingFile
+from wingfit.records.description.yaml_text import Path
+from wingfit.records.errors import nearest
+from wingfit.records.limits import MAX_OPEN_AT_START, PLANFORM_MARGIN
+from wingfit.records.vehicle import WINGS
+
+Inconsistency = tuple[Path, object, str]
+
+
+def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
+    """Everything that does not fit together: path, value, message."""
+    yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
+    recordings = [recording.name for recording in dataset.recordings]
+    yield from _unique(("recordings",), recordings, "name", ignore_case=True)
+    yield from _references(("held_out",), dataset.held_out, recordings, "recording")
+
+
+def _wing(wing: WingFile) -> Iterator[Inconsistency]:
+    yield from _increasing(("wing", "stations"), "y", [station.y_m for station in wing.stations])
+    yield from _unique(("wing", "rods"), [rod.name for rod in wing.rods], "name")
+    yield from _unique(("wing", "markers"), [marker.name for marker in wing.markers], "name")
+    yield from _rods(wing)
+    yield from _references(("wing", "driven_rods"), wing.driven_rods, [rod.name for rod in wing.rods], "rod")
+    markers = [marker.name for marker in wing.markers]
+    yield from _references(("wing", "reference_markers"), wing.reference_markers, markers, "marker")
+    yield from _markers(wing)
+
+
+def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
+    vehicle = dataset.vehicle
+    places = [station.r_m for station in vehicle.stations]
+    if places[0] != 0:
+        message = f"is {places[0]} m; the first station lies on the flapping axis: r_m must be 0 there"
+        yield ("vehicle", "stations", 0, "r_m"), places[0], message
+    yield from _increasing(("vehicle", "stations"), "r", places)
+    wings = WINGS[vehicle.layout] * vehicle.wing_mass_kg
+    masses: list[tuple[Path, Decimal | None]] = [(("vehicle",), vehicle.mass_kg)]
+    masses += [(("recordings", index), recording.mass_kg) for index, recording in enumerate(dataset.recordings)]
+    for path, mass in masses:
+        if mass is not None and wings >= mass:
+            message = f"is {mass} kg; it must be more than the mass of all wings, {wings} kg: check the units (kg)"
+            yield (*path, "mass_kg"), mass, message
+    motions: list[tuple[Path, MotionFile | None]] = [(("vehicle",), vehicle.motion)]
+    motions += [(("recordings", index), recording.motion) for index, recording in enumerate(dataset.recordings)]
+    for path, motion in motions:
+        if vehicle.claps and motion is not None:
+            yield from _starts_closed(motion, (*path, "motion", "flap"))
+
+
+def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
+    """Wings that clap must be about closed at the start of the beat; a split cycle is so by its law."""
+    flap = motion.flap
+    if not isinstance(flap, FourierFile):
+        return
+    phase = 2 * np.pi * np.outer(np.arange(360) / 360, np.arange(1, len(flap.cosine_deg) + 1))
+    angle = np.cos(phase) @ np.array(flap.cosine_deg, float) + np.sin(phase) @ np.array(flap.sine_deg, float)
+    late = (angle[0] - angle.min()) / max(float(np.ptp(angle)), 1e-12)
+    if late > MAX_OPEN_AT_START:
+        message = (
+            f"the wings are closest at {angle.argmin() / 360:.2f} of the beat and {100 * late:.0f} % open at its "
+            f"start; at most {100 * MAX_OPEN_AT_START:g} % are accepted: shift the series to a beat that starts "
+            "with the wings closed, and the recordings' times with it"
+        )
+        yield path, None, message
+
+
+def _increasing(path: Path, key: str, places: Sequence[Decimal]) -> Iterator[Inconsistency]:
+    for index in range(1, len(places)):
+        before, here = places[index - 1], places[index]
+        if here <= before:
+            message = f"is {here} m after {before} m; {key} must increase from root to tip: sort the stations"
+            yield (*path, index, f"{key}_m"), here, message
+
+
+def _unique(
+    path: Path, names: Sequence[str], key: str | None = None, *, ignore_case: bool = False
+) -> Iterator[Inconsistency]:
+    seen: dict[str, str] = {}
+    for index, name in enumerate(names):
+        folded = name.lower() if ignore_case else name
+        here = (*path, index, key) if key else (*path, index)
+        if seen.get(folded) == name:
+            yield here, name, f"{name!r} stands here a second time; every name must be unique: rename one"
+        elif folded in seen:
+            message = f"{name!r} differs from {seen[folded]!r} only by case, which files may not keep: rename one"
+            yield here, name, message
+        seen.setdefault(folded, name)
+
+
+def _references(path: Path, names: Sequence[str], known: Sequence[str], what: str) -> Iterator[Inconsistency]:
+    yield from _unique(path, names)
+    for index, name in enumerate(names):
+        if name not in known:
+            yield (*path, index), name, f"no {what} is called {name!r}; {nearest(name, known)}"
+
+
+def _rods(wing: WingFile) -> Iterator[Inconsistency]:
+    for index, rod in enumerate(wing.rods):
+        if (rod.x_root_m, rod.y_root_m) == (rod.x_tip_m, rod.y_tip_m):
+            message = f"rod {rod.name!r} starts and ends at the same point; its root and tip must differ"
+            yield ("wing", "rods", index), rod.name, message
+
+
+def _markers(wing: WingFile) -> Iterator[Inconsistency]:
+    if list(_increasing((), "y", [station.y_m for station in wing.stations])):
+        return
+    outline = planform_outline(wing.stations)
+    for index, marker in enumerate(wing.markers):
+        distance = distance_outside(outline, float(marker.x_m), float(marker.y_m))
+        if distance > PLANFORM_MARGIN:
+            message = (
+                f"marker {marker.name!r} at x = {marker.x_m} m, y = {marker.y_m} m is "
+                f"{distance * 1e3:.1f} mm outside the planform; at most {PLANFORM_MARGIN * 1e3:g} mm "
+                "are accepted: check unit (m), sign and whether x and y are swapped"
+            )
+            yield ("wing", "markers", index), marker.name, message
+
+
+def planform_outline(stations: Sequence[StationFile]) -> npt.NDArray[np.float64]:
+    """Corners of the planform [N, 2] as (x, y): leading edge from root to tip, then trailing edge back."""
+    leading = [(float(s.leading_edge_m), float(s.y_m)) for s in stations]
+    trailing = [(float(s.leading_edge_m + s.chord_m), float(s.y_m)) for s in stations]
+    return np.array(leading + trailing[::-1])
+
+
+def distance_outside(outline: npt.NDArray[np.float64], x: float, y: float) -> float:
+    """Distance from (x, y) to the planform, m; 0 inside."""
+    start, end = outline, np.roll(outline, -1, axis=0)
+    point, edge = np.array([x, y]), end - start
+    # Inside when a ray to +x crosses the outline an odd number of times.
+    crosses = (start[:, 1] > y) != (end[:, 1] > y)
+    slope = np.divide(edge[:, 0], edge[:, 1], out=np.zeros(len(edge)), where=crosses)
+    if np.count_nonzero(crosses & (x < start[:, 0] + (y - start[:, 1]) * slope)) % 2:
+        return 0.0
+    along = np.clip(((point - start) * edge).sum(axis=1) / np.maximum((edge**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    return float(np.hypot(*(start + along[:, None] * edge - point).T).min())

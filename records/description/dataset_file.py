@@ -1,0 +1,50 @@
+"""The layout of ``dataset.yaml``: pydantic models, in the units that people write, with physical limits.
+
+Only shape and single values are checked here; what needs several values (references between names, markers on
+the planform) is in ``wingfit.records.description.consistency``. The published JSON Schema is generated from these
+models.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from wingfit.records.description.fields import Name, Prose, Strict, Title, whole
+from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
+from wingfit.records.description.wing_file import WingFile, WingRecordingFile
+from wingfit.records.limits import MAX_RECORDINGS
+
+
+class _DatasetFile(Strict):
+    format_version: Annotated[Literal[1], BeforeValidator(whole)]
+    name: Title
+    description: Prose = ""
+    held_out: list[Name] = Field(default_factory=list, max_length=MAX_RECORDINGS)
+
+
+class WingDatasetFile(_DatasetFile):
+    """A wing with recordings of its markers."""
+
+    wing: WingFile
+    recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
+
+
+class VehicleDatasetFile(_DatasetFile):
+    """A vehicle with recordings of its forces."""
+
+    vehicle: VehicleFile
+    recordings: list[VehicleRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
+
+
+DatasetFile = WingDatasetFile | VehicleDatasetFile
+
+
+def model_of(data: object) -> type[DatasetFile]:
+    """The model that ``data``, not checked yet, is meant for: a vehicle's where it has that key, or nearly."""
+    keys = [str(key) for key in data] if isinstance(data, Mapping) else []
+    meant = "wing" not in keys and difflib.get_close_matches("vehicle", keys, 1, 0.7)
+    return VehicleDatasetFile if meant else WingDatasetFile

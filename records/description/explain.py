@@ -1,0 +1,173 @@
+"""Checks a description against its models and turns what pydantic says into errors a user can act on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from wingfit.records.description.consistency import inconsistencies
+from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile, WingDatasetFile, model_of
+from wingfit.records.description.quantity import FAULT, kind
+from wingfit.records.description.yaml_text import Document, Path
+from wingfit.records.errors import Faults, fail, nearest
+
+Location = tuple[int | str, ...]
+_SUFFIX = re.compile(
+    r"_(?:hz|khz|rpm|rad_s|rad|deg_s|deg|degrees|m|mm|cm|um|metres|meters|in|ft|m_s|km_h|kmh|kn|m_s2|pa|hpa|kpa|bar|mbar"
+    r"|atm|torr|k|c|f|kelvin|celsius|kg|g|mg|kg_m3|g_cm3|g_m3|kg_m2|g_m2|kg_m|g_m|s|s2|ms|us|n|mn|gf|beats"
+    r"|rad_per_beat|deg_per_beat)$"
+)
+_KINDS = {
+    "list_type": "a list",
+    "dict_type": "a mapping of keys to values",
+    "model_type": "a mapping of keys to values",
+    "model_attributes_type": "a mapping of keys to values",
+    "string_type": "text",
+    "bool_type": "true or false",
+}
+_RIGS = {"wing": "a wing with tracks of markers", "vehicle": "a vehicle with forces"}
+_OTHER: dict[type[DatasetFile], tuple[type[DatasetFile], str, str]] = {
+    WingDatasetFile: (VehicleDatasetFile, "wing", "vehicle"),
+    VehicleDatasetFile: (WingDatasetFile, "vehicle", "wing"),
+}
+
+
+def check_description(document: Document) -> DatasetFile:
+    """Validate the description; DatasetError lists everything that is wrong with it."""
+    faults, data = Faults(), document.data
+    if isinstance(data, Mapping) and "wing" in data and "vehicle" in data:
+        message = f"both 'wing' and 'vehicle' are described; a dataset is {' or '.join(_RIGS.values())}: split it"
+        raise fail(document.where(("vehicle",)), None, message)
+    root = model_of(data)
+    try:
+        checked = root.model_validate(data)
+    except ValidationError as error:
+        _Explainer(document, root).explain(error.errors(include_url=False), faults)
+        faults.raise_any()
+        raise
+    for path, value, message in inconsistencies(checked):
+        faults.add(document.where(path), value, message)
+    faults.raise_any()
+    return checked
+
+
+class _Explainer:
+    """Puts pydantic's errors about one description into words; ``root`` is the model it was checked against."""
+
+    def __init__(self, document: Document, root: type[DatasetFile]) -> None:
+        self.document, self.root = document, root
+
+    def explain(self, errors: list[ErrorDetails], faults: Faults) -> None:
+        """Note all errors."""
+        mistaken = {self._renamed(error["loc"]) for error in errors if error["type"] == "extra_forbidden"}
+        for error in errors:
+            path, unknown = _path(error, self.document.data), error["type"] == "extra_forbidden"
+            # A key with the wrong unit is one mistake, not an unknown key and a missing one.
+            if error["type"] == "missing" and error["loc"] in mistaken:
+                continue
+            value = error["input"] if error["type"] != "missing" else None
+            faults.add(self.document.where(path), path[-1] if unknown else value, self._message(error))
+
+    def _message(self, error: ErrorDetails) -> str:
+        what, location = error["type"], error["loc"]
+        if what == "missing":
+            if location in {("wing",), ("vehicle",)}:
+                return "there is neither 'wing' nor 'vehicle'; describe " + " or ".join(_RIGS.values())
+            return "this key is missing; add it (docs/formats.md)"
+        if what == "extra_forbidden":
+            return self._unknown_key(location)
+        if what == "union_tag_not_found":
+            kinds = " or ".join(str(_kind(model)) for model in _models(self.root, location))
+            return f"the key 'kind' is missing; it must be {kinds}"
+        return _plain_message(error)
+
+    def _unknown_key(self, location: Location) -> str:
+        key, renamed = str(location[-1]), self._renamed(location)
+        if renamed is not None:
+            return f"unknown key {key!r}; write {renamed[-1]!r} and give the value in that unit"
+        fields = self._fields(location)
+        other, this, that = _OTHER[self.root]
+        parent = tuple(that if part == this else part for part in location[:-1])
+        if any(key in model.model_fields for model in _models(other, parent)):
+            return f"key {key!r} is for a {that}, this is a {this}; {nearest(key, fields)}"
+        return f"unknown key {key!r}; {nearest(key, fields)}"
+
+    def _renamed(self, location: Location) -> Location | None:
+        """Where an unknown key should have stood, when it is a known one with another unit or none."""
+        key = str(location[-1])
+        for known in self._fields(location):
+            if _SUFFIX.search(known) and _stem(known) == _stem(key):
+                return (*location[:-1], known)
+        return None
+
+    def _fields(self, location: Location) -> list[str]:
+        """Keys that may stand beside the one at ``location``."""
+        return [name for model in _models(self.root, location[:-1])[:1] for name in model.model_fields]
+
+
+def _plain_message(error: ErrorDetails) -> str:
+    """Explain an error that says all by itself."""
+    what, context, value = error["type"], error.get("ctx", {}), error["input"]
+    if what == FAULT:
+        return error["msg"]
+    if what == "union_tag_invalid":
+        return f"kind is {context.get('tag')!r}; it must be {context.get('expected_tags')}"
+    if what == "literal_error":
+        version = "; a newer wingfit may read it" if error["loc"][-1] == "format_version" else ""
+        return f"is {kind(value)}; it must be {context.get('expected')}{version}"
+    if what == "too_short":
+        found, needed = context.get("actual_length"), context.get("min_length")
+        return f"has {found} entries, at least {needed} are needed: add some"
+    if what == "too_long":
+        return f"has more than {context.get('max_length')} entries, the most that are read; remove some"
+    if what in _KINDS:
+        return f"is {kind(value)}; it must be {_KINDS[what]}"
+    return error["msg"]
+
+
+def _stem(key: str) -> str:
+    return _SUFFIX.sub("", key.lower())
+
+
+def _models(root: type[BaseModel], location: Location) -> list[type[BaseModel]]:
+    """Models that may describe what stands at ``location``: several where a union is not decided by its tag."""
+    models = [root]
+    for part in location:
+        fields = [model.model_fields[str(part)] for model in models if str(part) in model.model_fields]
+        if fields:
+            models = [model for field in fields for model in _inside(field.annotation)]
+        else:
+            models = [model for model in models if _kind(model) == part] or models
+    return models
+
+
+def _inside(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models within a type such as ``list[Model] | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _inside(argument)
+
+
+def _kind(model: type[BaseModel]) -> str | None:
+    """The tag of a model in a union."""
+    field = model.model_fields.get("kind")
+    return str(get_args(field.annotation)[0]) if field else None
+
+
+def _path(error: ErrorDetails, data: Any) -> Path:
+    """Pydantic's location as a path in the data: without the tags of unions, which stand in no file."""
+    location, path = error["loc"], list[str | int]()
+    for number, part in enumerate(location):
+        inside = isinstance(data, Mapping) and part in data
+        indexed = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if inside or indexed:
+            data = data[part]
+        elif error["type"] != "missing" or number < len(location) - 1:
+            continue
+        path.append(part)
+    return tuple(path)

@@ -1,0 +1,108 @@
+"""Types of single keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from wingfit.records.description.quantity import Text, fault, limits
+from wingfit.records.drive import FourierDrive
+from wingfit.records.limits import MAX_ESTIMATES, MAX_HARMONICS
+from wingfit.records.units import DEG, from_si, to_si
+from wingfit.records.vehicle import FourierFlap, FourierPitch
+
+METRES = "give metres: 0.22, not 220 or 22"
+
+Name = Annotated[
+    str,
+    Text(
+        "[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9_-])?",
+        100,
+        "name",
+        "a name has letters, digits, '.', '_', '-'; it starts with a letter or digit, ends without '.'",
+    ),
+]
+GeneName = Annotated[
+    str,
+    Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'"),
+]
+_UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
+Title = Annotated[
+    str,
+    Text(
+        rf"[^{_UNPRINTABLE}]+",
+        200,
+        "title",
+        "a title is one line of printable text, not empty",
+        portable=False,
+    ),
+]
+Prose = Annotated[
+    str,
+    Text(
+        rf"(?:[^{_UNPRINTABLE}]|[\t\n])*",
+        20_000,
+        "free text",
+        "it must be printable text without control characters",
+        portable=False,
+    ),
+]
+Angle = Annotated[Decimal, limits("-180", "180", "deg", "angle", "give degrees")]
+Chord = Annotated[Decimal, limits("0.0001", "5", "m", "chord", METRES)]
+Thickness = Annotated[Decimal, limits("0", "0.5", "m", "thickness", "give metres: 0.012, not 12", above=True)]
+Frequency = Annotated[Decimal, limits("0.01", "1000", "Hz", "beats per second")]
+Pressure = Annotated[
+    Decimal,
+    limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325"),
+]
+Temperature = Annotated[Decimal, limits("-100", "100", "°C", "air temperature", "give degrees Celsius: 20, not 293.15")]
+Estimates = Annotated[
+    dict[GeneName, Annotated[Decimal, limits("-1e300", "1e300", "", "estimate of a gene, SI units")]],
+    Field(default_factory=dict, max_length=MAX_ESTIMATES),
+]
+
+
+class Strict(BaseModel):
+    """Base of all models of the file: a key that is not known is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FourierFile(Strict):
+    """An angle as a Fourier series over the beat; entry k belongs to the k-th harmonic."""
+
+    kind: Literal["fourier"]
+    mean_deg: Angle
+    cosine_deg: list[Angle] = Field(min_length=1, max_length=MAX_HARMONICS)
+    sine_deg: list[Angle] = Field(min_length=1, max_length=MAX_HARMONICS)
+
+    @model_validator(mode="after")
+    def _paired(self) -> FourierFile:
+        cosines, sines = len(self.cosine_deg), len(self.sine_deg)
+        if cosines != sines:
+            raise fault(f"cosine_deg has {cosines} entries and sine_deg {sines}; give as many of each: fill up with 0")
+        return self
+
+    def radians(self) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
+        """Mean, cosine and sine terms in rad."""
+        cosine, sine = (tuple(to_si(value, DEG) for value in terms) for terms in (self.cosine_deg, self.sine_deg))
+        return to_si(self.mean_deg, DEG), cosine, sine
+
+
+def fourier_data(series: FourierDrive | FourierFlap | FourierPitch) -> dict[str, object]:
+    """``series`` as the plain data of ``dataset.yaml``."""
+    return {
+        "kind": series.kind,
+        "mean_deg": from_si(series.mean, DEG),
+        "cosine_deg": [from_si(value, DEG) for value in series.cosine],
+        "sine_deg": [from_si(value, DEG) for value in series.sine],
+    }
+
+
+def whole(value: Any) -> Any:
+    """``value`` as an int where it is a whole number, for types that admit only ints."""
+    if isinstance(value, Decimal) and abs(value) < 10**6 and value == value.to_integral_value():
+        return int(value)
+    return value

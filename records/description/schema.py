@@ -1,0 +1,40 @@
+"""The JSON Schema of ``dataset.yaml``, generated from its models; run as a module, it is printed."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from wingfit.records.description.dataset_file import DatasetFile
+from wingfit.records.limits import FORMAT_VERSION
+
+
+def dataset_schema() -> dict[str, Any]:
+    """JSON Schema (2020-12) of the description, version ``FORMAT_VERSION`` of the format."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:wingfit:schema:dataset:{FORMAT_VERSION}",
+        **_untitled(TypeAdapter[object](DatasetFile).json_schema()),
+        "title": f"wingfit dataset.yaml, format {FORMAT_VERSION}",
+    }
+
+
+def schema_text() -> str:
+    """Write the schema as it is published in docs/schemas/dataset.schema.json."""
+    return json.dumps(dataset_schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _untitled(schema: Any) -> Any:
+    """Drop the titles that pydantic derives from key names; they say nothing."""
+    if isinstance(schema, list):
+        return [_untitled(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: _untitled(item) for key, item in schema.items() if not (key == "title" and isinstance(item, str))}
+
+
+if __name__ == "__main__":
+    sys.stdout.write(schema_text())

@@ -1,0 +1,160 @@
+"""The layout of ``wing:`` in ``dataset.yaml`` and of the recordings of its markers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from wingfit.records.description.fields import (
+    METRES,
+    Chord,
+    Estimates,
+    FourierFile,
+    Frequency,
+    Name,
+    Pressure,
+    Strict,
+    Temperature,
+    Thickness,
+    Title,
+)
+from wingfit.records.description.quantity import fault, limits
+from wingfit.records.limits import MAX_MARKERS, MAX_RODS, MAX_STATIONS
+
+Place = Annotated[Decimal, limits("-10", "10", "m", "coordinate in the wing frame (x aft, y outboard, z up)", METRES)]
+Length = Annotated[Decimal, limits("0", "10", "m", "length", METRES, above=True)]
+Deviation = Annotated[
+    Decimal,
+    limits("0", "0.1", "m", "standard deviation of the noise", "give metres: 0.0005, not 0.5", above=True),
+]
+
+
+class StationFile(Strict):
+    """Section of the planform."""
+
+    y_m: Place
+    leading_edge_m: Place
+    chord_m: Chord
+    thickness_m: Thickness
+
+
+class MaterialsFile(Strict):
+    """Masses that are no genes."""
+
+    foam_density_kg_m3: Annotated[Decimal, limits("0", "2000", "kg/m^3", "density of the foam", above=True)]
+    skin_areal_density_kg_m2: Annotated[
+        Decimal,
+        limits("0", "10", "kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2"),
+    ]
+
+
+class RodFile(Strict):
+    """Carbon rod in its straw."""
+
+    name: Name
+    x_root_m: Place
+    y_root_m: Place
+    x_tip_m: Place
+    y_tip_m: Place
+    diameter_m: Annotated[Decimal, limits("0", "0.05", "m", "diameter", "give metres: 0.002, not 2", above=True)]
+    density_kg_m3: Annotated[
+        Decimal, limits("0", "25000", "kg/m^3", "density", "give kg/m^3: 1600, not 1.6", above=True)
+    ]
+    glue_linear_density_kg_m: Annotated[
+        Decimal, limits("0", "1", "kg/m", "straw with its glue", "give kg/m: 0.002, not 2 g/m")
+    ]
+
+
+class MarkerFile(Strict):
+    """Tracked marker at rest."""
+
+    name: Name
+    x_m: Place
+    y_m: Place
+    z_m: Place
+    mass_kg: Annotated[Decimal, limits("0", "0.1", "kg", "mass", "give kilograms: 0.0001, not 0.1 g")]
+
+
+class HingeFile(Strict):
+    """Axis of flapping, parallel to x."""
+
+    y_m: Place
+    z_m: Place
+
+
+class FourBarFile(Strict):
+    """Crank-rocker linkage that drives the rods."""
+
+    kind: Literal["four_bar"]
+    ground_m: Length
+    crank_m: Length
+    coupler_m: Length
+    rocker_m: Length
+    offset_deg: Annotated[Decimal, limits("-360", "360", "deg", "added to the rocker angle", "give degrees")]
+
+    @model_validator(mode="after")
+    def _crank_turns(self) -> FourBarFile:
+        others = sorted((self.ground_m, self.coupler_m, self.rocker_m))
+        if self.crank_m >= others[0]:
+            raise fault(
+                f"crank_m is {self.crank_m} m; it must be below the shortest of the other links, "
+                f"{others[0]} m, for the crank to turn fully (Grashof): shorten it or check the links"
+            )
+        longest, rest = self.crank_m + others[2], others[0] + others[1]
+        if longest >= rest:
+            raise fault(
+                f"shortest + longest link is {longest} m; it must be below the sum of the other two, "
+                f"{rest} m, for the crank to turn fully (Grashof): check the lengths"
+            )
+        return self
+
+
+class WingFile(Strict):
+    """The wing as built."""
+
+    name: Title
+    stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)
+    materials: MaterialsFile
+    rods: list[RodFile] = Field(min_length=2, max_length=MAX_RODS)
+    driven_rods: list[Name] = Field(min_length=2, max_length=2, description="front rod, rear rod")
+    markers: list[MarkerFile] = Field(min_length=1, max_length=MAX_MARKERS)
+    reference_markers: list[Name] = Field(min_length=1, max_length=MAX_MARKERS)
+    hinge: HingeFile
+    drive: Annotated[FourierFile | FourBarFile, Field(discriminator="kind")]
+    estimates: Estimates
+
+
+def _noise_kind(value: Any) -> str:
+    return "per_marker" if isinstance(value, Mapping) else "one"
+
+
+Noise = Annotated[
+    Annotated[Deviation, Tag("one")]
+    | Annotated[dict[Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("per_marker")],
+    Discriminator(_noise_kind),
+]
+
+
+class WingRecordingFile(Strict):
+    """One recording; its tracks are in ``recordings/<name>.csv``."""
+
+    name: Name
+    rig: Literal["vacuum_chamber", "wind_tunnel"]
+    flap_frequency_hz: Frequency
+    phase_lag_deg: Annotated[
+        Decimal, limits("-180", "180", "deg", "lag of the rear rod", "give degrees of drive phase")
+    ]
+    pressure_mbar: Pressure
+    temperature_c: Temperature
+    airspeed_m_s: Annotated[Decimal, limits("0", "100", "m/s", "speed of the airstream, aft")] = Decimal(0)
+    angle_of_attack_deg: Annotated[Decimal, limits("-90", "90", "deg", "of the rig", "give degrees")] = Decimal(0)
+    gravity_m_s2: Annotated[Decimal, limits("0", "30", "m/s^2", "along -z", "give a positive number")] = Decimal(
+        "9.80665"
+    )
+    standard_deviation_m: Noise | None = Field(
+        None,
+        description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown",
+    )

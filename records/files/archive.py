@@ -1,0 +1,120 @@
+"""A dataset as a zip of its folder. Archives come from strangers: sizes first, nothing is extracted."""
+
+from __future__ import annotations
+
+import io
+import re
+import stat
+import zipfile
+import zlib
+from collections.abc import Sequence
+
+from wingfit.records.dataset import Dataset
+from wingfit.records.errors import Faults, fail
+from wingfit.records.files.folder import DESCRIPTION, contents, read_files
+from wingfit.records.limits import MAX_COMPRESSION_RATIO, MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB, RATIO_FREE_BYTES
+
+_BROKEN = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    OSError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+    OverflowError,
+    IndexError,
+)
+_METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
+_JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\._)")
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+class ZipFiles:
+    """Files in a zip, those of a single top-level folder seen from inside it."""
+
+    def __init__(self, data: bytes, label: str) -> None:
+        self.label = label
+        try:
+            self._zip = zipfile.ZipFile(io.BytesIO(data))
+        except _BROKEN as error:
+            raise fail(label, None, f"not a readable zip: {error}; it may be cut off: zip and upload again") from None
+        entries = self._zip.infolist()
+        _check_entries(entries, len(data), label)
+        files = [entry for entry in entries if not entry.is_dir() and not _JUNK.search(entry.filename)]
+        prefix = _prefix([entry.filename for entry in files])
+        self._entries = {entry.filename.removeprefix(prefix): entry for entry in files}
+
+    def names(self) -> list[str]:
+        """Names of all files."""
+        return list(self._entries)
+
+    def read(self, name: str) -> bytes:
+        """Contents of a file; DatasetError when the archive is damaged there."""
+        try:
+            return self._zip.read(self._entries[name])
+        except _BROKEN as error:
+            raise fail(f"{self.label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
+
+
+def read_zip(data: bytes, label: str) -> Dataset:
+    """Read a dataset from the bytes of a zip."""
+    return read_files(ZipFiles(data, label))
+
+
+def write_zip(dataset: Dataset) -> bytes:
+    """Pack the dataset as a zip; the same dataset gives the same bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name, data in sorted(contents(dataset).items()):
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.create_system = 3
+            entry.external_attr = (stat.S_IFREG | 0o644) << 16
+            archive.writestr(entry, data, zipfile.ZIP_DEFLATED, 6)
+    return buffer.getvalue()
+
+
+def _check_entries(entries: Sequence[zipfile.ZipInfo], packed: int, label: str) -> None:
+    if len(entries) > MAX_ENTRIES:
+        message = f"has {len(entries)} entries; at most {MAX_ENTRIES} are read: is this the right file?"
+        raise fail(label, len(entries), message)
+    expanded = sum(entry.file_size for entry in entries)
+    if expanded > MAX_EXPANDED_BYTES:
+        message = f"unpacks to {expanded / MIB:.0f} MiB; at most {MAX_EXPANDED_BYTES // MIB} MiB are read: split it"
+        raise fail(label, expanded, message)
+    if expanded > RATIO_FREE_BYTES and expanded > MAX_COMPRESSION_RATIO * packed:
+        message = (
+            f"unpacks to {expanded / packed:.0f} times its size; at most {MAX_COMPRESSION_RATIO} times are "
+            "read: zip with less compression, or upload NetCDF"
+        )
+        raise fail(label, expanded, message)
+    faults, seen = Faults(), set[str]()
+    for entry in entries:
+        problem = _entry_problem(entry) or ("stands twice in the zip; keep one" if entry.filename in seen else None)
+        if problem:
+            faults.add(f"{label}: {entry.filename!r}", entry.filename, problem)
+        seen.add(entry.filename)
+    faults.raise_any()
+
+
+def _entry_problem(entry: zipfile.ZipInfo) -> str | None:
+    # zipfile cuts a name at its first NUL and turns backslashes round; judge what is really stored.
+    name = entry.orig_filename
+    if "\0" in name or "\\" in name:
+        return "a name with a backslash or NUL; zip again with '/' between folder and file"
+    if name.startswith("/") or re.match(r"[A-Za-z]:", name) or ".." in name.split("/"):
+        return "a path that leads out of the archive; zip the dataset's folder, without '..' or leading '/'"
+    if stat.S_ISLNK(entry.external_attr >> 16):
+        return "a symbolic link; zip the file itself"
+    if entry.flag_bits & 0x1:
+        return "encrypted; zip again without a password"
+    if entry.compress_type not in _METHODS:
+        return f"packed by method {entry.compress_type}; zip again with the usual 'deflate'"
+    return None
+
+
+def _prefix(names: Sequence[str]) -> str:
+    """``folder/`` when everything lies in one folder that holds the description, else nothing."""
+    folders = {name.partition("/")[0] for name in names}
+    single = f"{folders.pop()}/" if len(folders) == 1 else ""
+    return single if f"{single}{DESCRIPTION}" in names else ""

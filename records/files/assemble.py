@@ -1,0 +1,160 @@
+"""From a description and numbers, however stored, to a dataset; and the same checks before writing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from wingfit.records.dataset import Dataset, Recording
+from wingfit.records.description import convert_vehicle, convert_wing
+from wingfit.records.description.dataset_file import VehicleDatasetFile
+from wingfit.records.description.explain import check_description
+from wingfit.records.description.vehicle_file import VehicleRecordingFile
+from wingfit.records.description.wing_file import WingRecordingFile
+from wingfit.records.description.yaml_text import Document
+from wingfit.records.errors import DatasetError, Faults, nearest
+from wingfit.records.files.forces import AXES
+from wingfit.records.files.plausibility import check_numbers
+from wingfit.records.files.table import Samples, too_much
+from wingfit.records.limits import FORMAT_VERSION, MAX_VALUES
+from wingfit.records.vehicle import Vehicle
+from wingfit.records.wing import Wing
+
+ReadSamples = Callable[[str, int], Samples]
+At = Callable[[str, Samples, int], str]
+
+
+def assemble(
+    document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
+) -> Dataset:
+    """Build the dataset described by ``document``, of at most ``room`` numbers.
+
+    ``read(name, room)`` gives the samples of a recording of at most ``room`` numbers, ``where(name)``
+    says where they are stored, ``at(name, samples, row)`` where one instant is. Faults of all recordings are
+    collected.
+    """
+    checked = check_description(document)
+    rig: Wing | Vehicle
+    if isinstance(checked, VehicleDatasetFile):
+        rig = convert_vehicle.to_vehicle(checked.vehicle)
+    else:
+        rig = convert_wing.to_wing(checked.wing)
+    faults, recordings = Faults(), list[Recording]()
+    entries: Sequence[WingRecordingFile | VehicleRecordingFile] = checked.recordings
+    for index, entry in enumerate(entries):
+        try:
+            samples = read(entry.name, room)
+        except DatasetError as error:
+            faults.extend(error)
+            continue
+        room -= samples.values.size + samples.times.size
+        path = ("recordings", index)
+        recording = (
+            convert_wing.to_recording(entry, samples, document, path, faults)
+            if isinstance(entry, WingRecordingFile)
+            else convert_vehicle.to_recording(entry, samples, document, path, faults)
+        )
+        check_numbers(
+            recording,
+            rig,
+            where(entry.name),
+            lambda row, name=entry.name, samples=samples: at(name, samples, row),  # type: ignore[misc]
+            faults,
+        )
+        recordings.append(recording)
+        if faults.full:
+            break
+    faults.raise_any()
+    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
+
+
+def checked_description(dataset: Dataset) -> dict[str, object]:
+    """Describe ``dataset``, after the checks that reading makes: what is written can be read."""
+    faults = Faults()
+    for recording in dataset.recordings:
+        _check_kind(recording, dataset, faults)
+        _check_shapes(recording, faults)
+    faults.raise_any()
+    data = describe(dataset)
+    check_description(Document(f"dataset {dataset.name!r}", data))
+    numbers = 0
+    for recording in dataset.recordings:
+        where = f"recording {recording.name!r}"
+        if dataset.kind == "tracks":
+            _check_markers(recording, dataset.wing, where, faults)
+        check_numbers(
+            recording,
+            dataset.rig,
+            where,
+            lambda row, where=where: f"{where}, frame {row}",  # type: ignore[misc]
+            faults,
+        )
+        numbers += recording.values.size + recording.times.size
+    if numbers > MAX_VALUES:
+        faults.extend(too_much(f"dataset {dataset.name!r}"))
+    faults.raise_any()
+    return data
+
+
+def describe(dataset: Dataset) -> dict[str, object]:
+    """``dataset`` without its numbers, as the plain data of ``dataset.yaml``."""
+    rig: dict[str, object]
+    if isinstance(dataset.rig, Vehicle):
+        rig = {"vehicle": convert_vehicle.describe_vehicle(dataset.rig)}
+        recordings = [convert_vehicle.describe_recording(recording) for recording in dataset.recordings]
+    else:
+        rig = {"wing": convert_wing.describe_wing(dataset.rig)}
+        recordings = [convert_wing.describe_recording(recording) for recording in dataset.recordings]
+    return {
+        "format_version": FORMAT_VERSION,
+        "name": dataset.name,
+        **({"description": dataset.description} if dataset.description else {}),
+        **rig,
+        "recordings": recordings,
+        **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
+    }
+
+
+def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
+    """Note what the file of this kind of dataset has no place for, rather than lose it."""
+    where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
+    lost: list[tuple[str, object]] = [
+        ("markers", recording.markers),
+        ("condition.phase_lag", recording.condition.phase_lag),
+    ]
+    if not kept:
+        lost = [(name, getattr(recording, name)) for name in ("forces", "low_pass", "motion", "mass")]
+    for name, value in lost:
+        if value:
+            what = "a vehicle with forces" if kept else "a wing with tracks"
+            faults.add(f"{where}: {name}", value, f"has no place in a dataset of {what}: remove it")
+    orders = [AXES[:1], AXES[1:], AXES]
+    if kept and recording.forces not in orders:
+        message = f"forces are {recording.forces!r}; they must be one of {', '.join(map(str, orders))}"
+        faults.add(f"{where}: forces", ", ".join(recording.forces), message)
+
+
+def _check_shapes(recording: Recording, faults: Faults) -> None:
+    where, times, channels = f"recording {recording.name!r}", len(recording.times), len(recording.channels)
+    wanted = {"times": (times,), "values": (times, channels), "standard_deviation": (channels,)}
+    for name, shape in wanted.items():
+        array = getattr(recording, name)
+        if array is None:
+            continue
+        if np.shape(array) != shape or np.asarray(array).dtype != np.float64:
+            found = f"{np.asarray(array).dtype} {list(np.shape(array))}"
+            faults.add(
+                f"{where}: {name}",
+                found,
+                f"is {found}; it must be float64 {list(shape)}: convert or transpose it",
+            )
+
+
+def _check_markers(recording: Recording, wing: Wing, where: str, faults: Faults) -> None:
+    known = [marker.name for marker in wing.markers]
+    for index, name in enumerate(recording.markers):
+        if name not in known:
+            faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")
+        if name in recording.markers[:index]:
+            faults.add(where, name, f"marker {name!r} stands twice; keep one")

@@ -1,0 +1,151 @@
+"""A dataset as files: ``dataset.yaml`` and ``recordings/<name>.csv``, in a folder or whatever holds files."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Protocol
+
+from wingfit.records.dataset import Dataset, Recording
+from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
+from wingfit.records.description.yaml_text import read_yaml, write_yaml
+from wingfit.records.errors import DatasetError, Faults, fail
+from wingfit.records.files.assemble import assemble, checked_description
+from wingfit.records.files.forces import read_forces
+from wingfit.records.files.table import Samples, write_table
+from wingfit.records.files.tracks import read_tracks
+from wingfit.records.limits import MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB
+
+DESCRIPTION = "dataset.yaml"
+RECORDINGS = "recordings"
+
+
+class Files(Protocol):
+    """Something that holds files."""
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        ...
+
+    def names(self) -> list[str]:
+        """Names of all files, folders separated by '/'."""
+        ...
+
+    def read(self, name: str) -> bytes:
+        """Contents of a file."""
+        ...
+
+
+class FolderFiles:
+    """Files in a folder."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.label = str(path)
+
+    def names(self) -> list[str]:
+        """Files that may belong to a dataset: the description and what lies in ``recordings``."""
+        top = [path.name for path in self.path.iterdir() if path.is_file()]
+        inner = [f"{RECORDINGS}/{p.name}" for p in (self.path / RECORDINGS).glob("*") if p.is_file()]
+        names = top + inner
+        if len(names) > MAX_ENTRIES:
+            message = f"holds {len(names)} files; at most {MAX_ENTRIES} are read: is this the right folder?"
+            raise fail(self.label, len(names), message)
+        return names
+
+    def read(self, name: str) -> bytes:
+        """Contents of a file; DatasetError when it is too large or not readable."""
+        path = self.path / name
+        try:
+            size = path.stat().st_size
+            if size > MAX_EXPANDED_BYTES:
+                message = f"is {size / MIB:.0f} MiB; at most {MAX_EXPANDED_BYTES // MIB} MiB are read: split it"
+                raise fail(name, size, message)
+            return path.read_bytes()
+        except OSError as error:
+            raise fail(name, None, f"cannot be read: {error.strerror}; check its permissions") from None
+
+
+def read_files(files: Files) -> Dataset:
+    """Read a dataset; DatasetError lists what is wrong with it."""
+    names = files.names()
+    if DESCRIPTION not in names:
+        raise fail(files.label, None, _no_description(names))
+    document = read_yaml(files.read(DESCRIPTION), DESCRIPTION)
+    markers = document.names("wing", "markers")
+    listed = document.names("recordings")
+
+    def read(name: str, room: int) -> Samples:
+        file = sample_file(name)
+        if file not in names:
+            raise fail(document.where(_place(listed, name)), name, _no_samples(file, names))
+        if model_of(document.data) is VehicleDatasetFile:
+            return read_forces(files.read(file), file, room)
+        return read_tracks(files.read(file), file, markers, room)
+
+    def at(name: str, samples: Samples, row: int) -> str:
+        return f"{sample_file(name)}, line {samples.lines[row]}"
+
+    faults = Faults()
+    dataset = None
+    try:
+        dataset = assemble(document, read, sample_file, at)
+    except DatasetError as error:
+        faults.extend(error)
+    for name in sorted(names):
+        if name.startswith(f"{RECORDINGS}/") and name.lower().endswith(".csv") and _stem(name) not in listed:
+            message = f"is not listed in {DESCRIPTION}; add '- name: {_stem(name)}' to recordings, or remove it"
+            faults.add(name, name, message)
+    faults.raise_any()
+    assert dataset is not None  # noqa: S101 - otherwise there was a fault
+    return dataset
+
+
+def contents(dataset: Dataset) -> dict[str, bytes]:
+    """Write the files of ``dataset`` into memory, sorted; DatasetError when it breaks a limit."""
+    files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
+    for recording in sorted(dataset.recordings, key=lambda r: r.name):
+        files[sample_file(recording.name)] = _table(recording).encode()
+    return files
+
+
+def _table(recording: Recording) -> str:
+    unit = "n" if recording.kind == "forces" else "m"
+    return write_table([f"{channel}_{unit}" for channel in recording.channels], recording.times, recording.values)
+
+
+def write_folder(dataset: Dataset, path: Path) -> None:
+    """Write ``dataset`` into a new or empty folder; DatasetError when there is anything in it."""
+    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+        raise fail(str(path), None, "exists and is not an empty folder; choose a new name or remove it first")
+    for name, data in contents(dataset).items():
+        target = path / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(data)
+
+
+def sample_file(name: str) -> str:
+    """Name of the file with the samples of a recording."""
+    return f"{RECORDINGS}/{name}.csv"
+
+
+def _stem(name: str) -> str:
+    return name.rpartition("/")[2][: -len(".csv")]
+
+
+def _place(listed: list[str], name: str) -> tuple[str | int, ...]:
+    return ("recordings", listed.index(name), "name") if name in listed else ("recordings",)
+
+
+def _no_description(names: list[str]) -> str:
+    near = next((n for n in names if n.rpartition("/")[2].lower() in {"dataset.yml", "dataset.yaml"}), None)
+    found = f"found {near!r}: rename or move it" if near else "it belongs beside the folder 'recordings'"
+    return f"{DESCRIPTION} is missing; {found} (docs/formats.md shows one)"
+
+
+def _no_samples(file: str, names: list[str]) -> str:
+    close = [n for n in names if n.rpartition("/")[2].lower() == file.rpartition("/")[2].lower()]
+    close = close or difflib.get_close_matches(file, [n for n in names if n.endswith(".csv")], 1, 0.8)
+    hint = f"found {close[0]!r}: rename or move it" if close else "add the file, or remove the recording from the list"
+    return f"file {file!r} is missing; {hint}"

@@ -1,0 +1,286 @@
+"""A dataset as one NetCDF-4 file: the text of ``dataset.yaml`` as an attribute, one group per recording.
+
+Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)`` and, NaN
+where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
+``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can point to other files of the
+server and every such pointer must be refused.
+
+Sizes of items and chunks, and filters, are checked before anything is read. That bounds what an honest file takes. A
+damaged or hostile one can still make the HDF5 library loop, crash or take memory without end: a stranger's file is
+read by :mod:`wingfit.records.files.confined` only.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, BinaryIO, NamedTuple
+
+import h5netcdf
+import h5py
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records.dataset import Dataset, Recording
+from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
+from wingfit.records.description.yaml_text import read_yaml, write_yaml
+from wingfit.records.errors import DatasetError, fail, nearest, shown
+from wingfit.records.files.assemble import assemble, checked_description
+from wingfit.records.files.folder import RECORDINGS
+from wingfit.records.files.forces import AXES
+from wingfit.records.files.parsed import Parsed
+from wingfit.records.files.table import Samples, too_much
+from wingfit.records.limits import (
+    MAX_CHUNK_BYTES,
+    MAX_DESCRIPTION_BYTES,
+    MAX_MARKERS,
+    MAX_NAME_BYTES,
+    MAX_ROWS,
+    MAX_VALUES,
+    MIB,
+)
+
+FORMAT = "wingfit dataset"
+Array = npt.NDArray[np.float64]
+BLOCK = 2**20  # numbers
+# Filters that come with h5py, each of which may be in a variable's pipeline once.
+FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF}
+_BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+
+
+class Limit(NamedTuple):
+    """Numbers that may be read: ``left`` of ``most``; and whether it matters how they are stored."""
+
+    left: int
+    most: int
+    storage: bool
+
+
+def write_netcdf(dataset: Dataset) -> bytes:
+    """Pack the dataset as NetCDF-4."""
+    text = write_yaml(checked_description(dataset))
+    buffer = io.BytesIO()
+    with h5netcdf.File(buffer, "w") as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["dataset_yaml"] = text
+        for recording in dataset.recordings:
+            group = file.create_group(f"{RECORDINGS}/{recording.name}")
+            _write_recording(group, recording)
+    return buffer.getvalue()
+
+
+def _write_recording(group: Any, recording: Recording) -> None:
+    frames, markers = len(recording.times), recording.markers
+    axes: tuple[str, ...]
+    if recording.kind == "forces":
+        group.dimensions = {"time": frames, "axis": len(recording.forces)}
+        of, names = "axis", np.array(recording.forces, dtype=object)
+        name, unit, axes, data = "force_n", "N", ("time", "axis"), recording.values
+    else:
+        group.dimensions = {"time": frames, "marker": len(markers), "axis": 3}
+        of, names = "marker", np.array(markers, dtype=object)
+        name, unit, axes, data = "position_m", "m", ("time", "marker", "axis"), recording.positions
+    group.create_variable(of, (of,), dtype=h5py.string_dtype(), data=names)
+    group.create_variable("time_s", ("time",), data=recording.times).attrs["units"] = "s"
+    values = group.create_variable(name, axes, data=data, fillvalue=np.nan, compression="gzip", shuffle=True)
+    values.attrs["units"] = unit
+
+
+def read_netcdf(data: bytes, label: str) -> Dataset:
+    """Read a dataset from the bytes of a NetCDF-4 file that is trusted."""
+    return parse_netcdf(io.BytesIO(data), label)[0]
+
+
+def parse_netcdf(
+    opened: BinaryIO, label: str, most: int = MAX_VALUES, *, storage: bool = True
+) -> tuple[Dataset, Parsed]:
+    """Read a NetCDF-4 file of at most ``most`` numbers: the dataset, and what it was built from.
+
+    ``storage``: refuse chunks, filters and texts of fixed length by which a small file takes much memory.
+    """
+    with _damage(label), h5py.File(opened, "r") as file:
+        text, samples = _attribute(file, "dataset_yaml", label), dict[str, Samples]()
+        document = read_yaml(text, f"{label}: dataset_yaml")
+        listed = _group(file, RECORDINGS, label)
+        markers = document.names("wing", "markers")
+        unlisted = sorted(set(listed) - set(document.names("recordings")))
+        if unlisted:
+            message = "this group is not listed in dataset_yaml; add it under recordings, or remove the group"
+            raise fail(f"{label}: {RECORDINGS}/{unlisted[0]}", unlisted[0], message)
+
+        def read(name: str, room: int) -> Samples:
+            where = f"{label}: {RECORDINGS}/{name}"
+            with _damage(where):
+                group = _group(listed, name, where)
+                forces = model_of(document.data) is VehicleDatasetFile
+                limit = Limit(room, most, storage)
+                samples[name] = _forces(group, where, limit) if forces else _tracks(group, where, markers, limit)
+                return samples[name]
+
+        dataset = assemble(
+            document,
+            read,
+            lambda name: f"{label}: {RECORDINGS}/{name}",
+            lambda name, _, row: _at(label, name, row),
+            most,
+        )
+    return dataset, Parsed(text, samples)
+
+
+def _at(label: str, name: str, row: int) -> str:
+    return f"{label}: {RECORDINGS}/{name}, time index {row}"
+
+
+@contextmanager
+def _damage(where: str) -> Iterator[None]:
+    """Turn whatever HDF5 says about a broken file into a DatasetError."""
+    try:
+        yield
+    except DatasetError:
+        raise
+    except _BROKEN as error:
+        cause = shown(" ".join(str(error).split()))
+        raise fail(where, None, f"not a readable NetCDF-4 file: {cause}; it may be cut off: write it again") from None
+
+
+def _attribute(file: Any, name: str, label: str) -> bytes:
+    if name not in file.attrs:
+        message = f"attribute {name!r} is missing; it must hold the text of dataset.yaml (docs/formats.md)"
+        raise fail(label, None, message)
+    size = file.attrs.get_id(name).dtype.itemsize
+    if size > MAX_DESCRIPTION_BYTES:
+        message = f"attribute {name!r} takes {size / MIB:.0f} MiB; at most {MAX_DESCRIPTION_BYTES // MIB} MiB are read"
+        raise fail(label, size, message)
+    value = file.attrs[name]
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if not isinstance(value, (str, bytes)):
+        raise fail(label, None, f"attribute {name!r} must be one text, the contents of dataset.yaml")
+    return value.encode() if isinstance(value, str) else value
+
+
+def _child(parent: Any, name: str, where: str, kind: type) -> Any:
+    """Member of a group, which must lie in this very file."""
+    link = parent.get(name, getlink=True)
+    if link is None:
+        raise fail(where, name, f"{name!r} is missing; see docs/formats.md for the groups and variables")
+    if not isinstance(link, h5py.HardLink):
+        raise fail(where, name, f"{name!r} is a link; only data in the file itself are read: copy them in")
+    child = parent[name]
+    if not isinstance(child, kind):
+        raise fail(where, name, f"{name!r} must be a {kind.__name__.lower()}; see docs/formats.md")
+    return child
+
+
+def _group(parent: Any, name: str, where: str) -> Any:
+    return _child(parent, name, where, h5py.Group)
+
+
+def _variable(group: Any, name: str, where: str) -> Any:
+    variable = _child(group, name, where, h5py.Dataset)
+    if variable.is_virtual or variable.external:
+        raise fail(where, name, f"{name!r} keeps its data in other files; copy them into this one")
+    if variable.shape is None:
+        raise fail(where, name, f"{name!r} has no dimensions and no data; see docs/formats.md for its shape")
+    return variable
+
+
+def _tracks(group: Any, where: str, known: list[str], limit: Limit) -> Samples:
+    times, positions = _variable(group, "time_s", where), _variable(group, "position_m", where)
+    names = _variable(group, "marker", where)
+    frames, count = times.shape[0] if len(times.shape) == 1 else -1, names.size
+    if positions.shape != (frames, count, 3) or names.shape != (count,):
+        message = (
+            f"shapes time_s {list(times.shape)}, marker {list(names.shape)}, position_m "
+            f"{list(positions.shape)} do not fit; they must be [T], [M] and [T, M, 3]"
+        )
+        raise fail(where, list(positions.shape), message)
+    if count > MAX_MARKERS:
+        raise fail(where, count, f"{count} markers; at most {MAX_MARKERS} are read: remove some")
+    _check_size(times, positions, where, limit)
+    markers = _names(names, "marker", where, limit)
+    _check_names(markers, known, where)
+    values = _numbers(positions).reshape(frames, 3 * count)
+    return Samples(_numbers(times), values, np.arange(frames), markers=markers)
+
+
+def _forces(group: Any, where: str, limit: Limit) -> Samples:
+    times, forces, names = (_variable(group, name, where) for name in ("time_s", "force_n", "axis"))
+    frames = times.shape[0] if len(times.shape) == 1 else -1
+    if names.shape not in {(1,), (2,)} or forces.shape != (frames, *names.shape):
+        message = (
+            f"shapes time_s {list(times.shape)}, axis {list(names.shape)}, force_n {list(forces.shape)} do not fit; "
+            "they must be [T], [C] and [T, C], with 1 or 2 axes"
+        )
+        raise fail(where, list(forces.shape), message)
+    _check_size(times, forces, where, limit)
+    found = _names(names, "axis", where, limit)
+    axes = tuple(axis for axis in AXES if axis in found)
+    if len(axes) != len(found):
+        raise fail(where, ", ".join(found), f"axis is {', '.join(found)}; it must hold x, z, or both")
+    values = np.ascontiguousarray(_numbers(forces)[:, [found.index(axis) for axis in axes]])
+    return Samples(_numbers(times), values, np.arange(frames), forces=axes)
+
+
+def _numbers(variable: Any) -> Array:
+    """All of a variable, some whole chunks at a time: in one go the library would hold it twice."""
+    made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
+    rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
+    for start in range(0, len(made), rows):
+        block = np.s_[start : start + rows]
+        variable.read_direct(made, block, block)
+    return made
+
+
+def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
+    """Declared shapes cost nothing to write: check them before memory is spent."""
+    if times.size > MAX_ROWS:
+        raise fail(where, times.size, f"{times.size} times; at most {MAX_ROWS} are read: cut it")
+    if times.size + values.size > limit.left:
+        raise too_much(where, limit.most)
+    for variable in (times, values):
+        if variable.dtype.kind != "f" or variable.dtype.itemsize > 8:
+            message = f"{variable.name} is of type {variable.dtype}; write 32- or 64-bit floating-point numbers"
+            raise fail(where, str(variable.dtype), message)
+        if limit.storage:
+            _check_storage(variable, where)
+
+
+def _check_storage(variable: Any, where: str) -> None:
+    """Refuse chunks and filters by which a small file takes much memory."""
+    chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize
+    if chunk > MAX_CHUNK_BYTES:
+        message = (
+            f"a chunk of {variable.name} takes {chunk / MIB:.0f} MiB; at most {MAX_CHUNK_BYTES // MIB} MiB are read"
+        )
+        raise fail(where, chunk, f"{message}: write smaller chunks")
+    pipeline = variable.id.get_create_plist()
+    filters = [pipeline.get_filter(index)[0] for index in range(pipeline.get_nfilters())]
+    if set(filters) - FILTERS or len(set(filters)) < len(filters):
+        message = (
+            f"{variable.name} is packed by the HDF5 filters {filters}; pack it by deflate alone, once, or not at all"
+        )
+        raise fail(where, str(filters), message)
+
+
+def _names(variable: Any, name: str, where: str, limit: Limit) -> tuple[str, ...]:
+    if h5py.check_string_dtype(variable.dtype) is None:
+        raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
+    if limit.storage and variable.dtype.itemsize > MAX_NAME_BYTES:
+        message = (
+            f"each {name} takes {variable.dtype.itemsize} bytes; at most {MAX_NAME_BYTES} are read: shorten the type"
+        )
+        raise fail(where, str(variable.dtype), message)
+    if limit.storage:
+        _check_storage(variable, where)
+    return tuple(str(text) for text in variable.asstr()[:])
+
+
+def _check_names(markers: tuple[str, ...], known: list[str], where: str) -> None:
+    for index, name in enumerate(markers):
+        if name not in known:
+            raise fail(where, name, f"no marker is called {name!r} in dataset_yaml; {nearest(name, known)}")
+        if name in markers[:index]:
+            raise fail(where, name, f"marker {name!r} stands twice; keep one")

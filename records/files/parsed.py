@@ -1,0 +1,137 @@
+"""A dataset in the project's own form: what is stored of a file that must not be opened a second time.
+
+A zip that the service writes for itself, and never takes as an upload: ``dataset.yaml`` byte for byte; ``layout.json``
+with the number of instants of each recording and its markers or axes of force; ``recordings/<name>.f8`` with its times
+[T], then its values [T, C], as little-endian 64-bit numbers. Read again, it is the same dataset, bit for bit.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records.dataset import Dataset
+from wingfit.records.description.yaml_text import read_yaml
+from wingfit.records.errors import DatasetError, fail
+from wingfit.records.files.assemble import assemble
+from wingfit.records.files.folder import DESCRIPTION, RECORDINGS
+from wingfit.records.files.table import Samples, too_much
+from wingfit.records.limits import MAX_DESCRIPTION_BYTES, MAX_RECORDINGS
+
+LAYOUT = "layout.json"
+NUMBER = "<f8"
+# Recorded numbers end in noise: packing them harder takes many times as long and saves a few percent.
+DEFLATE_LEVEL = 1
+BLOCK = 2**17  # numbers that are packed at a time
+# The end of a zip that is smaller than 2 GiB and has no comment; of a larger one, 20 bytes in front of it begin so.
+_END, _END_OF_LARGE = struct.Struct("<4s4H2LH"), b"PK\6\7"
+LONGEST_ENTRY = 1024  # bytes of an entry in the directory: its name, and 46
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """The text of ``dataset.yaml``, and the samples of each recording by its name."""
+
+    description: bytes
+    samples: Mapping[str, Samples]
+
+
+def pack(parsed: Parsed, into: IO[bytes]) -> None:
+    """Write ``parsed`` piece by piece; the same contents give the same bytes."""
+    layout = {
+        name: {"instants": len(one.times), "markers": one.markers, "forces": one.forces}
+        for name, one in parsed.samples.items()
+    }
+    with zipfile.ZipFile(into, "w", zipfile.ZIP_DEFLATED, compresslevel=DEFLATE_LEVEL) as archive:
+        for name, text in ((DESCRIPTION, parsed.description), (LAYOUT, json.dumps(layout).encode())):
+            with archive.open(_entry(name), "w") as stream:
+                stream.write(text)
+        for name, samples in parsed.samples.items():
+            with archive.open(_entry(_numbers(name)), "w", force_zip64=True) as stream:
+                for array in (samples.times, samples.values.reshape(-1)):
+                    for start in range(0, len(array), BLOCK):
+                        stream.write(array[start : start + BLOCK].astype(NUMBER, copy=False).data)
+
+
+def load_parsed(data: bytes, label: str) -> Dataset:
+    """The dataset that was packed; ``label`` is what messages call it. DatasetError where ``data`` is damaged."""
+    try:
+        _check_directory(data)
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            return _dataset(archive, label)
+    except DatasetError:
+        raise
+    except Exception as error:  # whatever it is: what wrote it read a stranger's file
+        raise fail(label, None, f"its stored form is damaged ({error}); upload the file again") from None
+
+
+def _check_directory(data: bytes) -> None:
+    """A directory that lists more than we ever write would take memory before anything of it is looked at."""
+    end = data[-_END.size :]
+    if len(end) < _END.size or data[-_END.size - 20 :].startswith(_END_OF_LARGE):
+        raise ValueError("it does not end as it was written")
+    signature, _, _, _, entries, size, _, _ = _END.unpack(end)
+    if signature != b"PK\5\6" or entries > MAX_RECORDINGS + 2 or size > entries * LONGEST_ENTRY:
+        raise ValueError(f"it lists {entries} entries over {size} bytes; at most {MAX_RECORDINGS + 2} were written")
+
+
+def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
+    if any(entry.compress_type != zipfile.ZIP_DEFLATED or entry.flag_bits & 1 for entry in archive.infolist()):
+        raise ValueError("it is packed as none was written")
+    document = read_yaml(_text(archive, DESCRIPTION), f"{label}: {DESCRIPTION}")
+    layout = json.loads(_text(archive, LAYOUT))
+
+    def read(name: str, room: int) -> Samples:
+        return _samples(archive, name, layout[name], room)
+
+    return assemble(document, read, lambda name: f"{label}: {name}", lambda name, _, row: f"{label}: {name}, {row}")
+
+
+def _text(archive: zipfile.ZipFile, name: str) -> bytes:
+    """An entry of at most ``MAX_DESCRIPTION_BYTES``: what wrote it read a stranger's file."""
+    if archive.getinfo(name).file_size > MAX_DESCRIPTION_BYTES:
+        raise ValueError(f"{name} is too large")
+    return archive.read(name)
+
+
+def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], room: int) -> Samples:
+    instants, markers, forces = int(layout["instants"]), tuple(layout["markers"]), tuple(layout["forces"])
+    channels = 3 * len(markers) + len(forces)
+    if not 0 <= instants * (1 + channels) <= room:
+        raise too_much(name)
+    with archive.open(_numbers(name)) as stream:
+        times, values = _array(stream, (instants,)), _array(stream, (instants, channels))
+    return Samples(times, values, np.arange(instants), markers, forces)
+
+
+def _array(stream: IO[bytes], shape: tuple[int, ...]) -> Array:
+    """Read straight into memory of its own: kernels take a read-only array for another type."""
+    array = np.empty(shape, dtype=NUMBER)
+    rest = array.reshape(-1).view(np.uint8).data
+    while rest:
+        count = stream.readinto(rest)  # type: ignore[attr-defined]  # it has, though its protocol does not say so
+        if not count:
+            raise EOFError("it ends early")
+        rest = rest[count:]
+    return array.astype(np.float64, copy=False)
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name, _EPOCH)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    return entry
+
+
+def _numbers(name: str) -> str:
+    return f"{RECORDINGS}/{name}.f8"

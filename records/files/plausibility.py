@@ -1,0 +1,192 @@
+"""Checks on the numbers of a recording, wherever they come from: order of times, amount of data, unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records.dataset import STANDARD_GRAVITY, Recording
+from wingfit.records.errors import Faults
+from wingfit.records.limits import (
+    IMPLAUSIBLE_SPANS,
+    IMPLAUSIBLE_WEIGHTS,
+    MAX_MARKERS,
+    MAX_ROWS,
+    MIN_FRAMES,
+    MIN_SAMPLES_PER_BEAT,
+    NEGLIGIBLE_WEIGHTS,
+    UNEVEN_STEPS,
+)
+from wingfit.records.vehicle import Vehicle
+from wingfit.records.wing import Wing
+
+Array = npt.NDArray[np.float64]
+Locate = Callable[[int], str]
+_SHOWN = 3
+ABSURD = 1e6  # weights: no unit makes a force of one weight so large a number
+
+
+def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
+    """Note what is wrong with the times and values of ``recording``; ``at(row)`` says where a row stands."""
+    times, values, frames = recording.times, recording.values, len(recording.times)
+    quantity = "force" if isinstance(rig, Vehicle) else "position"
+    if not MIN_FRAMES <= frames <= MAX_ROWS:
+        faults.add(
+            where,
+            frames,
+            f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or cut in parts",
+        )
+    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= MAX_MARKERS:
+        faults.add(where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {MAX_MARKERS}")
+    increasing = _check_times(times, at, faults)
+    infinite = np.flatnonzero(np.isinf(values).any(axis=1))
+    for row in infinite[:_SHOWN]:
+        faults.add(at(int(row)), "inf", f"a {quantity} is infinite; it must be finite, or missing")
+    if infinite.size or not values.size:
+        return
+    if np.isnan(values).all():
+        faults.add(where, None, f"there is no {quantity} at all; leave the recording out")
+        return
+    if isinstance(rig, Wing):
+        _check_positions(values, recording.markers, rig, where, faults)
+        return
+    _check_forces(recording, rig, where, faults)
+    if increasing and frames >= MIN_FRAMES:
+        _check_clock(recording, where, at, faults)
+
+
+def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
+    """Whether times are finite and increase; notes where not."""
+    bad = np.flatnonzero(~np.isfinite(times))
+    for row in bad[:_SHOWN]:
+        faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
+    if bad.size:
+        return False
+    back = np.flatnonzero(np.diff(times) <= 0) + 1
+    for row in back[:_SHOWN]:
+        before, here = float(times[row - 1]), float(times[row])
+        how = "the same as" if here == before else "before"
+        message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
+        faults.add(at(int(row)), here, message)
+    return not back.size
+
+
+def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where: str, faults: Faults) -> None:
+    """Markers stay within about a span of the hinge; those further out are in another unit or frame."""
+    hinge = (0.0, wing.hinge.y, wing.hinge.z)
+    distance = _typical(values, hinge)
+    limit = IMPLAUSIBLE_SPANS * wing.span
+    if distance > limit:
+        far = distance / wing.span
+        unit = (
+            "millimetres" if far > 100 else "centimetres" if far > 10 else "feet, or a frame whose origin is elsewhere,"
+        )
+        message = (
+            f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span "
+            f"(limit {limit:.4g} m); that looks like {unit} in columns named _m: "
+            "convert to metres, in the wing frame"
+        )
+        faults.add(where, f"{distance:.4g}", message)
+        return
+    each = np.array([_typical(values[:, 3 * k : 3 * k + 3], hinge) for k in range(len(markers))])
+    for k in np.flatnonzero(each > limit)[:_SHOWN]:
+        message = (
+            f"marker {markers[k]} is typically {each[k]:.4g} m from the hinge, the others {distance:.4g} m (limit "
+            f"{limit:.4g} m): convert it to metres, in the wing frame, or leave it out"
+        )
+        faults.add(where, f"{each[k]:.4g}", message)
+
+
+def _typical(values: Array, hinge: tuple[float, float, float]) -> float:
+    """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 where none is known.
+
+    One axis after the other: a large recording is not copied whole.
+    """
+    return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
+
+
+def _median_distance(places: Array, origin: float) -> float:
+    distances = np.abs(places - origin)
+    known = distances[np.isfinite(distances)]
+    return float(np.median(known, overwrite_input=True)) if known.size else 0.0
+
+
+def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
+    """Forces in flight are about a weight; typical ones far from it are in another unit. One axis may be zero."""
+    sizes = {}
+    for name, axis in zip(recording.forces, recording.values.T, strict=True):
+        found = axis[np.isfinite(axis)]
+        if not found.size:
+            faults.add(where, None, f"force_{name}_n has no value at all; remove the column")
+            continue
+        most = float(np.abs(found).max())  # squares of huge values would overflow
+        sizes[f"force_{name}_n"] = most * float(np.sqrt(np.mean((found / (most or 1.0)) ** 2)))
+    if not any(sizes.values()):
+        which = " and ".join(sizes) + (" are" if len(sizes) > 1 else " is")
+        faults.add(where, 0.0, f"{which} zero throughout; check the channel, or leave the recording out")
+        return
+    mass = vehicle.mass if recording.mass is None else recording.mass
+    weight = mass * STANDARD_GRAVITY
+    largest, force = max(sizes.items(), key=lambda item: item[1])
+    low, high = NEGLIGIBLE_WEIGHTS * weight, IMPLAUSIBLE_WEIGHTS * weight
+    if not low <= force <= high:
+        message = (
+            f"{largest} is typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; it "
+            f"must lie in [{low:.4g}, {high:.4g}] N; that looks like {_unit(force / weight)} in columns named _n: "
+            "convert to newtons, or check mass_kg"
+        )
+        faults.add(where, f"{force:.4g}", message)
+
+
+def _unit(weights: float) -> str:
+    """The unit in which a force of so many weights would be nearest to one weight."""
+    if weights < 1:
+        return "a much larger unit"
+    if weights > ABSURD:
+        return "no unit of force"
+    gram_force, millinewtons = 1000 / STANDARD_GRAVITY, 1000.0  # in a newton
+    halfway = np.sqrt(gram_force * millinewtons)
+    return "gram-force (1 gf = 0.00980665 N)" if weights < halfway else "millinewtons (1 mN = 0.001 N)"
+
+
+def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -> None:
+    """Forces cover a beat at an even clock, fast enough for the filter that they have been through."""
+    times, frequency, low_pass = recording.times, recording.condition.flap_frequency, recording.low_pass
+    steps = np.diff(times)
+    step = float(np.median(steps))
+    uneven = np.flatnonzero(np.abs(steps - step) > UNEVEN_STEPS * step) + 1
+    for row in uneven[:_SHOWN]:
+        message = (
+            f"time_s is {steps[row - 1]:.6g} s after the one above, typically {step:.6g} s; steps must be equal within "
+            f"{100 * UNEVEN_STEPS:g} %: write times with more digits, give lost samples a row with empty cells, or "
+            "resample to an even clock"
+        )
+        faults.add(at(int(row)), float(times[row]), message)
+    beats = frequency * float(times[-1] - times[0] + 1.5 * step)
+    if beats < 1.0:
+        message = (
+            f"the times cover {frequency * (times[-1] - times[0] + step):.2f} beats of {1 / frequency:.4g} s; at least "
+            "one whole beat is needed (two or more are better): record longer, or check flap_frequency_hz and time_s"
+        )
+        faults.add(where, None, message)
+    if step * frequency * MIN_SAMPLES_PER_BEAT > 1.0 + UNEVEN_STEPS:
+        message = (
+            f"the sampling rate is {1 / step:.4g} Hz, {1 / (step * frequency):.3g} samples in a beat of "
+            f"{1 / frequency:.4g} s; at least {MIN_SAMPLES_PER_BEAT} are needed: give time_s in seconds, not "
+            "milliseconds, check flap_frequency_hz, or record faster"
+        )
+        faults.add(where, f"{1 / step:.4g}", message)
+    if low_pass is not None and low_pass.cutoff < frequency:
+        message = (
+            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz, below the flap frequency, {frequency:g} Hz: of such values "
+            "no beat is left; check both, give values less filtered, or leave low_pass out if they are not filtered"
+        )
+        faults.add(where, low_pass.cutoff, message)
+    if low_pass is not None and low_pass.cutoff >= 0.5 / step:
+        message = (
+            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "
+            "Hz: check both, or leave low_pass out"
+        )
+        faults.add(where, low_pass.cutoff, message)

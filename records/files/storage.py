@@ -1,0 +1,105 @@
+"""Load and save datasets: a folder, a zip of it, or NetCDF; what a file is, its contents say."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from wingfit.records.dataset import Dataset
+from wingfit.records.errors import fail, shown
+from wingfit.records.files.archive import read_zip, write_zip
+from wingfit.records.files.folder import FolderFiles, read_files, write_folder
+from wingfit.records.files.netcdf import read_netcdf, write_netcdf
+from wingfit.records.limits import MAX_ARCHIVE_BYTES, MIB
+
+_ZIP = (b"PK\x03\x04", b"PK\x05\x06")
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_OTHERS = {
+    b"CDF": "NetCDF-3; write NetCDF-4 (for instance 'nccopy -k nc4 old.nc new.nc')",
+    b"\x1f\x8b": "gzip; upload a zip",
+    b"7z\xbc\xaf": "7z; upload a zip",
+    b"Rar!": "RAR; upload a zip",
+    b"BZh": "bzip2; upload a zip",
+    b"\xfd7zXZ": "xz; upload a zip",
+}
+
+
+def load_dataset(path: str | Path) -> Dataset:
+    """Read the folder, zip or NetCDF file at ``path``; DatasetError lists what is wrong with it."""
+    path = Path(path)
+    if path.is_dir():
+        return read_files(FolderFiles(path))
+    if path.name == "dataset.yaml" and path.is_file():
+        return read_files(FolderFiles(path.parent))
+    try:
+        size = path.stat().st_size
+        _check_size(size, str(path))
+        return load_archive(path.read_bytes(), path.name)
+    except OSError as error:
+        raise fail(str(path), None, f"cannot be read: {error.strerror}; check the path") from None
+
+
+def label_of(filename: str) -> str:
+    """What messages call an upload that its sender calls ``filename``."""
+    return shown(filename.replace("\\", "/").rpartition("/")[2]) or "upload"
+
+
+def is_netcdf(data: bytes) -> bool:
+    """Whether ``data`` is of the kind that only the HDF5 library reads."""
+    return data[: len(_HDF5)] == _HDF5
+
+
+def load_archive(data: bytes, filename: str) -> Dataset:
+    """Read a zip or NetCDF file from its bytes; ``filename`` is only what messages call it.
+
+    NetCDF from a stranger is for :func:`wingfit.records.files.confined.convert_netcdf`.
+    """
+    label = label_of(filename)
+    _check_size(len(data), label)
+    if data.startswith(_ZIP):
+        return read_zip(data, label)
+    if is_netcdf(data):
+        return read_netcdf(data, label)
+    if not data:
+        raise fail(label, None, "the file is empty; upload a zip of the dataset's folder, or NetCDF-4")
+    found = next((name for magic, name in _OTHERS.items() if data.startswith(magic)), None)
+    if found is None:
+        found = "neither a zip nor NetCDF-4; zip the folder that holds dataset.yaml and recordings/"
+    raise fail(label, data[:8].hex(" "), f"this is {found}")
+
+
+def save_dataset(dataset: Dataset, path: str | Path) -> None:
+    """Write ``dataset`` as zip (``.zip``), NetCDF (``.nc``) or folder (anything else).
+
+    An existing file is replaced at once, never left half written; a folder must be new or empty. DatasetError
+    when the dataset breaks a limit of the format: what is written can be read.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix == ".zip":
+        _replace(path, write_zip(dataset))
+    elif suffix == ".nc":
+        _replace(path, write_netcdf(dataset))
+    else:
+        write_folder(dataset, path)
+
+
+def _check_size(size: int, label: str) -> None:
+    if size > MAX_ARCHIVE_BYTES:
+        message = f"is {size / MIB:.0f} MiB; at most {MAX_ARCHIVE_BYTES // MIB} MiB are read: split the dataset"
+        raise fail(label, size, message)
+
+
+def _replace(path: Path, data: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    partial = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        partial.chmod(0o644)
+        partial.replace(path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise

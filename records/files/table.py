@@ -1,0 +1,217 @@
+"""The numbers of one recording as CSV: a column ``time_s``, and columns that a layout knows.
+
+Numbers are written by ``repr`` and read by ``float``, which is exact. A clean row costs one ``float`` a cell;
+only a file with anything suspicious in it takes the slow road that names the cell.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from array import array
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records.dataset import ForceAxis
+from wingfit.records.description.yaml_text import NUMBER
+from wingfit.records.errors import DatasetError, Faults, decode, fail, shown
+from wingfit.records.limits import MAX_ROWS, MAX_VALUES, MIN_FRAMES
+
+Array = npt.NDArray[np.float64]
+_SUSPICIOUS = re.compile(r"[^0-9eE+\-., \r\n]")
+_TIMES = {
+    "time",
+    "t",
+    "t_s",
+    "times",
+    "time_ms",
+    "time_us",
+    "seconds",
+    "frame",
+    "frames",
+    "timestamp",
+    "time_min",
+}
+_MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/a"}
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The numbers of a recording, of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`).
+
+    ``lines`` [T] is the line of the file that each instant came from.
+    """
+
+    times: Array
+    values: Array
+    lines: npt.NDArray[np.int64]
+    markers: tuple[str, ...] = ()
+    forces: tuple[ForceAxis, ...] = ()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which columns hold what: ``columns`` [C] in the order of the channels."""
+
+    time: int
+    columns: list[int]
+    markers: tuple[str, ...] = ()
+    forces: tuple[ForceAxis, ...] = ()
+
+
+def write_table(columns: Sequence[str], times: Array, values: Array) -> str:
+    """CSV text of ``values`` [T, C] under the names ``columns``; NaN is an empty cell."""
+    rows = zip(times.tolist(), values.tolist(), strict=True)
+    lines = (",".join([repr(time), *(repr(v) if v == v else "" for v in row)]) for time, row in rows)
+    return "\n".join([",".join(["time_s", *columns]), *lines, ""])
+
+
+def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], Layout], room: int, gap: str) -> Samples:
+    """Read CSV of at most ``room`` numbers; ``read_layout(header, where)`` judges the header.
+
+    ``gap`` says where a cell may be empty. DatasetError names line and column of everything that is not as it should
+    be.
+    """
+    text = decode(raw, file)
+    if not text.strip():
+        raise fail(file, None, f"the file is empty; it needs a header and at least {MIN_FRAMES} rows")
+    # Not io.StringIO, which takes four bytes for each character.
+    reader = csv.reader(io.TextIOWrapper(io.BytesIO(raw), "utf-8-sig", newline=""), strict=True)
+    try:
+        header = [name.strip() for name in next(reader)]
+        if not header:
+            raise fail(f"{file}, line 1", None, "the line is empty; it must name the columns, 'time_s' first")
+        layout = read_layout(header, f"{file}, line 1")
+        clean = not _SUSPICIOUS.search(text, text.find("\n"))
+        matrix, lines = _rows(reader, header, file, room, None if clean else gap)
+    except csv.Error as error:
+        message = f"not valid CSV: {error}; separate with commas, without stray quotes or NUL bytes"
+        raise fail(f"{file}, line {reader.line_num}", None, message) from None
+    values = np.ascontiguousarray(matrix[:, layout.columns])
+    return Samples(matrix[:, layout.time].copy(), values, lines, layout.markers, layout.forces)
+
+
+def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str | None]) -> dict[str, int]:
+    """Place of each column by name; ``problem(name)`` says what is wrong with one that is not ``time_s``."""
+    _check_separator(header, where)
+    columns, faults = dict[str, int](), Faults()
+    for index, name in enumerate(header):
+        message = _column_problem(name, columns) or (problem(name) if name != "time_s" else None)
+        if message:
+            faults.add(f"{where}, column {index + 1}", name, message)
+        columns.setdefault(name, index)
+    faults.raise_any()
+    if "time_s" not in columns:
+        raise fail(where, header[0], "column 'time_s' is missing; add it first, with times in seconds")
+    return columns
+
+
+def _check_separator(header: Sequence[str], where: str) -> None:
+    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            message = f"the columns are separated by {word}; separate by commas, with decimal points"
+            raise fail(where, header[0], message)
+
+
+def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
+    if name in earlier:
+        return f"column {name!r} also stands as column {earlier[name] + 1}; keep one"
+    if not name:
+        return "this column has no name; name it or remove the comma at the end of the lines"
+    if name != "time_s" and (name.lower() in _TIMES or name.lower() == "time_s"):
+        return f"unknown column {name!r}; write 'time_s', with times in seconds"
+    return None
+
+
+def _rows(
+    reader: Iterable[list[str]], header: Sequence[str], file: str, room: int, gap: str | None
+) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Read all rows as numbers [T, columns], and their lines. No ``gap``: the text holds no letters, no 'nan'."""
+    convert: Callable[[list[str]], list[float]] = _fast if gap is None else _strict
+    numbers, lines, width, faults = array("d"), array("q"), len(header), Faults()
+    line = getattr(reader, "line_num", 1)
+    for row in reader:
+        line = getattr(reader, "line_num", line + 1)
+        if not row:
+            continue
+        if len(row) != width:
+            faults.add(f"{file}, line {line}", ",".join(row), _ragged(row, width))
+        else:
+            try:
+                numbers.extend(convert(row))
+            except ValueError:
+                numbers.extend(_explained(row, header, f"{file}, line {line}", gap or "there is no number", faults))
+            lines.append(line)
+        if faults.full:
+            break
+        _check_size(len(lines), len(numbers), file, room)
+    faults.raise_any()
+    matrix = np.frombuffer(numbers, dtype=np.float64).reshape(-1, width)
+    for index, column in np.argwhere(np.isinf(matrix))[:10]:
+        faults.add(
+            f"{file}, line {lines[index]}, column {header[column]!r}",
+            None,
+            "is too large for a number; check its unit",
+        )
+    faults.raise_any()
+    return matrix, np.array(lines, dtype=np.int64)
+
+
+def _fast(row: list[str]) -> list[float]:
+    return [float(cell) if cell else math.nan for cell in row]
+
+
+def _strict(row: list[str]) -> list[float]:
+    return [_cell(cell) for cell in row]
+
+
+def _cell(cell: str) -> float:
+    text = cell.strip()
+    if not text:
+        return math.nan
+    if not NUMBER.fullmatch(text):
+        raise ValueError(text)
+    return float(text)
+
+
+def _explained(row: list[str], header: Sequence[str], where: str, gap: str, faults: Faults) -> list[float]:
+    """Numbers of a row that the quick conversion refused; notes every cell that is none."""
+    numbers = []
+    for name, cell in zip(header, row, strict=True):
+        try:
+            numbers.append(_cell(cell))
+        except ValueError:
+            faults.add(f"{where}, column {name!r}", cell, _not_a_number(cell.strip(), gap))
+            numbers.append(math.nan)
+    return numbers
+
+
+def _not_a_number(text: str, gap: str) -> str:
+    if text.lower().lstrip("+-") in {"inf", "infinity"}:
+        return f"is {text!r}; it must be a finite number, or an empty cell where {gap}"
+    if text.lower() in _MISSING_WORDS:
+        return f"is {text!r}; leave the cell empty where {gap}"
+    return f"is {shown(text)!r}; it must be a number, or an empty cell where {gap}"
+
+
+def _ragged(row: list[str], width: int) -> str:
+    cause = "the line is cut off or lacks commas" if len(row) < width else "decimal commas, or a comma too many"
+    return f"has {len(row)} cells where the header has {width}; {cause}"
+
+
+def _check_size(rows: int, numbers: int, file: str, room: int) -> None:
+    if rows > MAX_ROWS:
+        raise fail(file, rows, f"has more than {MAX_ROWS} rows, the most that are read; cut the recording in parts")
+    if numbers > room:
+        raise too_much(file)
+
+
+def too_much(where: str, most: int = MAX_VALUES) -> DatasetError:
+    """Make the error of a dataset with more than ``most`` numbers."""
+    message = f"the dataset holds more than {most} numbers, the most that are read; split it or thin it out"
+    return fail(where, None, message)

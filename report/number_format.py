@@ -1,0 +1,154 @@
+"""Numbers with units, as people read them: millimetres, millinewtons, degrees, at most four digits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from wingfit.diagnosis.finding import Finding, Hypothesis, Interval, RecordingMisfit
+
+_PREFIXED = {"m", "N", "Pa", "s", "Hz", "W", "J", "N m", "N/m", "m/s"}
+_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+class Scale(NamedTuple):
+    """What SI values are multiplied by, and the unit that they then have."""
+
+    factor: float
+    unit: str
+
+    def text(self, value: float, digits: int = 3) -> str:
+        """``value`` with its unit."""
+        return with_unit(number(value * self.factor, digits), self.unit)
+
+
+def channel_scale(finding: Finding) -> Scale:
+    """Misfits and samples are shown in mm or mN."""
+    return Scale(1e3, "mm" if finding.unit == "m" else "mN")
+
+
+def scale_for(values: Iterable[float | None], unit: str) -> Scale:
+    """A prefix that suits the largest of ``values``; radians become degrees, kilograms grams where they are few."""
+    largest = max((abs(v) for v in values if v is not None), default=0.0)
+    if unit == "rad":
+        return Scale(180 / math.pi, "°")
+    if unit == "kg" and 0 < largest < 1:
+        return Scale(1e3, "g") if largest >= 1e-3 else Scale(1e6, "mg")
+    if unit not in _PREFIXED or largest == 0:
+        return Scale(1.0, "" if unit == "1" else unit)
+    size, prefix = next((p for p in _PREFIXES if largest >= 0.9999 * p[0]), _PREFIXES[-1])
+    return Scale(1 / size, prefix + unit)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """``value`` to ``digits`` significant digits, with a true minus sign; integers up to 99999 stay whole."""
+    if value == 0:
+        return "0"
+    power = math.floor(math.log10(abs(value)))
+    if not -4 <= power < 5:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{_trimmed(mantissa)}e{int(exponent)}".replace("-", "−")
+    text = _trimmed(f"{value:.{max(0, digits - 1 - power)}f}")
+    return text.replace("-", "−")
+
+
+def share(part: float) -> str:
+    """A part as a whole percentage, where more digits would mean nothing."""
+    return with_unit(number(float(round(100 * part))), "%")
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Number and unit with the space that the unit wants."""
+    if not unit:
+        return text
+    return f"{text}{unit}" if unit == "°" else f"{text}\u00a0{unit}"
+
+
+def percent(part: float) -> str:
+    """A part as a percentage; never 0 % or 100 % unless it is exactly that."""
+    value = 100 * part
+    if 0 < value < 0.1:
+        return "< 0.1\u00a0%"
+    if 99.9 < value < 100:
+        return "> 99.9\u00a0%"
+    return with_unit(number(round(value, 1) if abs(value) < 10 or value > 90 else round(value), 3), "%")
+
+
+def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
+    """The 90 % interval in words, without its unit."""
+    low, high = (None if v is None else number(v * scale.factor, digits) for v in (interval.low, interval.high))
+    if low is None and high is None:
+        return "not bounded"
+    if low is None:
+        return f"below {high}"
+    return f"above {low}" if high is None else f"{low} to {high}"
+
+
+def condition(recording: RecordingMisfit) -> str:
+    """Flap frequency, lag, pressure and airspeed, shortly."""
+    parts = [f"{number(recording.flap_frequency_hz)} Hz"]
+    if recording.phase_lag_deg:
+        parts.append(f"lag {number(recording.phase_lag_deg)}°")
+    parts.append(f"{number(recording.pressure_mbar, 4)} mbar")
+    if recording.airspeed:
+        parts.append(f"{number(recording.airspeed)} m/s")
+    return ", ".join(parts).replace(" ", "\u00a0").replace(",\u00a0", ", ")
+
+
+def shortened(text: str, letters: int) -> str:
+    """``text``, its middle left out where it is longer than ``letters``: names differ at both ends."""
+    if len(text) <= letters:
+        return text
+    tail = letters // 3
+    return f"{text[: letters - tail - 1]}…{text[len(text) - tail :]}"
+
+
+def titles(finding: Finding) -> dict[str, str]:
+    """Title of every effect that a hypothesis consists of alone."""
+    return {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
+
+
+def title_of(name: str, known: dict[str, str]) -> str:
+    """Title of effect ``name``, or its name in words."""
+    return known.get(name) or name.replace("_", " ").capitalize()
+
+
+def listed(items: Iterable[str], last: str = "and") -> str:
+    """Items as one would say them, with ``last`` before the last."""
+    words = list(items)
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
+
+
+def best_of(finding: Finding) -> Hypothesis | None:
+    """The hypothesis that was put in, else the most probable one that is not the nominal model."""
+    others = [h for h in finding.hypotheses if h.effects]
+    put_in = [h for h in others if set(h.effects) == set(finding.put_in)]
+    return next(iter([*put_in, *others]), None)
+
+
+def stages(finding: Finding) -> dict[str, str]:
+    """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
+    if not finding.put_in:
+        return {"before": "nominal model, refitted"}
+    after = "what was found" if finding.named else "the nearest in the library"  # short: titles of maps
+    return {"before": "before: nominal model, refitted", "after": f"after: with {after}"}
+
+
+def what_was_put_in(finding: Finding) -> str:
+    """Of a finding that has an "after", what that has: in one without a name, what comes nearest."""
+    return "what was found" if finding.named else "the nearest in the library, which it is not"
+
+
+def change(finding: Finding, before: str, after: str) -> str:
+    """Two values as a change, or only the first where nothing was put in."""
+    return f"{before} before, {after} after" if "after" in stages(finding) else before
+
+
+def capital(text: str) -> str:
+    """``text`` with a capital letter in front, the others as they are."""
+    return text[:1].upper() + text[1:]
+
+
+def _trimmed(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text

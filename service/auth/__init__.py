@@ -1,0 +1,1 @@
+"""API keys: who calls, what a key permits, and the audit log."""

@@ -1,0 +1,128 @@
+"""Parsed datasets, by id: parsing takes longer than most requests may.
+
+NetCDF files come from strangers, and a damaged one can hang whoever opens it. So each is opened once, in a process of
+its own, and stored in the project's own form beside the archive; later only this form is read.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import OrderedDict
+from typing import NamedTuple
+
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
+
+from wingfit.records import Dataset, DatasetError
+from wingfit.records.files.confined import STORED, Limits, convert_netcdf
+from wingfit.records.files.parsed import load_parsed
+from wingfit.records.files.storage import is_netcdf, label_of
+from wingfit.service.runs.engine import Engine
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database, is_full
+
+LOG = logging.getLogger("wingfit")
+KEPT, KEPT_BYTES = 8, 2**28
+
+
+class Opened(NamedTuple):
+    """A dataset, and its own form where its archive must not be opened again."""
+
+    dataset: Dataset
+    parsed: bytes | None
+
+
+class Datasets:
+    """The last few datasets used, of the largest only the last. They never change once uploaded."""
+
+    def __init__(self, database: Database, engine: Engine) -> None:
+        self._database, self._engine = database, engine
+        self._lock, self._loading, self._converting = threading.Lock(), threading.Lock(), threading.Lock()
+        self._kept: OrderedDict[str, Dataset] = OrderedDict()
+        # Files of earlier versions that could not be read: found out once, it may have taken a quarter of an hour.
+        self._damaged: dict[str, DatasetError] = {}
+
+    def get(self, dataset_id: str) -> Dataset:
+        """The dataset, or a 404."""
+        with self._database.read() as session:
+            row = store.dataset(session, dataset_id)
+        if (known := self._known(dataset_id)) is not None:
+            return known
+        old = self._is_old(dataset_id)
+        # One at a time, and once: a large one takes a minute, and gigabytes. A conversion holds up conversions alone.
+        with self._converting if old else self._loading:
+            if (known := self._known(dataset_id)) is not None:
+                return known
+            loaded = self._convert(dataset_id, row.filename) if old else self._load(dataset_id, row.filename)
+            self.keep(dataset_id, loaded)
+        return loaded
+
+    def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
+        """Read an archive; ValueError says what is wrong with it. ``limits`` are those of an upload, or others."""
+        if not is_netcdf(archive):
+            return Opened(self._engine.load(archive, filename), None)
+        label = label_of(filename)
+        parsed = convert_netcdf(archive, label, limits)
+        return Opened(load_parsed(parsed, label), parsed)
+
+    def _load(self, dataset_id: str, filename: str) -> Dataset:
+        with self._database.read() as session:
+            parsed = store.parsed(session, dataset_id)
+            archive = store.archive(session, dataset_id) if parsed is None else b""
+        return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
+
+    def _is_old(self, dataset_id: str) -> bool:
+        """Whether it is a NetCDF file that an earlier version stored, which is opened once more."""
+        with self._database.look() as connection:
+            return is_netcdf(store.archive_piece(connection, dataset_id, 0, 8)) and not store.has_parsed(
+                connection, dataset_id
+            )
+
+    def _convert(self, dataset_id: str, filename: str) -> Dataset:
+        if dataset_id in self._damaged:
+            raise self._damaged[dataset_id].with_traceback(None)
+        with self._database.read() as session:
+            archive = store.archive(session, dataset_id)
+        try:
+            opened = self.open(archive, filename, STORED)
+        except DatasetError as error:
+            self._damaged[dataset_id] = error
+            raise
+        if opened.parsed is not None:
+            self._keep_parsed(dataset_id, opened.parsed)
+        return opened.dataset
+
+    def _keep_parsed(self, dataset_id: str, parsed: bytes) -> None:
+        """Store what only saves time later, if there is room."""
+        try:
+            with self._database.write() as session:
+                store.keep_parsed(session, dataset_id, parsed)
+        except OperationalError as error:
+            if not is_full(error):
+                raise
+            LOG.warning("the stored form of %s is not kept: the disk is full or fails (%s)", dataset_id, error.orig)
+
+    def _known(self, dataset_id: str) -> Dataset | None:
+        with self._lock:
+            if dataset_id in self._kept:
+                self._kept.move_to_end(dataset_id)
+            return self._kept.get(dataset_id)
+
+    def keep(self, dataset_id: str, loaded: Dataset) -> None:
+        """Remember a dataset that was just parsed."""
+        with self._lock:
+            self._kept[dataset_id] = loaded
+            while len(self._kept) > KEPT or (len(self._kept) > 1 and self._bytes > KEPT_BYTES):
+                self._kept.popitem(last=False)
+
+    @property
+    def _bytes(self) -> int:
+        return sum(recording.values.nbytes for one in self._kept.values() for recording in one.recordings)
+
+    def delete(self, session: Session, dataset_id: str) -> None:
+        """Delete a dataset here and there."""
+        store.delete_dataset(session, dataset_id)
+        with self._lock:
+            self._kept.pop(dataset_id, None)
+            self._damaged.pop(dataset_id, None)

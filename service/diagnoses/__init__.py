@@ -1,0 +1,1 @@
+"""Diagnoses: specification, computation, schemas, exports."""

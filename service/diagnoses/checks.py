@@ -1,0 +1,63 @@
+"""What is refused of a request for a diagnosis, with the place and the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis.spec import DiagnosisSpec
+from wingfit.records import Dataset
+from wingfit.service.diagnoses import specs
+from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.http.problems import error_item, invalid
+from wingfit.service.runs import spec_views
+from wingfit.service.runs.engine import Engine
+from wingfit.service.runs.request_checks import gene_names, unknown_recordings
+from wingfit.service.runs.spec_schemas import VehicleModel
+
+
+def checked(
+    body: DiagnosisIn,
+    dataset: Dataset,
+    engine: Engine,
+    diagnoser: Diagnoser,
+    of_run: CalibrationSpec | None = None,
+    genome: Mapping[str, float] | None = None,
+) -> DiagnosisSpec:
+    """What ``body`` asks for, from the settings and the ``genome`` of a run if there is one; else a 422.
+
+    Of the genome those genes are taken that the model asked for has.
+    """
+    spec_views.refuse_foreign(body, dataset)
+    calibration = specs.calibration(body, of_run)
+    spec_views.refuse_cutoff(calibration.low_pass, dataset.recordings)
+    vehicle = VehicleModel.model_validate({"preset": calibration.preset, "without": list(calibration.without)})
+    spec_views.refuse_effects(calibration.effects, dataset, vehicle)
+    known = gene_names(engine, calibration, dataset)
+    _refuse_unknown(calibration, dataset, known)
+    _refuse_bounds(engine, calibration, dataset)
+    start = {name: value for name, value in (genome or {}).items() if name in known}
+    spec = specs.asked(body, calibration, start)
+    try:
+        diagnoser.check(spec, dataset)
+    except ValueError as error:
+        raise invalid("the diagnosis does not fit the dataset", [error_item("body", None, str(error))]) from None
+    return spec
+
+
+def _refuse_unknown(calibration: CalibrationSpec, dataset: Dataset, known: tuple[str, ...]) -> None:
+    genes = [(f"body.genes.{place}", name) for place, name in enumerate(calibration.genes)]
+    genes += [(f"body.fixed.{name}", name) for name in calibration.fixed]
+    recordings = tuple(recording.name for recording in dataset.recordings)
+    faults = [*unknown_recordings(calibration.recordings, recordings), *spec_views.unknown_genes(genes, known)]
+    if faults:
+        raise invalid("the request names what does not exist", faults)
+
+
+def _refuse_bounds(engine: Engine, calibration: CalibrationSpec, dataset: Dataset) -> None:
+    for name, value in calibration.fixed.items():
+        try:
+            engine.genome(calibration, dataset, {name: value})
+        except ValueError as error:
+            raise invalid("a value is out of bounds", [error_item(f"body.fixed.{name}", value, str(error))]) from None

@@ -1,0 +1,181 @@
+"""Exports of a diagnosis: its ranking as a table, all of it as a document, its maps and misfits as NetCDF.
+
+All are bound by the size of the finding, which they are made of.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wingfit.service.container import Service
+from wingfit.service.diagnoses import views as diagnosis_views
+from wingfit.service.http import csv_text
+from wingfit.service.runs import netcdf_variables, views
+from wingfit.service.runs.export_schemas import DiagnosisExportOut
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import DatasetRow, DiagnosisRow
+from wingfit.service.version import wingfit_version
+
+Json = dict[str, Any]
+RANKING = (
+    "title",
+    "family",
+    "source",
+    "signature",
+    "probability",
+    "evidence",
+    "score",
+    "freedom",
+    "explained",
+    "predicted",
+)
+# Of loads, as the conventions write units.
+CF_UNITS = {"N/m": "N m-1"}
+CONDITION = (
+    ("flap_frequency_hz", "Hz", "flap frequency"),
+    ("phase_lag_deg", "degree", "lag of the rear rod behind the front one"),
+    ("pressure_mbar", "mbar", "pressure of the air"),
+    ("airspeed", "m s-1", "airspeed"),
+)
+SPAN = "part of the span, root 0, tip 1"
+PHASE = "phase of the beat"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A diagnosis, what it found, and its dataset, as they were ``at`` a moment."""
+
+    row: DiagnosisRow
+    finding: Json
+    dataset: DatasetRow
+    at: str
+
+
+def of(service: Service, diagnosis_id: str) -> Exported:
+    """The diagnosis as it is now; a 404, or a 409 where it has found nothing."""
+    with service.database.read() as session:
+        row, found = store.diagnosis(session, diagnosis_id), store.finding(session, diagnosis_id)
+        return Exported(row, found, store.dataset(session, row.dataset_id), store.now())
+
+
+def document(exported: Exported) -> DiagnosisExportOut:
+    """All of a diagnosis."""
+    return DiagnosisExportOut(
+        wingfit_version=wingfit_version(),
+        exported_at=exported.at,
+        dataset=views.dataset(exported.dataset),
+        diagnosis=diagnosis_views.diagnosis(exported.row),
+        finding=exported.finding,
+    )
+
+
+def table(found: Json) -> str:
+    """The ranking as CSV, an explanation a row, the most probable first; the nominal model names no effect."""
+    head = ["rank", "effects", *RANKING, f"misfit_{found['unit'].lower()}", "refitted"]
+    rows = [
+        [rank, " + ".join(one["effects"]), *(one[name] for name in RANKING), one["misfit"], one["refitted"]]
+        for rank, one in enumerate(found["hypotheses"], 1)
+    ]
+    return csv_text.lines([head, *rows])
+
+
+def file(exported: Exported) -> bytes:
+    """Maps of the misfit, missing loads, and the misfit to each recording, a group each."""
+    row, found = exported.row, exported.finding
+
+    def write(root: Any) -> None:
+        _recordings(root, found)
+        _markers(root, found)
+        _phase_map(root, found)
+        for number, load in enumerate(found["missing"], 1):
+            _load(root.create_group(f"missing/{number}"), load)
+
+    attributes = netcdf_variables.provenance(row, exported.dataset, found["model"], exported.at) | {
+        "title": f"diagnosis {row.name}",
+        "comment": found["summary"],
+        "verdict": found["verdict"],
+        "named": ", ".join(found["named"]),
+        "put_in": ", ".join(found["put_in"]),
+        "noise": found["floors"]["noise"],
+        "floor": found["floors"]["total"],
+    }
+    return netcdf_variables.made(write, attributes)
+
+
+def _recordings(root: Any, found: Json) -> None:
+    """Misfit to each recording, before and after, with 90 % intervals."""
+    items, unit, along = found["recordings"], found["unit"], ("recording",)
+    if not items:
+        return
+    group = root.create_group("recordings")
+    group.dimensions = {"recording": len(items)}
+    netcdf_variables.texts(group, "recording", "recording", "recording", (one["name"] for one in items))
+    netcdf_variables.flags(
+        group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items)
+    )
+    for name, units, said in CONDITION:
+        netcdf_variables.numbers(group, name, along, units, said, _all(items, name))
+    for name, model in (("before", "nominal model, refitted"), ("after", "model with what was found")):
+        for end, said in (("value", ""), ("low", ", lower end of its 90 % interval"), ("high", ", upper end of it")):
+            values = netcdf_variables.or_nan(one[name][end] for one in items)
+            label = name if end == "value" else f"{name}_{end}"
+            netcdf_variables.numbers(group, label, along, unit, f"misfit of the {model}{said}", values)
+    netcdf_variables.numbers(group, "floor", along, unit, "misfit that a right model would leave", _all(items, "floor"))
+
+
+def _markers(root: Any, found: Json) -> None:
+    """Misfit of each marker, or force axis, over all recordings."""
+    items, unit, along = found["markers"], found["unit"], ("marker",)
+    if not items:
+        return
+    group = root.create_group("markers")
+    group.dimensions = {"marker": len(items), "axis": 3}
+    netcdf_variables.texts(group, "marker", "marker", "marker or force axis", (one["name"] for one in items))
+    netcdf_variables.texts(group, "axis", "axis", "axis", "xyz")
+    places = {
+        "span": (netcdf_variables.NO_UNIT, SPAN),
+        "chord": (netcdf_variables.NO_UNIT, "part of the chord, leading edge 0, trailing edge 1"),
+        "x": ("m", "place on the wing, aft"),
+        "y": ("m", "place on the wing, outboard"),
+        "before": (unit, "misfit beyond the noise, nominal model"),
+        "after": (unit, "misfit beyond the noise, with what was found"),
+        "worst": (netcdf_variables.NO_UNIT, f"{PHASE} where the misfit is largest"),
+    }
+    for name, (units, said) in places.items():
+        netcdf_variables.numbers(group, name, along, units, said, _all(items, name))
+    directions = np.array([one["direction"] for one in items])
+    said = "mean direction of the misfit at that phase"
+    netcdf_variables.numbers(group, "direction", ("marker", "axis"), netcdf_variables.NO_UNIT, said, directions)
+
+
+def _phase_map(root: Any, found: Json) -> None:
+    """Misfit over the span and the beat."""
+    given, unit = found["phase_map"], found["unit"]
+    if given is None:
+        return
+    group = root.create_group("phase_map")
+    group.dimensions = {"band": len(given["bands"]), "phase": len(given["phase"])}
+    netcdf_variables.numbers(group, "band", ("band",), netcdf_variables.NO_UNIT, SPAN, given["bands"])
+    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, given["phase"])
+    netcdf_variables.numbers(group, "before", ("band", "phase"), unit, "misfit of the nominal model", given["before"])
+    netcdf_variables.numbers(group, "after", ("band", "phase"), unit, "misfit with what was found", given["after"])
+    netcdf_variables.numbers(group, "noise", (), unit, "what noise alone leaves in a cell", given["noise"])
+
+
+def _load(group: Any, load: Json) -> None:
+    """What the nominal model lacks under one condition."""
+    units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
+    said = f"turn that rod {load['rod']} lacks" if load["rod"] else "force that the nominal model lacks"
+    netcdf_variables.describe(group, {"recording": load["recording"], "rod": load["rod"]})
+    group.dimensions = {"station": len(load["stations"]), "phase": len(load["phase"])}
+    netcdf_variables.numbers(group, "station", ("station",), netcdf_variables.NO_UNIT, SPAN, load["stations"])
+    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, load["phase"])
+    netcdf_variables.numbers(group, "value", along, units, said, load["values"])
+    netcdf_variables.numbers(group, "error", along, units, f"standard error of the {said}", load["errors"])
+
+
+def _all(items: list[Json], name: str) -> Any:
+    return netcdf_variables.or_nan(one[name] for one in items)

@@ -1,0 +1,62 @@
+"""A diagnosis in this process, without a server: the same checks, the same tool, a pool of processes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from wingfit.client.transport import WingfitError
+from wingfit.diagnosis.finding import Finding
+from wingfit.records import Dataset, load_dataset
+from wingfit.service.diagnoses.checks import checked
+from wingfit.service.diagnoses.diagnoser import ModelDiagnoser
+from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.simulation_hints import with_remedy
+from wingfit.workers import make_evaluator
+from wingfit.workers.jobs import eta_seconds
+
+OnProgress = Callable[[float, float | None, str], None]
+
+
+def diagnose(path: Path, asked: dict[str, Any], workers: int | None, on_progress: OnProgress) -> Finding:
+    """Diagnose the dataset at ``path``; ``asked`` as in the body of ``POST /v1/diagnoses``.
+
+    ``on_progress`` gets the part that is done, the seconds left, and the stage. WingfitError says what is wrong.
+    """
+    dataset, diagnoser = _loaded(path), ModelDiagnoser()
+    try:
+        spec = checked(DiagnosisIn.model_validate(asked), dataset, ModelEngine(), diagnoser)
+    except ValidationError as error:
+        faults = [
+            {"where": ".".join(map(str, one["loc"])), "value": one.get("input"), "message": one["msg"]}
+            for one in error.errors()
+        ]
+        raise WingfitError("the request is invalid", errors=faults) from None
+    except ProblemError as problem:
+        raise WingfitError(problem.detail, errors=problem.errors) from None
+    evaluator, began, points = make_evaluator("processes", workers), time.monotonic(), [(0.0, 0.0)]
+    try:
+        for progress in diagnoser.diagnose(spec, dataset, evaluator):
+            points.append((time.monotonic() - began, progress.fraction))
+            on_progress(progress.fraction, eta_seconds(points[1:]), progress.stage)
+            if progress.finding is not None:
+                return progress.finding
+    except ValueError as error:
+        raise WingfitError("the diagnosis failed", with_remedy(str(error))) from error
+    finally:
+        evaluator.close()
+    raise WingfitError("the diagnosis ended without a finding")
+
+
+def _loaded(path: Path) -> Dataset:
+    try:
+        return load_dataset(path)
+    except ValueError as error:
+        faults = [vars(fault) for fault in getattr(error, "errors", [])]
+        raise WingfitError(f"{path} is not a valid dataset", "" if faults else str(error), errors=faults) from error

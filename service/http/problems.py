@@ -1,0 +1,147 @@
+"""Errors as RFC 9457 problem details: what is wrong, where, and what to do."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import sqlite3
+from collections.abc import Mapping, Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
+
+from wingfit.service.storage import disk_space
+from wingfit.service.storage.database import DatabaseClosedError, is_full
+
+MEDIA_TYPE = "application/problem+json"
+LONGEST_VALUE = 200
+KINDS = {413: "too-large", 422: "invalid"}
+# Seconds after which to come again, by the kind of a problem that passes by itself.
+RETRY_AFTER = {"busy": 5, "not-ready": 5, "stopping": 5, "disk-full": 30}
+LOG = logging.getLogger("wingfit.http")
+
+ErrorItem = dict[str, Any]
+
+
+class ProblemError(Exception):
+    """An answer that is not what was asked for. ``kind`` names it in the ``type`` URI."""
+
+    def __init__(self, status: int, kind: str, detail: str, *, errors: Sequence[ErrorItem] = (), **extra: Any) -> None:
+        super().__init__(detail)
+        self.status, self.kind, self.detail, self.errors, self.extra = (
+            status,
+            kind,
+            detail,
+            list(errors),
+            extra,
+        )
+
+
+def not_found(what: str, name: str, remedy: str = "") -> ProblemError:
+    """There is no ``what`` called ``name``."""
+    return ProblemError(404, "not-found", f"there is no {what} {shown(name)!r}{'; ' if remedy else ''}{remedy}")
+
+
+def conflict(detail: str, **extra: Any) -> ProblemError:
+    """The state of the thing does not allow the request."""
+    return ProblemError(409, "conflict", detail, **extra)
+
+
+def invalid(detail: str, errors: Sequence[ErrorItem]) -> ProblemError:
+    """The request cannot be meant; ``errors`` say where."""
+    return ProblemError(422, "invalid", detail, errors=errors)
+
+
+def error_item(where: str, value: object, message: str) -> ErrorItem:
+    """One entry of ``errors``."""
+    return {"where": where, "value": shown(value), "message": message}
+
+
+def shown(value: object) -> object:
+    """``value`` as an error may repeat it: short, and JSON whatever came in."""
+    if value is None or isinstance(value, bool) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    if isinstance(value, int) and abs(value) < 2**63:
+        return value
+    text = value if isinstance(value, str) else repr(value)
+    return text if len(text) <= LONGEST_VALUE else text[:LONGEST_VALUE] + "..."
+
+
+def response(problem: ProblemError, headers: Mapping[str, str] | None = None) -> Response:
+    """``problem`` on the wire."""
+    body: dict[str, Any] = {
+        "type": f"urn:wingfit:problem:{problem.kind}",
+        "title": HTTPStatus(problem.status).phrase,
+        "status": problem.status,
+        "detail": problem.detail,
+        **problem.extra,
+    }
+    if problem.errors:
+        body["errors"] = problem.errors
+    later = {"Retry-After": str(RETRY_AFTER[problem.kind])} if problem.kind in RETRY_AFTER else {}
+    # ASCII, because a lone surrogate that came in must be able to go out again.
+    return Response(json.dumps(body), problem.status, {**later, **(headers or {})}, MEDIA_TYPE)
+
+
+def install(app: FastAPI) -> None:
+    """Make every error of ``app`` a problem."""
+    app.add_exception_handler(ProblemError, _on_problem)
+    app.add_exception_handler(HTTPException, _on_http)
+    app.add_exception_handler(RequestValidationError, _on_validation)
+    app.add_exception_handler(DatabaseClosedError, _on_closed)
+    app.add_exception_handler(OperationalError, _on_operational)
+    app.add_exception_handler(sqlite3.OperationalError, _on_operational)
+
+
+async def _on_problem(_: Request, error: Exception) -> Response:
+    assert isinstance(error, ProblemError)  # noqa: S101  # for the type checker; registered for it alone
+    return response(error)
+
+
+async def _on_http(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)  # noqa: S101
+    if detail := disk_space.while_spooling(error.__cause__):
+        return _without_room(request, error.__cause__, detail)
+    kind = KINDS.get(error.status_code) or HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
+    return response(ProblemError(error.status_code, kind, str(error.detail)), error.headers)
+
+
+async def _on_validation(_: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)  # noqa: S101
+    return response(invalid("the request is invalid", [_from_pydantic(item) for item in error.errors()]))
+
+
+async def _on_closed(_: Request, error: Exception) -> Response:
+    return response(ProblemError(503, "stopping", str(error)))
+
+
+async def _on_operational(request: Request, error: Exception) -> Response:
+    if not is_full(error):
+        return of_a_mistake(request, error)
+    detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
+    return _without_room(request, error, detail)
+
+
+def _without_room(request: Request, error: BaseException | None, detail: str) -> Response:
+    LOG.error("%s %a: %s", request.method, request.scope["path"], error)
+    return response(ProblemError(507, "disk-full", detail))
+
+
+def of_a_mistake(request: Request, error: Exception) -> Response:
+    """The answer to an error that nothing else answers: a full disk, or a mistake of ours, which the log describes."""
+    if detail := disk_space.anywhere(error):
+        return _without_room(request, error, detail)
+    LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)
+    return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
+
+
+def _from_pydantic(item: Mapping[str, Any]) -> ErrorItem:
+    where = ".".join(str(part) for part in item["loc"])
+    value = None if item["type"] == "missing" else item.get("input")
+    return error_item(where, value, item["msg"])

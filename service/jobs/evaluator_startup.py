@@ -1,0 +1,98 @@
+"""Starts the evaluator in the background, so that the API answers at once, and keeps trying when it fails."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import Literal
+
+from wingfit.service.jobs.runner import lower_priority, message
+from wingfit.workers import RunningEvaluator
+from wingfit.workers.watch import Standing
+
+LOG = logging.getLogger("wingfit.evaluator")
+RETRY_SECONDS = (2.0, 5.0, 15.0, 60.0)
+CLOSE_SECONDS = 5.0
+NO_WORKER = (
+    "there is no worker: of a Ray cluster all nodes that compute are gone, or its head does not answer; jobs are "
+    "accepted, and wait until a node joins (ray start --address=...)"
+)
+
+
+class Pool:
+    """The evaluator that all runs share. ``error`` says why there is none yet."""
+
+    def __init__(self, make: Callable[[], RunningEvaluator], on_ready: Callable[[RunningEvaluator], None]) -> None:
+        self._make, self._on_ready = make, on_ready
+        self._stop = threading.Event()
+        self._lock = threading.Lock()
+        self._evaluator: RunningEvaluator | None = None
+        self.error: str | None = None
+        self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
+
+    def start(self) -> None:
+        """Begin to start the evaluator."""
+        self._thread.start()
+
+    @property
+    def status(self) -> Literal["starting", "ok", "degraded"]:
+        """Standing of the evaluator, in the words of the health call."""
+        if self._evaluator:
+            return "degraded" if self.workers == 0 else "ok"
+        return "degraded" if self.error else "starting"
+
+    @property
+    def detail(self) -> str | None:
+        """Why jobs are not computed, where that is known."""
+        return NO_WORKER if self._evaluator and self.workers == 0 else self.error
+
+    @property
+    def workers(self) -> int | None:
+        """Number of workers that live, where the evaluator knows it."""
+        standing = self.standing
+        return standing.workers if standing else None
+
+    @property
+    def standing(self) -> Standing | None:
+        """The workers that live, and what became of others; None before there are any."""
+        evaluator = self._evaluator
+        return evaluator.standing if evaluator else None
+
+    def close(self, seconds: float = CLOSE_SECONDS) -> bool:
+        """Close the evaluator, or abandon it after ``seconds``; whether it closed."""
+        self._stop.set()
+        with self._lock:
+            evaluator, self._evaluator = self._evaluator, None
+        if evaluator is None:
+            if self._thread.ident:  # it closes what it is starting
+                self._thread.join(seconds)
+            return not self._thread.is_alive()
+        closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)
+        closing.start()
+        closing.join(seconds)
+        return not closing.is_alive()
+
+    def _start(self) -> None:
+        # Worker processes inherit the priority of the thread that starts them.
+        lower_priority()
+        attempt = 0
+        while not self._stop.is_set():
+            try:
+                self._adopt(self._make())
+                return
+            except Exception as error:
+                self.error = message(error)
+                LOG.exception("cannot start the evaluator")
+            self._stop.wait(RETRY_SECONDS[min(attempt, len(RETRY_SECONDS) - 1)])
+            attempt += 1
+
+    def _adopt(self, evaluator: RunningEvaluator) -> None:
+        with self._lock:
+            if not self._stop.is_set():
+                self._evaluator, self.error = evaluator, None
+        if self._stop.is_set():
+            evaluator.close()
+            return
+        LOG.info("the evaluator is ready")
+        self._on_ready(evaluator)

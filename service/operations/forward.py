@@ -1,0 +1,69 @@
+"""Passes TCP connections on to the server: ``python -m wingfit.service.operations.forward api:8321``.
+
+In the containers this process alone is on the network that is published. Ray listens on every interface, so the
+container of the API, which holds a Ray node, may only be on the network of the cluster.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import sys
+from contextlib import suppress
+
+PIECE_BYTES = 64 * 1024
+CONNECT_SECONDS = 10.0
+
+
+def main(words: list[str] | None = None) -> None:
+    """Listen on every address of this machine and forward until the process is ended."""
+    parser = argparse.ArgumentParser(prog="python -m wingfit.service.operations.forward", description=__doc__)
+    parser.add_argument("target", help="where connections go, as host:port")
+    parser.add_argument("--host", default="0.0.0.0", help="address to listen on (default: all)")  # noqa: S104  its purpose
+    parser.add_argument("--port", type=int, default=8321, help="TCP port to listen on (default: 8321)")
+    options = parser.parse_args(words)
+    host, _, port = options.target.rpartition(":")
+    if not host or not port.isdigit():
+        parser.error(f"the target is {options.target!r}; write host:port, for example api:8321")
+    with suppress(KeyboardInterrupt):
+        asyncio.run(forward(options.host, options.port, host, int(port)))
+
+
+async def forward(host: str, port: int, target_host: str, target_port: int) -> None:
+    """Forward every connection to ``host``:``port`` to the target, until cancelled."""
+
+    async def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        try:
+            await _join(reader, writer, target_host, target_port)
+        except OSError as error:
+            print(f"cannot reach {target_host}:{target_port}: {error}", file=sys.stderr, flush=True)
+        finally:
+            writer.close()
+
+    listening = await asyncio.start_server(connected, host, port)
+    async with listening:
+        await listening.serve_forever()
+
+
+async def _join(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host: str, port: int) -> None:
+    """Connect to the target and copy both ways until both sides have finished. OSError if it cannot be reached."""
+    target_reader, target_writer = await asyncio.wait_for(asyncio.open_connection(host, port), CONNECT_SECONDS)
+    try:
+        ways = (_copy(reader, target_writer), _copy(target_reader, writer))
+        # A side that breaks off says nothing about the other: both are closed by the callers.
+        with suppress(ConnectionError):
+            await asyncio.gather(*ways)
+    finally:
+        target_writer.close()
+
+
+async def _copy(source: asyncio.StreamReader, target: asyncio.StreamWriter) -> None:
+    """Copy until ``source`` ends, then tell ``target`` that no more will come; answers may still come back."""
+    while piece := await source.read(PIECE_BYTES):
+        target.write(piece)
+        await target.drain()
+    target.write_eof()
+
+
+if __name__ == "__main__":
+    main()

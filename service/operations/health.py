@@ -1,0 +1,71 @@
+"""How the service is: answered without a thread of the pool or a lock, which anything slow may hold."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Sequence
+
+from sqlalchemy import inspect
+
+from wingfit.service.http import threads
+from wingfit.service.jobs.evaluator_startup import Pool
+from wingfit.service.jobs.job_kind import Work
+from wingfit.service.runs.schemas import HealthOut
+from wingfit.service.settings import Settings
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.version import wingfit_version
+
+# For which a caller waits for the database: what looks after services mostly gives up after a few seconds.
+LOOK_SECONDS = 1.0
+
+_COUNT = "SELECT state, count(*) FROM {} GROUP BY state"
+
+Jobs = dict[str, dict[str, int]]
+
+
+class Health:
+    """Counts jobs in a thread of its own; who asks meanwhile shares the count."""
+
+    def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[Work]) -> None:
+        self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
+        self._counting = threads.Shared("health", self._count)
+        self.jobs: Jobs | None = None
+        """Of all owners, by kind and state; None where the database did not answer in time."""
+
+    async def look(self) -> str | None:
+        """Count anew; why there is no count, None where there is one."""
+        try:
+            self.jobs = await self._counting.result(LOOK_SECONDS)
+        except TimeoutError:
+            self.jobs = None
+            return f"the database does not answer within {LOOK_SECONDS:g} s"
+        except sqlite3.Error as error:
+            self.jobs = None
+            return f"the database cannot be read: {error}"
+        return None
+
+    async def now(self) -> HealthOut:
+        """Standing of the service, of all owners, whoever asks."""
+        silent = await self.look()
+        run, diagnosis = (None if self.jobs is None else _active(self.jobs[work.what]) for work in self._kinds)
+        return HealthOut(
+            status="degraded" if silent else self._pool.status,
+            version=wingfit_version(),
+            sqlite_version=sqlite3.sqlite_version,
+            evaluator=self._settings.evaluator,
+            workers=self._pool.workers,
+            runs_active=run,
+            diagnoses_active=diagnosis,
+            detail="; ".join(reason for reason in (silent, self._pool.detail) if reason) or None,
+        )
+
+    def _count(self) -> Jobs:
+        with self._database.look() as look:
+            return {
+                work.what: dict(look.execute(_COUNT.format(inspect(work.table).local_table))) for work in self._kinds
+            }
+
+
+def _active(states: dict[str, int]) -> int:
+    return sum(count for state, count in states.items() if state in store.ACTIVE)

@@ -1,0 +1,1 @@
+"""Results of runs on the wire: loads, forces, coefficients, effects."""

@@ -1,0 +1,1 @@
+"""Calibration runs: specification, computation, schemas, exports."""

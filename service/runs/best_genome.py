@@ -1,0 +1,25 @@
+"""The best genome of a run so far."""
+
+from __future__ import annotations
+
+from wingfit.service.container import Service
+from wingfit.service.http.problems import conflict
+from wingfit.service.runs import views
+from wingfit.service.runs.schemas import GenomeOut
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import RunRow
+
+
+def best(row: RunRow) -> dict[str, float]:
+    """The best genome so far by name, or a 409."""
+    if row.genome is None:
+        raise conflict("no generation has finished yet", state=row.state)
+    return row.genome
+
+
+def standing(service: Service, row: RunRow) -> GenomeOut:
+    """The best genome so far beside the nominal one, or a 409."""
+    if row.result is not None:
+        return GenomeOut(genes=row.result["genes"], final=True)
+    genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))
+    return GenomeOut(genes=[views.gene(gene) for gene in genes], final=False)

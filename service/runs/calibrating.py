@@ -1,0 +1,100 @@
+"""Runs: calibrations that go on from their last stored generation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from sqlalchemy.orm import Session
+
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.result import ForceResult
+from wingfit.calibration.search import Generation
+from wingfit.service.datasets.parsed_datasets import Datasets
+from wingfit.service.jobs.job_kind import Points, Step
+from wingfit.service.outcomes import force_views
+from wingfit.service.runs import views
+from wingfit.service.runs.engine import Engine
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import CheckpointRow, GenerationRow, RunRow
+from wingfit.service.units import finite
+from wingfit.workers import jobs
+
+
+class Calibrating:
+    """How runs are computed."""
+
+    what = "run"
+    table = RunRow
+
+    def __init__(self, database: Database, engine: Engine, datasets: Datasets) -> None:
+        self._database, self._engine, self._datasets = database, engine, datasets
+
+    def row(self, session: Session, job_id: str) -> RunRow:
+        """The run, or a 404."""
+        return store.run(session, job_id)
+
+    def begin(self, session: Session, row: RunRow) -> Points:
+        """Go on where the run was: its generations so far."""
+        return [(g.elapsed_seconds, g.progress) for g in store.history(session, row.id, 0)]
+
+    def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
+        """Search generation by generation, then judge what was found."""
+        spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
+        with self._database.read() as session:
+            checkpoint = store.checkpoint(session, row.id)
+        for generation in self._engine.calibrate(spec, dataset, evaluator, checkpoint):
+            checkpoint = generation.checkpoint
+            yield _step(generation)
+        if checkpoint is None:
+            raise ValueError("the search ended without a generation")
+        judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
+        if isinstance(judged, ForceResult):
+            outcome = force_views.result(judged, spec, dataset).model_dump(mode="json")
+        else:
+            outcome = views.result(judged).model_dump(mode="json")
+        yield _judged(outcome)
+
+
+def _step(generation: Generation) -> Step:
+    """One generation with its checkpoint and genome."""
+
+    def keep(session: Session, row: RunRow, eta: float | None) -> None:
+        row.stage, row.genome = generation.stage, generation.genome
+        misfit = views.misfit(row.kind, generation.distance)
+        row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
+        row.evaluations = generation.evaluations
+        row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
+        session.add(_generation_row(row, generation, eta))
+        session.merge(CheckpointRow(run_id=row.id, body=generation.checkpoint))
+
+    return Step(generation.progress, keep)
+
+
+def _judged(outcome: dict[str, Any]) -> Step:
+    def keep(_session: Session, row: RunRow, _eta: float | None) -> None:
+        row.result = outcome
+        # while it runs, the best of the present stage; in the end, over all that was fitted
+        row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
+
+    return Step(1.0, keep, last=True)
+
+
+def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> GenerationRow:
+    return GenerationRow(
+        run_id=row.id,
+        sequence=row.generations,
+        stage=generation.stage,
+        generation=generation.index,
+        best=finite(generation.best),
+        mean=finite(generation.mean),
+        diversity=finite(generation.diversity),
+        **views.misfit(row.kind, generation.distance),
+        evaluations=generation.evaluations,
+        failed=generation.failed,
+        reasons=list(generation.reasons),
+        elapsed_seconds=row.elapsed_seconds,
+        progress=row.progress,
+        eta_seconds=eta,
+    )

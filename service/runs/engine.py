@@ -1,0 +1,180 @@
+"""What the service needs of calibration, behind one seam: `ModelEngine` is the real one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Protocol
+
+from wingfit.calibration import result, search
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces import estimation
+from wingfit.calibration.forces.agreement import agreements
+from wingfit.calibration.forces.estimation import Prediction
+from wingfit.calibration.forces.result import Agreement, ForceComparison, ForceResult, GlobalModel, Source
+from wingfit.calibration.plan import prepared
+from wingfit.calibration.problem import base_genome
+from wingfit.calibration.result import Comparison, GeneResult, Result
+from wingfit.calibration.search import CalibrationSpec, Generation
+from wingfit.calibration.spec import vehicle_model, wing_model
+from wingfit.records import Condition, Dataset, Recording, load_archive
+from wingfit.sim.wing.loads import simulate_outputs
+from wingfit.sim.wing.outputs import Outputs
+
+
+class Engine(Protocol):
+    """Reads datasets, checks specifications, calibrates, judges; ValueError says what is wrong."""
+
+    def load(self, data: bytes, filename: str) -> Dataset:
+        """Parse an uploaded zip."""
+        ...
+
+    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
+        """``spec`` with everything decided; ValueError when it does not fit ``dataset``."""
+        ...
+
+    def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+        """Genes of the model; ValueError for an impossible division or an unknown term."""
+        ...
+
+    def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
+        """The nominal genome with ``values`` changed; ValueError for a value out of bounds."""
+        ...
+
+    def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
+        """Standing of the genes while the search runs."""
+        ...
+
+    def calibrate(
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
+    ) -> Iterator[Generation]:
+        """Search, or go on from ``checkpoint``."""
+        ...
+
+    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+        """The best genome of each stage so far, by the stage's name."""
+        ...
+
+    def summarise(
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+    ) -> Result | ForceResult:
+        """Judge what the search found, by its last checkpoint, on every recording."""
+        ...
+
+    def compare(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> Comparison:
+        """Tracks of a genome over a recording."""
+        ...
+
+    def loads(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
+    ) -> Outputs:
+        """Loads, powers and energies of a genome under a recording's condition."""
+        ...
+
+    def forces(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
+    ) -> ForceComparison:
+        """Forces of a genome, which comes from ``source``, over a recording."""
+        ...
+
+    def agreements(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> tuple[Agreement, ...]:
+        """How the forces of a genome agree with a recording."""
+        ...
+
+    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
+        """Forces under any condition from a global model."""
+        ...
+
+
+class ModelEngine:
+    """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
+
+    def load(self, data: bytes, filename: str) -> Dataset:
+        """Parse an uploaded zip; DatasetError says where it is malformed."""
+        return load_archive(data, filename)
+
+    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
+        """Plan the calibration without running it."""
+        search.plan(spec, dataset)
+        return search.resolved(spec, dataset)
+
+    def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+        """Genes of the model with this division, or these terms."""
+        return tuple(gene.name for gene in search.model_for(dataset, spec).genes)
+
+    def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
+        """The nominal genome with ``values`` changed."""
+        return base_genome(search.model_for(dataset, spec), values).as_dict()
+
+    def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
+        """Standing of the genes while the search runs: no errors of estimation yet."""
+        model = search.model_for(dataset, spec)
+        searched = {name for stage in search.plan(spec, dataset) for name in stage.free}
+        nominal, best = base_genome(model).normalised(), base_genome(model, genome).normalised()
+        return tuple(
+            GeneResult(
+                name=gene.name,
+                unit=gene.unit,
+                description=gene.description,
+                nominal=nominal[gene.name],
+                best=best[gene.name],
+                lower=gene.lower,
+                upper=gene.upper,
+                searched=gene.name in searched,
+                standard_error=None,
+                identifiable=None,
+            )
+            for gene in model.genes
+        )
+
+    def calibrate(
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
+    ) -> Iterator[Generation]:
+        """Search, stage by stage."""
+        return search.calibrate(spec, dataset, evaluator, checkpoint)
+
+    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+        """The best genome of each stage so far."""
+        return search.found(spec, dataset, checkpoint)
+
+    def summarise(
+        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+    ) -> Result | ForceResult:
+        """Judge what the search found on every recording."""
+        return result.summarise(spec, dataset, evaluator, checkpoint)
+
+    def compare(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> Comparison:
+        """Simulate one recording's condition."""
+        return result.compare(spec, dataset, genome, recording)
+
+    def loads(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
+    ) -> Outputs:
+        """Simulate one recording's condition for what acts inside the wing and on it."""
+        model = wing_model(dataset, spec)
+        return simulate_outputs(model, base_genome(model, genome).values, recording)
+
+    def forces(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
+    ) -> ForceComparison:
+        """Compute one recording's forces, low-passed like the recording."""
+        return estimation.compare_forces(spec, dataset, recording, source, genome)
+
+    def agreements(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> tuple[Agreement, ...]:
+        """Compute one recording's forces and how they agree."""
+        model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+        observed = model.observe([base_genome(model, genome).values], record)
+        if observed.reasons[0] is not None:
+            raise ValueError(f"the forces under {recording!r} cannot be computed: {observed.reasons[0]}")
+        return agreements(record, observed.channels[0], "nominal")
+
+    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
+        """Compute the forces with the coefficients that ``law`` gives."""
+        return estimation.predict(spec, dataset, law, condition)

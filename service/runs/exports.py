@@ -1,0 +1,101 @@
+"""Exports of a run: its history as a table, or all of it as one document.
+
+Both are made while they are sent, ``BLOCK`` generations at a time, however long the history is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from wingfit.service.container import Service
+from wingfit.service.http import csv_text
+from wingfit.service.outcomes import force_views
+from wingfit.service.runs import best_genome, views
+from wingfit.service.runs.export_schemas import RunExportOut
+from wingfit.service.runs.schemas import RunOut
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import DatasetRow, GenerationRow, RunRow
+from wingfit.service.version import wingfit_version
+
+BLOCK = 1000
+# Columns of the table, by the fields of a generation; the first two are squares of the unit of the run's kind.
+SQUARES = ("best", "mean")
+COLUMNS = ("sequence", "stage", "generation", *SQUARES, "diversity")
+MORE_COLUMNS = ("evaluations", "failed", "reasons", "elapsed_seconds")
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A run and its dataset as they were ``at`` a moment."""
+
+    row: RunRow
+    dataset: DatasetRow
+    at: str
+
+
+def of(service: Service, run_id: str) -> Exported:
+    """The run as it is now, or a 404."""
+    with service.database.read() as session:
+        row = store.run(session, run_id)
+        return Exported(row, store.dataset(session, row.dataset_id), store.now())
+
+
+def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
+    """The generations that ``row`` counts, ascending; each block is a reading of its own, so that none lasts long.
+
+    A 404 where the run is deleted meanwhile: what was sent is then seen not to be whole.
+    """
+    for after in range(0, row.generations, BLOCK):
+        with database.read() as session:
+            store.run(session, row.id)
+            found = store.history(session, row.id, after, min(BLOCK, row.generations - after))
+        yield found
+
+
+def table(database: Database, row: RunRow) -> Iterator[str]:
+    """The history as CSV, a generation a row; units are in the names of the columns."""
+    square, misfit = ("m2", "best_mm") if row.kind == "tracks" else ("n2", "best_mn")
+    fields = (*COLUMNS, misfit, *MORE_COLUMNS)
+    yield csv_text.lines([[f"{name}_{square}" if name in SQUARES else name for name in fields]])
+    for block in blocks(database, row):
+        yield csv_text.lines([[_cell(one, name) for name in fields] for one in block])
+
+
+def document(service: Service, exported: Exported) -> Iterator[str]:
+    """All of a run as JSON (`export_schemas.RunExportOut`); a part that needs the dataset is made at once."""
+    empty = _without_history(service, exported).model_dump_json()
+    return _filled(service.database, exported.row, empty.removesuffix("]}"))
+
+
+def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
+    yield head
+    for number, block in enumerate(blocks(database, row)):
+        items = ",\n".join(views.history_item(one).model_dump_json() for one in block)
+        yield f",\n{items}" if number else items
+    yield "]}\n"
+
+
+def _without_history(service: Service, exported: Exported) -> RunExportOut:
+    row, run = exported.row, views.run(exported.row)
+    return RunExportOut(
+        wingfit_version=wingfit_version(),
+        exported_at=exported.at,
+        run=run,
+        request=request(run),
+        dataset=views.dataset(exported.dataset),
+        genome=None if row.genome is None else best_genome.standing(service, row),
+        result=None if row.result is None else force_views.stored(row.kind, row.result),
+        history=[],
+    )
+
+
+def request(run: RunOut) -> dict[str, object]:
+    """The body of POST /v1/runs that repeats a run."""
+    return {"dataset_id": run.dataset_id, "name": run.name, **run.spec.model_dump(mode="json")}
+
+
+def _cell(generation: GenerationRow, name: str) -> csv_text.Cell:
+    value: csv_text.Cell = "; ".join(generation.reasons) if name == "reasons" else getattr(generation, name)
+    return value

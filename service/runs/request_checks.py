@@ -1,0 +1,31 @@
+"""Refusals that requests for runs, simulations and diagnoses share."""
+
+from __future__ import annotations
+
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.records import Dataset, EstimateError
+from wingfit.service.http.problems import ErrorItem, error_item, invalid
+from wingfit.service.runs.engine import Engine
+
+
+def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
+    """Genes of the model that a body asks for, or a 422."""
+    try:
+        return engine.gene_names(spec, dataset)
+    except EstimateError as error:
+        place = f"dataset.{'wing' if dataset.kind == 'tracks' else 'vehicle'}.estimates"
+        raise invalid("the dataset's estimates do not fit", [error_item(place, None, str(error))]) from None
+    except ValueError as error:
+        tracks = dataset.kind == "tracks"
+        where, value = ("body.division", spec.division) if tracks else ("body.without", ", ".join(spec.without))
+        raise invalid("there is no such model", [error_item(where, value, str(error))]) from None
+
+
+def unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
+    """Faults for the recordings of a body that its dataset does not have; what it has is listed once."""
+    unknown = [(place, name) for place, name in enumerate(names) if name not in known]
+    remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]
+    return [
+        error_item(f"body.recordings.{place}", name, f"unknown; {remedy}")
+        for (place, name), remedy in zip(unknown, remedies, strict=False)
+    ]

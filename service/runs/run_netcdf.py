@@ -1,0 +1,195 @@
+"""A run as NetCDF: its history and genome, and every recording beside what the best genome makes of it.
+
+Layout: at the root the history along ``generation`` and the genes along ``gene``; a group ``recordings/<name>`` with
+tracks along ``time, marker, axis``, or forces along ``quantity, phase``, the modelled ones also along ``source``.
+Numbers and names are those of the API. The file is made in memory: some hundreds of bytes a generation, and the dataset
+twice, a recording at a time.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from wingfit.client.answers import CONDITION
+from wingfit.records import Dataset, Recording
+from wingfit.records.files.folder import RECORDINGS
+from wingfit.service.container import Service
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.outcomes import coefficient_source, force_views
+from wingfit.service.runs import best_genome, netcdf_variables, views
+from wingfit.service.runs.exports import Exported, blocks, request
+from wingfit.service.runs.schemas import GeneOut, GenomeOut
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import RunRow
+
+Json = dict[str, Any]
+AXES = "xyz"
+TRACK_PHASE = "phase of the beat, zero where the reference markers cross the horizontal on the upstroke"
+FORCE_PHASE = "phase of the beat, zero where the wings are closest and begin to open"
+GENE_NUMBERS = (
+    ("nominal", "see gene_unit", "nominal value"),
+    ("best", "see gene_unit", "best value so far"),
+    ("lower", "see gene_unit", "lower bound"),
+    ("upper", "see gene_unit", "upper bound"),
+    ("standard_error", "see gene_unit", "standard error of the best value"),
+    ("standard_error_percent", "percent", "standard error, of the best value"),
+)
+
+
+def file(service: Service, exported: Exported, genome: GenomeOut, gone: Callable[[], bool]) -> bytes:
+    """The file; once ``gone``, for whom it is, a 503 before the next recording."""
+    dataset = service.datasets.get(exported.row.dataset_id)
+
+    def write(root: Any) -> None:
+        root.dimensions = {"generation": exported.row.generations, "gene": len(genome.genes)}
+        _history(root, service.database, exported.row)
+        _genes(root, genome.genes)
+        _recordings(root, service, exported.row, dataset, gone)
+
+    row, model = exported.row, "flexible wing" if exported.row.kind == "tracks" else "blade-element model"
+    attributes = netcdf_variables.provenance(row, exported.dataset, model, exported.at) | {
+        "title": f"calibration {row.name}",
+        "request": json.dumps(request(views.run(row))),
+    }
+    return netcdf_variables.made(write, attributes)
+
+
+def _history(root: Any, database: Database, row: RunRow) -> None:
+    along = ("generation",)
+    square, misfit = ("m2", ("best_mm", "mm")) if row.kind == "tracks" else ("N2", ("best_mn", "mN"))
+    counts = {
+        "sequence": "number of the generation over all stages",
+        "generation_in_stage": "number of the generation in its stage",
+        "evaluations": "individuals evaluated since the run began",
+        "failed": "individuals of the generation that failed",
+    }
+    reals = {
+        "best": (square, "fitness of the best individual"),
+        "mean": (square, "mean fitness of the individuals that did not fail"),
+        "diversity": (netcdf_variables.NO_UNIT, "diversity of the generation; of Gauss-Newton its largest step"),
+        misfit[0]: (misfit[1], "misfit of the best individual"),
+        "elapsed_seconds": ("s", "computing time since the run began"),
+    }
+    whole = {
+        name: netcdf_variables.numbers(root, name, along, netcdf_variables.NO_UNIT, said, kind="i8")
+        for name, said in counts.items()
+    }
+    real = {name: netcdf_variables.numbers(root, name, along, *said) for name, said in reals.items()}
+    stage = netcdf_variables.texts(root, "stage", "generation", "stage of the search")
+    reasons = netcdf_variables.texts(root, "reasons", "generation", "why individuals failed")
+    filled = 0
+    for block in blocks(database, row):
+        here = slice(filled, filled := filled + len(block))
+        for name, variable in whole.items():
+            field = "generation" if name == "generation_in_stage" else name
+            variable[here] = np.array([getattr(one, field) for one in block])
+        for name, variable in real.items():
+            variable[here] = netcdf_variables.or_nan(getattr(one, name) for one in block)
+        stage[here] = netcdf_variables.text_array(one.stage for one in block)
+        reasons[here] = netcdf_variables.text_array("; ".join(one.reasons) for one in block)
+
+
+def _genes(root: Any, genes: list[GeneOut]) -> None:
+    netcdf_variables.texts(root, "gene", "gene", "gene", (gene.name for gene in genes))
+    netcdf_variables.texts(root, "gene_unit", "gene", "unit of the gene's values", (gene.unit for gene in genes))
+    netcdf_variables.texts(root, "gene_description", "gene", "what the gene is", (gene.description for gene in genes))
+    for name, units, said in GENE_NUMBERS:
+        values = netcdf_variables.or_nan(getattr(gene, name) for gene in genes)
+        netcdf_variables.numbers(root, f"gene_{name}", ("gene",), units, said, values)
+    netcdf_variables.flags(root, "gene_searched", "gene", "whether it was searched", (gene.searched for gene in genes))
+    netcdf_variables.flags(
+        root, "gene_identifiable", "gene", "whether the data tell it", (gene.identifiable for gene in genes)
+    )
+
+
+def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone: Callable[[], bool]) -> None:
+    found = coefficient_source.estimates(service, row, dataset) if row.kind == "forces" else {}
+    for recording in dataset.recordings:
+        if gone():
+            raise ProblemError(503, "unavailable", "the caller has hung up; ask again")
+        group = root.create_group(f"{RECORDINGS}/{recording.name}")
+        described = views.recording(recording, recording.name in dataset.held_out).model_dump()
+        held_out = {"held_out": "yes" if described["held_out"] else "no"}
+        netcdf_variables.describe(group, held_out | {name: described[name] for name in ("rig", *CONDITION)})
+        if row.kind == "tracks":
+            _tracks(group, service, row, dataset, recording)
+        else:
+            _forces(group, service, row, dataset, recording, found)
+
+
+def _tracks(group: Any, service: Service, row: RunRow, dataset: Dataset, recording: Recording) -> None:
+    how: Json
+    group.dimensions = {"time": len(recording.times), "marker": len(recording.markers), "axis": len(AXES)}
+    netcdf_variables.texts(group, "marker", "marker", "marker", recording.markers)
+    netcdf_variables.texts(group, "axis", "axis", "axis of the wing frame: x aft, y outboard, z up", AXES)
+    netcdf_variables.numbers(group, "time_s", ("time",), "s", "time of the frame", recording.times)
+    along, where = ("time", "marker", "axis"), {"coordinates": "time_s phase"}
+    recorded = views.track_mm(recording.positions)
+    netcdf_variables.numbers(group, "recorded_mm", along, "mm", "recorded position", recorded, **where)
+    phase, simulated = np.full(len(recording.times), np.nan), np.full(recorded.shape, np.nan)
+    try:
+        found = service.engine.compare(store.spec(row), dataset, best_genome.best(row), recording.name)
+    except ValueError as error:
+        how = {"comment": f"the simulation failed: {error}"}
+    else:
+        phase, simulated = views.tidy_phase(found.phase), views.track_mm(found.simulated)
+        solved = views.numerics(found)
+        how = {name: np.nan if value is None else value for name, value in solved.items()}
+    netcdf_variables.numbers(group, "phase", ("time",), netcdf_variables.NO_UNIT, TRACK_PHASE, phase)
+    netcdf_variables.numbers(
+        group, "simulated_mm", along, "mm", "position simulated with the best genome", simulated, **where, **how
+    )
+
+
+def _forces(
+    group: Any,
+    service: Service,
+    row: RunRow,
+    dataset: Dataset,
+    recording: Recording,
+    found: coefficient_source.Estimates,
+) -> None:
+    beats: dict[str, Json] = {}
+    comments = []
+    for source, make in coefficient_source.offered(service, row, dataset, recording.name, found).items():
+        try:
+            chosen = make()
+            compared = service.engine.forces(store.spec(row), dataset, chosen.genome, recording.name, source)
+        except ValueError as error:
+            comments.append(f"{source}: the simulation failed: {error}")
+            continue
+        beats[source] = force_views.forces(compared)
+        comments += [f"{source}: {remark}" for remark in (*chosen.remarks, *compared.remarks)]
+    if beats:
+        _beats(group, beats)
+    if comments:
+        netcdf_variables.describe(group, {"comment": "\n".join(comments)})
+
+
+def _beats(group: Any, beats: dict[str, Json]) -> None:
+    """Recorded forces, which are the same beside every source, and modelled ones."""
+    first = next(iter(beats.values()))
+    quantities, phase = tuple(first["recorded_n"]), first["phase"]
+    group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}
+    netcdf_variables.texts(group, "source", "source", "where the coefficients are from", beats)
+    netcdf_variables.texts(
+        group, "quantity", "quantity", "force of the wings on the body: of the stream, or body axes", quantities
+    )
+    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, FORCE_PHASE, phase)
+
+    def series(named: dict[str, list[float]]) -> list[list[float]]:
+        missing = [np.nan] * len(phase)
+        return [named.get(quantity, missing) for quantity in quantities]
+
+    along = ("quantity", "phase")
+    netcdf_variables.numbers(group, "recorded_n", along, "N", "recorded force, mean beat", series(first["recorded_n"]))
+    netcdf_variables.numbers(
+        group, "spread_n", along, "N", "standard deviation between beats", series(first["spread_n"])
+    )
+    modelled = [series(beat["modelled_n"]) for beat in beats.values()]
+    netcdf_variables.numbers(group, "modelled_n", ("source", *along), "N", "modelled force", modelled)

@@ -1,0 +1,184 @@
+"""How a run calibrates, on the wire."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
+from pydantic_core import PydanticCustomError
+
+from wingfit.service.outcomes.load_schemas import Number
+
+Mode = Literal["staged", "joint", "local"]
+Method = Literal["genetic", "cma_es", "gauss_newton"]
+Preset = Literal["proposed", "berman_wang", "dickinson"]
+ForceAxis = Literal["x", "z"]
+
+DATASET_ID = "ds_0f3c9a7be1d24568"
+LARGEST_SEED = 2**53 - 1
+DIVISION = r"^[1-9][0-9]?(x[1-9][0-9]?|(,[1-9][0-9]?){0,63})$"
+LONGEST_DIVISION = 200
+DIVISION_FORMS = "preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2"
+FINEST_MM, COARSEST_MM = 0.02, 1.0
+
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Whole = Annotated[int, Field(strict=True)]
+# Control characters, and those that take no room or turn the text after them around.
+_HIDDEN = r"\u0000-\u001f\u007f-\u009f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff"
+TITLE = rf"^[^{_HIDDEN}]*[^{_HIDDEN}\s][^{_HIDDEN}]*$"
+
+
+def _visible(title: str) -> str:
+    # Half a surrogate pair is no character: it can be sent as JSON, and neither stored nor shown. The published pattern
+    # leaves it out, because to many readers of patterns every character beyond U+FFFF is two halves.
+    if not re.fullmatch(TITLE, title) or re.search(r"[\ud800-\udfff]", title):
+        raise PydanticCustomError("title", "must be one line of text that can be seen, without control characters")
+    return title
+
+
+Title = Annotated[
+    str, AfterValidator(_visible), Field(min_length=1, max_length=200, json_schema_extra={"pattern": TITLE})
+]
+
+
+def _readable(division: str) -> str:
+    if len(division) > LONGEST_DIVISION or not re.fullmatch(DIVISION, division):
+        raise PydanticCustomError("division", "must be a {forms}", {"forms": DIVISION_FORMS})
+    return division
+
+
+Division = Annotated[
+    str,
+    AfterValidator(_readable),
+    Field(
+        json_schema_extra={"pattern": DIVISION, "maxLength": LONGEST_DIVISION},
+        description=DIVISION_FORMS,
+    ),
+]
+
+
+def _attainable(accuracy_mm: float) -> float:
+    if accuracy_mm < FINEST_MM:
+        raise PydanticCustomError(
+            "too_fine",
+            "must be at least {least} mm: below, corners in the law of the air make the estimated error unreliable",
+            {"least": FINEST_MM},
+        )
+    if accuracy_mm > COARSEST_MM:
+        raise PydanticCustomError(
+            "too_coarse",
+            "must be at most {most} mm: beyond, the error of the solution would be as large as what is fitted",
+            {"most": COARSEST_MM},
+        )
+    return accuracy_mm
+
+
+Accuracy = Annotated[
+    Number,
+    AfterValidator(_attainable),
+    Field(
+        json_schema_extra={"minimum": FINEST_MM, "maximum": COARSEST_MM},
+        description="largest error of any simulated marker at any instant; the steps of a beat follow from it",
+    ),
+]
+
+
+def _different(axes: list[ForceAxis]) -> list[ForceAxis]:
+    if len(set(axes)) < len(axes):
+        raise PydanticCustomError("repeated_axis", "must name an axis once")
+    return axes
+
+
+Axes = Annotated[
+    list[ForceAxis],
+    AfterValidator(_different),
+    Field(
+        min_length=1,
+        max_length=2,
+        json_schema_extra={"uniqueItems": True},
+        description="vehicles only: force axes that are fitted",
+    ),
+]
+
+Effects = Annotated[
+    list[Name],
+    Field(max_length=100, description="effects that the model contains as well, see /v1/effects; fitted like others"),
+]
+
+SPEC: dict[str, Any] = {
+    "method": "genetic",
+    "mode": "staged",
+    "division": "11",
+    "population": 50,
+    "stall": 10,
+    "tolerance": 0.001,
+    "max_generations": 200,
+    "seed": 1,
+    "bounds_factor": 5.0,
+    "accuracy_mm": 0.1,
+    "recordings": [],
+    "genes": [],
+    "effects": [],
+    "finish": False,
+    "preset": "proposed",
+    "without": [],
+    "axes": ["x"],
+    "low_pass_hz": None,
+    "peel_width_beats": 0.0,
+}
+
+
+class VehicleModel(BaseModel):
+    """Which model of a vehicle, and what it is compared with; a wing takes none of it."""
+
+    preset: Annotated[Preset, Field(description="vehicles only: blade-element model, see /v1/models")] = "proposed"
+    without: Annotated[list[Name], Field(max_length=100, description="vehicles only: terms to leave out")] = []
+    low_pass_hz: Annotated[
+        Annotated[Number, Field(ge=0, le=1e6)] | None,
+        Field(description="vehicles only: cut-off for forces; null: 3.2 x flap frequency; 0: not filtered"),
+    ] = None
+    peel_width_beats: Annotated[
+        Number, Field(ge=0, le=0.5, description="vehicles only: over which the end of the peel is smoothed")
+    ] = 0.0
+
+
+class Spec(VehicleModel):
+    """What every specification says; see `wingfit.calibration.spec.CalibrationSpec`."""
+
+    division: Division = "11"
+    population: Annotated[Whole, Field(ge=4, le=1000)] = 50
+    stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
+    tolerance: Annotated[Number, Field(ge=0, le=1)] = 1e-3
+    max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
+    seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1
+    bounds_factor: Annotated[Number, Field(ge=1.01, le=100)] = 5.0
+    accuracy_mm: Accuracy = 0.1
+    recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
+    genes: Annotated[
+        list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
+    ] = []
+    effects: Effects = []
+    finish: Annotated[StrictBool, Field(description="Gauss-Newton after the search of each stage")] = False
+    axes: Axes = ["x"]
+
+
+class SpecOut(Spec):
+    """How a run calibrates."""
+
+    mode: Mode
+    method: Method
+
+
+class RunIn(Spec):
+    """A calibration to run."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"dataset_id": DATASET_ID, "division": "11", "name": "first try"}]},
+    )
+
+    dataset_id: Name
+    name: Title | None = None
+    mode: Annotated[Mode | None, Field(description="null: staged for a wing, local for a vehicle")] = None
+    method: Annotated[Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle")] = None

@@ -1,0 +1,182 @@
+"""Specifications between the wire and the inside: SI, tuples, and what belongs to the other kind of dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from wingfit.calibration.effects import effect_of
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.records import Dataset, Recording
+from wingfit.service.http.problems import ErrorItem, error_item, invalid
+from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
+from wingfit.service.runs.spec_schemas import RunIn, SpecOut, VehicleModel
+from wingfit.service.units import MM, tidy_mm
+from wingfit.sim.effects.registry import chosen
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.terms import PRESETS
+from wingfit.sim.vehicle.terms import chosen as terms_of
+
+# A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
+WIDEST_BOUNDS = 100.0
+METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
+USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
+LONGEST_NAME = 200
+
+
+def spec_out(given: CalibrationSpec) -> SpecOut:
+    """How a run calibrates, as it goes out."""
+    named = {
+        "accuracy_mm": tidy_mm(given.accuracy),
+        "low_pass_hz": given.low_pass,
+        "peel_width_beats": given.peel_width,
+    }
+    return SpecOut.model_validate(vars(given) | named)
+
+
+def of_run(body: RunIn) -> CalibrationSpec:
+    """What a request for a run asks for."""
+    alike = ("division", "mode", "method", "population", "stall", "tolerance", "max_generations", "seed")
+    return CalibrationSpec(
+        **{name: getattr(body, name) for name in alike},
+        bounds_factor=body.bounds_factor,
+        accuracy=body.accuracy_mm / MM,
+        recordings=tuple(body.recordings),
+        genes=tuple(body.genes),
+        effects=tuple(body.effects),
+        finish=body.finish,
+        axes=tuple(body.axes),
+        **_vehicle(body),
+    )
+
+
+def of_simulation(
+    division: str, accuracy_mm: float, effects: Iterable[str], vehicle: VehicleModel | None = None
+) -> CalibrationSpec:
+    """The model that a request for a simulation asks for."""
+    return CalibrationSpec(
+        division=division,
+        bounds_factor=WIDEST_BOUNDS,
+        accuracy=accuracy_mm / MM,
+        effects=tuple(effects),
+        **(_vehicle(vehicle) if vehicle else {}),
+    )
+
+
+def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) -> None:
+    """A 422 for a low-pass that takes away the beat itself."""
+    for recording in recordings:
+        flap = recording.condition.flap_frequency
+        if low_pass_hz and low_pass_hz < flap:
+            message = (
+                f"below the flap frequency of recording {recording.name!r}, {flap:g} Hz, nothing of the beat is left; "
+                "give more than that, 0 for no filter, or leave it out for 3.2 times the flap frequency"
+            )
+            raise invalid("the low-pass does not fit", [error_item("body.low_pass_hz", low_pass_hz, message)])
+
+
+def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel | None = None) -> None:
+    """A 422 for effects that are unknown, named twice, of no use to what the dataset describes, or terms already.
+
+    What is known is listed with the first that is not.
+    """
+    faults, listed = [], set[str]()
+    for place, name in enumerate(names):
+        try:
+            chosen([name] * names[: place + 1].count(name), dataset.rig)
+            _refuse_terms(name, dataset, vehicle)
+        except ValueError as error:
+            head, _, known = str(error).partition("; there are ")
+            message = f"{head}; see those named above" if known and known in listed else str(error)
+            listed.add(known)
+            faults.append(error_item(f"body.effects.{place}", name, message))
+    if faults:
+        raise invalid("the model cannot contain these effects; GET /v1/effects lists them all", faults)
+
+
+def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
+    """Faults for the genes among ``named`` (place in the request, name) that are not ``known``: listed once."""
+    faults, remedy = [], f"known are {', '.join(known)}"
+    for where, name in named:
+        if name in known:
+            continue
+        effect = effect_of(name)
+        if effect:
+            message = (
+                f"belongs to effect {effect.name!r}, which the request does not include; name it in 'effects' "
+                f"(--with {effect.name})"
+            )
+        else:
+            message, remedy = f"unknown gene; {remedy}", "see those named above"
+        faults.append(error_item(where, name, message))
+    return faults
+
+
+def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
+    """A 422 for settings of a wing in a request about a vehicle, or the reverse; defaults do no harm."""
+    what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
+    message = f"means nothing for a {what}, which the dataset describes; leave it out"
+    if faults := _given(body, names, message):
+        raise invalid(f"the request has settings that a {what} does not have", faults)
+
+
+def refuse_idle(body: RunIn, method: str | None) -> None:
+    """A 422 for settings of a search in a request for Gauss-Newton alone; defaults do no harm."""
+    if method != "gauss_newton":
+        return
+    message = (
+        "means nothing for the method gauss_newton, which searches nothing; leave it out, or use genetic or cma_es"
+    )
+    if faults := _given(body, SEARCH_ONLY, message):
+        raise invalid("the request has settings of a search, and asks for none", faults)
+
+
+def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+    """A name for a run that was given none: what tells it from the other runs on its dataset."""
+    unusual = spec.method not in (None, USUAL[dataset.kind])
+    method = METHODS.get(spec.method or "", spec.method) if unusual else None
+    if spec.finish:
+        method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
+    parts = (dataset.name, model_name(dataset, spec), spec.mode, method)
+    return ", ".join(part for part in parts if part)[:LONGEST_NAME]
+
+
+def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+    """The model in words that tell it from others."""
+    model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
+    if spec.without:
+        model += f" without {', '.join(spec.without)}"
+    if spec.effects:
+        model += f" with {', '.join(spec.effects)}"
+    return model
+
+
+def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:
+    """ValueError where the model of a vehicle has the effect as a term already, or its wings do not meet."""
+    if vehicle is None or dataset.kind != "forces" or set(vehicle.without) - set(PRESETS[vehicle.preset].terms):
+        return  # what is wrong with the terms is said of them
+    terms = terms_of(vehicle.preset, tuple(vehicle.without))
+    if name in terms:
+        raise ValueError(
+            f"effect {name!r} is a term of the model {vehicle.preset!r} already; leave the effect out, or the term: "
+            f'without: ["{name}"] (--without {name})'
+        )
+    BladeElementWing(dataset.vehicle, terms, effects=(name,))
+
+
+def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorItem]:
+    """Faults for those settings of ``names`` that differ from their defaults."""
+    fields = type(body).model_fields
+    given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
+    return [error_item(f"body.{name}", getattr(body, name), message) for name in given]
+
+
+def _vehicle(body: VehicleModel) -> dict[str, Any]:
+    return {
+        "preset": body.preset,
+        "without": tuple(body.without),
+        "low_pass": body.low_pass_hz,
+        "peel_width": body.peel_width_beats,
+    }

@@ -1,0 +1,180 @@
+"""Copies of the database: taken while the service works, checked, and put back."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from tempfile import mkstemp
+from urllib.parse import quote
+
+from wingfit.records.files.permissions import FILE, open_new
+from wingfit.service.storage.backup_contents import Contents, ContentsError, contents, revoke_keys
+from wingfit.service.storage.backup_rows import RowError, check_rows
+from wingfit.service.storage.backup_schema import SchemaError, check_schema
+from wingfit.service.storage.database import FILE_NAME, Database, DataFolderError, FolderLock, make_folder
+
+SUFFIX = ".backup"
+
+
+class BackupError(RuntimeError):
+    """A copy that cannot be taken or put back; the message says why and what to do."""
+
+
+def snapshot(folder: Path) -> Path:
+    """A copy of the database in ``folder`` as it is now, in a file of its own there, checked; the caller removes it.
+
+    One reading transaction: what is written meanwhile goes on, and is not in the copy.
+    """
+    try:
+        handle, name = mkstemp(SUFFIX, "copy-", folder)
+    except OSError as error:
+        raise BackupError(f"cannot write into {folder}: {error.strerror}") from error
+    os.fchmod(handle, FILE)  # whatever the umask
+    os.close(handle)
+    target = Path(name)
+    try:
+        source = sqlite3.connect(f"file:{quote(str(folder / FILE_NAME))}?mode=ro", uri=True)
+        with closing(source), closing(sqlite3.connect(target)) as copy:
+            source.backup(copy)
+            copy.execute("PRAGMA journal_mode=DELETE")  # one file, without a log beside it
+        check(target)
+    except (OSError, sqlite3.Error) as error:
+        target.unlink(missing_ok=True)
+        raise BackupError(f"the database cannot be copied ({error}); is the disk full?") from error
+    except BackupError:
+        target.unlink(missing_ok=True)
+        raise
+    return target
+
+
+def forget_snapshots(folder: Path) -> None:
+    """Remove copies that a process left when it was killed."""
+    for left in folder.glob(f"copy-*{SUFFIX}"):
+        left.unlink(missing_ok=True)
+
+
+def check(path: Path) -> None:
+    """BackupError unless ``path`` is a whole database of this service."""
+    with _opened(path, path) as copy:
+        versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
+        if len(versions) != 1:
+            raise BackupError(f"{path} is no backup of wingfit; take another one")
+        _check_pages(copy, path)
+
+
+def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
+    """Put a copy into a data folder that has no database; BackupError says why not.
+
+    The copy may come from a stranger: it is put back only if it is whole and its schema is exactly ours. Its API keys
+    are revoked unless ``keep_keys``: whoever made the copy may have them. Returns the keys that are good in the copy
+    and the owners of its data. Jobs that were under way go on from their last stored step when a server starts there.
+    """
+    if not backup.is_file():
+        raise BackupError(f"{backup} is no file; name what 'wingfit backup' wrote")
+    target = folder / FILE_NAME
+    try:
+        make_folder(folder)
+        lock = FolderLock(folder)
+    except DataFolderError as error:
+        raise BackupError(str(error)) from None
+    except OSError as error:
+        raise BackupError(f"cannot use the folder {folder}: {error.strerror}") from None
+    try:
+        present = [path.name for path in folder.glob(f"{FILE_NAME}*")]
+        if present:
+            raise BackupError(
+                f"{folder} holds {', '.join(sorted(present))} already; move that away, or name another folder"
+            )
+        brought = _put(backup, target, keep_keys)
+    finally:
+        lock.release()
+    try:
+        _check_opens(folder)
+    except (DataFolderError, RowError) as error:
+        for left in folder.glob(f"{FILE_NAME}*"):
+            left.unlink()
+        raise BackupError(f"{backup} is not put back: {error}") from None
+    return brought
+
+
+def _check_opens(folder: Path) -> None:
+    """Bring the database to the newest schema, and read every row; DataFolderError or RowError where that fails."""
+    database = Database(folder)
+    try:
+        check_rows(database)
+    finally:
+        database.close()
+
+
+def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
+    """Copy ``backup`` to ``target`` if the copy passes the checks; others may change the original."""
+    part = target.with_suffix(".part")
+    try:
+        _copied(backup, part)
+        brought = _examined(part, backup)
+        if not keep_keys:
+            with _opened(part, backup, "rw") as copy, copy:
+                revoke_keys(copy)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+    return brought
+
+
+def _examined(copy: Path, name: Path) -> Contents:
+    """Check a ``copy`` of the file ``name`` and return its keys and owners; BackupError if it is not ours."""
+    with _opened(copy, name) as opened:
+        try:
+            check_schema(opened)  # before anything is read that could be made to run
+            _check_pages(opened, name)
+            return contents(opened)
+        except (SchemaError, ContentsError) as error:
+            raise BackupError(f"{name} is not put back: {error}") from None
+
+
+@contextmanager
+def _opened(path: Path, name: Path, mode: str = "ro&immutable=1") -> Iterator[sqlite3.Connection]:
+    """Open a database that is not trusted; SQLite's errors become a BackupError that calls the file ``name``."""
+    try:
+        with closing(sqlite3.connect(f"file:{quote(str(path))}?mode={mode}", uri=True)) as copy:
+            copy.text_factory = lambda text: text.decode(errors="replace")
+            copy.execute("PRAGMA trusted_schema=OFF")
+            copy.execute("PRAGMA cell_size_check=ON")
+            yield copy
+    except sqlite3.Error as error:
+        raise BackupError(f"{name} is no backup of wingfit, or is damaged: {error}; take another one") from None
+
+
+def _check_pages(copy: sqlite3.Connection, name: Path) -> None:
+    (found,) = copy.execute("PRAGMA integrity_check(1)").fetchone()
+    if found != "ok":
+        raise BackupError(f"{name} is damaged: {found}; take another one")
+
+
+def move(copy: Path, target: Path) -> None:
+    """Move ``copy`` to ``target``, also into another file system; only its owner can read it there either."""
+    try:
+        copy.replace(target)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        _copied(copy, target)
+    finally:
+        copy.unlink(missing_ok=True)
+
+
+def _copied(backup: Path, target: Path) -> None:
+    """Copy to a new file, whole or not at all."""
+    try:
+        with backup.open("rb") as source, open_new(target) as into:
+            shutil.copyfileobj(source, into)
+            into.flush()
+            os.fsync(into.fileno())
+    except OSError as error:
+        target.unlink(missing_ok=True)
+        raise BackupError(f"cannot write {target}: {error.strerror}") from error

@@ -1,0 +1,58 @@
+"""Whether the server can read every dataset, run and diagnosis of a database that may come from a stranger."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from wingfit.service.diagnoses import views as diagnosis_views
+from wingfit.service.runs import views
+from wingfit.service.storage import store
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import DatasetRow, DiagnosisRow, RunRow
+
+Table = type[DatasetRow] | type[RunRow] | type[DiagnosisRow]
+LONGEST_CAUSE = 200
+
+
+class RowError(ValueError):
+    """A row that the server cannot read; the message says which and why."""
+
+
+def check_rows(database: Database) -> None:
+    """Read each row as the server reads it for a list and at its start; RowError for the first that cannot be."""
+    with database.read() as session:
+        for table, read in _READERS.items():
+            for number in session.scalars(select(table.number).order_by(table.number)).all():
+                _check(session, table, number, read)
+                session.expunge_all()
+
+
+def _check(session: Session, table: Table, number: int, read: Callable[[Any], object]) -> None:
+    try:
+        read(session.get_one(table, number))
+    except Exception as error:  # whatever it is that a stranger wrote
+        cause = " ".join(str(error).split())[:LONGEST_CAUSE]
+        raise RowError(
+            f"row {number} of its table {table.__tablename__!r} cannot be read ({type(error).__name__}: {cause!a})"
+        ) from None
+
+
+def _run(row: RunRow) -> None:
+    views.run(row)
+    store.job(row)
+
+
+def _diagnosis(row: DiagnosisRow) -> None:
+    diagnosis_views.diagnosis(row)
+    store.job(row)
+
+
+_READERS: dict[Table, Callable[[Any], object]] = {
+    DatasetRow: views.dataset,
+    RunRow: _run,
+    DiagnosisRow: _diagnosis,
+}

@@ -1,0 +1,88 @@
+"""The service's own clock, by which retention counts.
+
+The wall clock of a machine may be wrong for a while, and may jump by years in either direction: a dead battery, a
+virtual machine that is put back, a date set by hand. What was deleted by it is lost. So the service counts the seconds
+itself. While a process runs, a clock that nobody can set counts them. From the end of one process to the start of the
+next only the wall clock can, and it counts for a day at most.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+
+from sqlalchemy.orm import Session
+
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import ClockRow
+
+LOG = logging.getLogger("wingfit")
+DAY = 86_400.0
+ROW = 1  # the only one
+
+
+def _wall() -> datetime:
+    return datetime.now(UTC)
+
+
+def _steady() -> float:
+    """Seconds on a clock that nobody can set; where the system has one, a clock that goes on while it is suspended."""
+    boot = getattr(time, "CLOCK_BOOTTIME", None)
+    return time.monotonic() if boot is None else time.clock_gettime(boot)
+
+
+class ServiceClock:
+    """Seconds of one service over all its processes; it never goes back, and is never ahead of the true time.
+
+    The exception are starts of a process: each may count up to one day too much, where the wall clock jumped ahead.
+    """
+
+    def __init__(self, wall: Callable[[], datetime] = _wall, steady: Callable[[], float] = _steady) -> None:
+        self._wall, self._steady = wall, steady
+        self._last: tuple[datetime, float] | None = None
+
+    def advance(self, session: Session) -> float:
+        """The seconds until now, which are stored."""
+        wall, steady = self._wall(), self._steady()
+        row = session.get(ClockRow, ROW)
+        if row is None:
+            row = ClockRow(id=ROW, service_seconds=0.0)
+            session.add(row)
+        elif self._last is None:
+            row.service_seconds += _stopped(row.wall_time, wall)
+        else:
+            row.service_seconds += _elapsed(self._last, (wall, steady))
+        row.wall_time = store.timestamp(wall)
+        self._last = wall, steady
+        return row.service_seconds
+
+
+def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> float:
+    """Seconds between two moments of one process, by the steady clock; a wall clock that disagrees is logged."""
+    elapsed = max(now[1] - before[1], 0.0)
+    jumped = (now[0] - before[0]).total_seconds() - elapsed
+    if abs(jumped) > DAY:
+        LOG.warning(
+            "the wall clock jumped by %+.1f days within %.1f hours; WINGFIT_KEEP_DAYS counts the hours only",
+            jumped / DAY,
+            elapsed / 3600,
+        )
+    return elapsed
+
+
+def _stopped(stored: str, wall: datetime) -> float:
+    """Seconds that count, in [0, 1 day], of the time since an earlier process ``stored`` the wall time."""
+    try:
+        gap = (wall - datetime.fromisoformat(stored)).total_seconds()
+    except (TypeError, ValueError):  # no time, or one without a zone
+        return 0.0
+    counted = min(max(gap, 0.0), DAY)
+    if abs(gap - counted) > DAY:
+        LOG.warning(
+            "by the wall clock the service last ran %.1f days ago; WINGFIT_KEEP_DAYS counts %.0f of them",
+            gap / DAY,
+            counted / DAY,
+        )
+    return counted

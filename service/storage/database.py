@@ -1,0 +1,291 @@
+"""The database: one process owns the data folder, one connection does all writing, reads go beside it.
+
+SQLite before 3.51.3 can corrupt a database in WAL mode when two connections write or checkpoint at the same
+time. Therefore readers are opened read-only, and the folder is locked against a second server.
+"""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import sqlite3
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any, ClassVar
+from urllib.parse import quote
+
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import QueuePool, StaticPool
+
+from wingfit.service.auth.access import OwnSession
+from wingfit.records.files import permissions
+from wingfit.service.storage import fail_points
+from wingfit.service.storage.disk_space import FULL
+
+FILE_NAME = "wingfit.sqlite3"
+LOCK_NAME = "wingfit.lock"
+BUSY_TIMEOUT_MS = 10_000
+READERS = 16
+
+
+class DataFolderError(RuntimeError):
+    """The data folder cannot be used; the message says why and what to do."""
+
+
+class DatabaseClosedError(RuntimeError):
+    """The service is stopping; what was not yet stored is computed again after the next start."""
+
+
+def is_full(error: Exception) -> bool:
+    """Whether a write failed for lack of space, or because the disk does not take it: later it may."""
+    if isinstance(error, OSError):
+        return error.errno in FULL
+    text = str(getattr(error, "orig", error))
+    return isinstance(error, OperationalError | sqlite3.OperationalError) and any(
+        sign in text for sign in ("is full", "disk I/O error")
+    )
+
+
+class FolderLock:
+    """Holds a data folder for this process.
+
+    A POSIX record lock, because it dies with the process and is not inherited by worker processes; it does
+    not guard against the same process, hence the set.
+    """
+
+    _held: ClassVar[set[Path]] = set()
+
+    def __init__(self, folder: Path) -> None:
+        self.path = (folder / LOCK_NAME).resolve()
+        if self.path in self._held:
+            raise DataFolderError(f"this process already serves the data folder {folder}")
+        try:
+            permissions.make_file(self.path)
+            self._file: IO[str] = self.path.open("a+", encoding="ascii")
+        except OSError as error:
+            raise DataFolderError(
+                f"cannot write into the data folder {folder}: {error.strerror}; set WINGFIT_DATA to one that you can "
+                "write into"
+            ) from None
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno not in (errno.EACCES, errno.EAGAIN):
+                self._file.close()
+                raise DataFolderError(
+                    f"the data folder {folder} cannot be locked ({error.strerror}), as on some network file systems; "
+                    "set WINGFIT_DATA to a folder on a disk of this machine"
+                ) from None
+            self._file.seek(0)
+            owner = self._file.read().strip() or "unknown"
+            self._file.close()
+            raise DataFolderError(
+                f"another wingfit server (process {owner}) uses the data folder {folder}; stop it, or set "
+                "WINGFIT_DATA to another folder"
+            ) from None
+        self._file.truncate(0)
+        self._file.write(f"{os.getpid()}\n")
+        self._file.flush()
+        self._held.add(self.path)
+
+    def release(self) -> None:
+        """Give the folder free."""
+        self._held.discard(self.path)
+        self._file.close()
+
+
+class Database:
+    """Sessions that read and the one that writes."""
+
+    def __init__(self, folder: Path) -> None:
+        """Lock ``folder`` (created if missing), bring its database to the newest schema and open it.
+
+        Only the user who runs the process can read either.
+        """
+        try:
+            make_folder(folder)
+        except OSError as error:
+            raise DataFolderError(
+                f"cannot create the data folder {folder}: {error.strerror}; set WINGFIT_DATA"
+            ) from None
+        self._lock = FolderLock(folder)
+        self._guard = threading.Lock()
+        self._closed = self._released = False
+        path = (folder / FILE_NAME).resolve()
+        try:
+            _close_to_others(path)
+            self._writer = _writer(path)
+            migrate(self._writer)
+        except Exception as error:
+            self._lock.release()
+            if isinstance(error, DataFolderError):
+                raise
+            raise DataFolderError(f"cannot open the database {path}: {error}") from error
+        self._readers = _readers(path)
+        self._path = path
+        self._bare: deque[sqlite3.Connection] = deque()
+        self.version = 0
+        """Another one after every write."""
+
+    @contextmanager
+    def write(self) -> Iterator[Session]:
+        """One transaction, the only one that writes at this time; durable when the block has ended. As :meth:`read`."""
+        with self._guard:
+            if self._closed:
+                raise DatabaseClosedError("the service is stopping")
+            try:
+                with OwnSession(self._writer, expire_on_commit=False) as session, session.begin():
+                    yield session
+                    fail_points.passing("commit")
+            finally:
+                self.version += 1
+            fail_points.passing("committed")
+
+    @contextmanager
+    def read(self) -> Iterator[Session]:
+        """One consistent snapshot, of what :data:`wingfit.service.auth.access.CALLER` may see."""
+        if self._closed:
+            raise DatabaseClosedError("the service is stopping")
+        with OwnSession(self._readers, expire_on_commit=False) as session:
+            yield session
+
+    @contextmanager
+    def look(self) -> Iterator[sqlite3.Connection]:
+        """One consistent snapshot, of everything, through a bare connection: for reads that must be quick."""
+        if self._closed:
+            raise DatabaseClosedError("the service is stopping")
+        try:
+            connection = self._bare.pop()
+        except IndexError:
+            connection = _bare(self._path)
+        connection.execute("BEGIN")
+        try:
+            yield connection
+        finally:
+            connection.execute("ROLLBACK")
+            self._bare.append(connection)
+            if self._closed:
+                self._close_bare()
+
+    def _close_bare(self) -> None:
+        with suppress(IndexError):
+            while True:
+                self._bare.pop().close()
+
+    def close(self, seconds: float = -1) -> bool:
+        """Refuse further reads and writes, finish the write under way, give the folder free.
+
+        Whether the write under way has ended within ``seconds`` (negative: however long it takes); else all stays open.
+        """
+        self._closed = True
+        if not self._guard.acquire(timeout=seconds):
+            return False
+        try:
+            if not self._released:
+                self._released = True
+                self._readers.dispose()
+                self._close_bare()
+                self._writer.dispose()
+                self._lock.release()
+        finally:
+            self._guard.release()
+        return True
+
+
+def make_folder(folder: Path) -> None:
+    """Create a data folder, or close one to other users."""
+    permissions.make_folder(folder, FILE_NAME, LOCK_NAME)
+
+
+def _close_to_others(path: Path) -> None:
+    """Let only the owner read the database at ``path`` (created if missing) and its log."""
+    permissions.make_file(path)
+    for name in (f"{path}-wal", f"{path}-shm"):  # new ones get the rights of the database
+        with suppress(FileNotFoundError):
+            permissions.tighten(Path(name))
+
+
+def revisions() -> list[str]:
+    """The versions of the schema that this wingfit knows, oldest first."""
+    return [script.revision for script in ScriptDirectory.from_config(_migrations()).walk_revisions()][::-1]
+
+
+def _migrations() -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    return config
+
+
+def migrate(engine: Engine, revision: str = "head") -> None:
+    """Bring the schema to ``revision``, the newest."""
+    config = _migrations()
+    script = ScriptDirectory.from_config(config)
+    with engine.connect() as connection:
+        config.attributes["connection"] = connection
+        try:
+            command.upgrade(config, revision)
+        except CommandError as error:
+            raise DataFolderError(
+                f"a newer wingfit wrote the database (this one knows schema {script.get_current_head()}): "
+                f"{error}; install the newer wingfit, or set WINGFIT_DATA to another folder"
+            ) from None
+        connection.commit()
+
+
+def _writer(path: Path) -> Engine:
+    engine = create_engine(
+        f"sqlite:///{path}",
+        poolclass=StaticPool,
+        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
+    )
+    event.listen(engine, "connect", _prepare_writer)
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN IMMEDIATE"))
+    return engine
+
+
+def _readers(path: Path) -> Engine:
+    engine = create_engine(
+        f"sqlite:///{_read_only(path)}&uri=true",
+        poolclass=QueuePool,
+        pool_size=READERS,
+        max_overflow=READERS,
+        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
+    )
+    event.listen(engine, "connect", _prepare_reader)
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
+    return engine
+
+
+def _bare(path: Path) -> sqlite3.Connection:
+    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False)
+    _prepare_reader(connection, None)
+    return connection
+
+
+def _read_only(path: Path) -> str:
+    return f"file:{quote(str(path))}?mode=ro"
+
+
+def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:
+    # The driver must not begin transactions by itself: schema changes and reads belong to ours.
+    connection.isolation_level = None
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
+
+
+def _prepare_reader(connection: sqlite3.Connection, _record: Any) -> None:
+    connection.isolation_level = None
+    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
+    connection.execute("PRAGMA query_only=ON")

@@ -1,0 +1,96 @@
+"""What is forgotten by itself: answers that nobody repeats, and, where it is asked for, jobs that ended long ago."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+from sqlalchemy import select, update
+from sqlalchemy.orm import Session
+
+from wingfit.service.storage import store
+from wingfit.service.storage.clock import DAY, ServiceClock
+from wingfit.service.storage.database import Database, DatabaseClosedError
+from wingfit.service.storage.tables import DiagnosisRow, RunRow
+
+LOG = logging.getLogger("wingfit")
+EVERY_SECONDS = 3600.0
+
+JobTable = type[RunRow] | type[DiagnosisRow]
+TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
+
+
+class Housekeeping:
+    """Tidies at the start and every hour; datasets are never forgotten.
+
+    The service's own clock counts how long ago a job ended, from the first tidying that saw it ended. The wall time
+    of the end is not used: nobody knows whether the wall clock was right then.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        keep_days: int | None,
+        on_deleted: Callable[[str], None],
+        clock: ServiceClock | None = None,
+    ) -> None:
+        self._database, self._keep_days, self._on_deleted = database, keep_days, on_deleted
+        self._clock = clock or ServiceClock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._go, name="housekeeping", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Do nothing more."""
+        self._stop.set()
+
+    def tidy(self) -> int:
+        """Tidy once; the number of jobs forgotten."""
+        with self._database.write() as session:
+            store.forget_answers(session)
+            now = self._clock.advance(session)
+            _note_ends(session, now)  # also where nothing is deleted: later that may be asked for
+        if self._keep_days is None:
+            return 0
+        ended = self._ended_before(now - self._keep_days * DAY)
+        for table, job_id in ended:  # one transaction each: nobody waits long for the one that writes
+            if self._stop.is_set():
+                break
+            with self._database.write() as session:
+                row = session.scalar(select(table).where(table.id == job_id))
+                if row is not None:  # somebody else may have deleted it
+                    session.delete(row)
+            self._on_deleted(job_id)
+        if ended:
+            LOG.info("%d jobs that ended more than %d days ago were deleted", len(ended), self._keep_days)
+        return len(ended)
+
+    def _ended_before(self, seconds: float) -> list[tuple[JobTable, str]]:
+        with self._database.read() as session:
+            return [
+                (table, job_id)
+                for table in TABLES
+                for job_id in session.scalars(select(table.id).where(table.ended_at_service_seconds < seconds))
+            ]
+
+    def _go(self) -> None:
+        while True:
+            try:
+                self.tidy()
+            except DatabaseClosedError:
+                return
+            except Exception:
+                LOG.exception("tidying failed; it is tried again in an hour")
+            if self._stop.wait(EVERY_SECONDS):
+                return
+
+
+def _note_ends(session: Session, now: float) -> None:
+    """Store the service's time with the jobs that have ended since the last tidying."""
+    for table in TABLES:
+        new = table.finished_at.is_not(None), table.ended_at_service_seconds.is_(None)
+        session.execute(update(table).where(*new).values(ended_at_service_seconds=now))

@@ -1,0 +1,376 @@
+"""What the database is asked and told. Every function works in a session: callers decide what is atomic."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import logging
+import secrets
+import sqlite3
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Any, TypeVar
+
+from sqlalchemy import ColumnElement, delete, func, select
+from sqlalchemy.orm import Session
+
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid, not_found
+from wingfit.service.storage.tables import (
+    AnswerRow,
+    ArchiveRow,
+    CheckpointRow,
+    DatasetRow,
+    DiagnosisRow,
+    FindingRow,
+    GenerationRow,
+    JobRow,
+    OwnedRow,
+    ParsedRow,
+    RunRow,
+    StepRow,
+)
+from wingfit.workers.jobs import Job, State, Wish
+
+LOG = logging.getLogger("wingfit")
+ANSWERS_KEPT = timedelta(days=7)
+MB = 10**6
+# What specifications meant that were stored before there was a choice.
+BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
+ACTIVE = tuple(state.value for state in State if not state.final)
+
+Row = TypeVar("Row", DatasetRow, RunRow, DiagnosisRow)
+
+
+def now() -> str:
+    """Give the time, RFC 3339 in UTC."""
+    return timestamp(datetime.now(UTC))
+
+
+def timestamp(moment: datetime) -> str:
+    """A time in UTC as it is stored: RFC 3339, so that texts are in the order of the times."""
+    return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
+
+
+def new_id(prefix: str) -> str:
+    """An id that nobody can guess."""
+    return f"{prefix}_{secrets.token_hex(8)}"
+
+
+# -- lists -----------------------------------------------------------------------------------------------
+
+
+def page(
+    session: Session, table: type[Row], limit: int, cursor: str | None, **equal: str | None
+) -> tuple[list[Row], str | None]:
+    """Up to ``limit`` rows, newest first, and the cursor to the next ones."""
+    query = select(table).order_by(table.number.desc()).limit(limit + 1)
+    if cursor is not None:
+        query = query.where(table.number < number(cursor))
+    for column, value in equal.items():
+        if value is not None:
+            query = query.where(getattr(table, column) == value)
+    rows = list(session.scalars(query))
+    following = cursor_before(rows[limit - 1].number) if len(rows) > limit else None
+    return rows[:limit], following
+
+
+def cursor_before(number: int) -> str:
+    """The cursor to the rows before ``number``."""
+    return base64.urlsafe_b64encode(f"before:{number}".encode()).decode().rstrip("=")
+
+
+def number(cursor: str) -> int:
+    """The number before which a cursor leads, or a 422."""
+    try:
+        text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
+        if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
+            return int(text[7:])
+    except (binascii.Error, UnicodeError, ValueError):
+        pass
+    raise invalid(
+        "the cursor is not one of this server",
+        [error_item("query.cursor", cursor, "use next_cursor of the last page")],
+    )
+
+
+# -- datasets --------------------------------------------------------------------------------------------
+
+
+def dataset(session: Session, dataset_id: str) -> DatasetRow:
+    """The dataset's row, or a 404."""
+    row = session.scalar(select(DatasetRow).where(DatasetRow.id == dataset_id))
+    if row is None:
+        raise not_found("dataset", dataset_id)
+    return row
+
+
+def archive(session: Session, dataset_id: str) -> bytes:
+    """The dataset's bytes as uploaded, or a 404."""
+    body = session.scalar(select(ArchiveRow.body).where(ArchiveRow.dataset_id == dataset_id))
+    if body is None:
+        raise not_found("dataset", dataset_id)
+    return body
+
+
+def parsed(session: Session, dataset_id: str) -> bytes | None:
+    """The dataset in the project's own form, where it is stored so."""
+    return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
+
+
+def has_parsed(connection: sqlite3.Connection, dataset_id: str) -> bool:
+    """Whether the dataset is stored in the project's own form."""
+    return connection.execute("SELECT 1 FROM parsed WHERE dataset_id = ?", (dataset_id,)).fetchone() is not None
+
+
+def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
+    """Store a dataset in the project's own form, unless it was deleted meanwhile."""
+    if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):
+        session.merge(ParsedRow(dataset_id=dataset_id, body=body))
+
+
+def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
+    """``size`` bytes of the dataset's archive from ``start``, without reading the others; a 404 where it is gone."""
+    row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
+    if row is None:
+        raise not_found("dataset", dataset_id)
+    with connection.blobopen("archive", "body", row[0], readonly=True) as blob:
+        blob.seek(start)
+        return blob.read(size)
+
+
+def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
+    """A 429 where the archives of an owner, with what is stored beside them, would take more than ``most_mb``."""
+    held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
+    beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
+    held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
+    if held + size > most_mb * MB:
+        raise ProblemError(
+            429,
+            "too-many",
+            f"the archives of one owner may take {most_mb} MB (WINGFIT_MAX_STORED_MB); these take {held / MB:.1f} MB, "
+            f"this one {size / MB:.1f} MB more; delete datasets that are not needed",
+        )
+
+
+def delete_dataset(session: Session, dataset_id: str) -> None:
+    """Delete a dataset that no run or diagnosis refers to."""
+    row = dataset(session, dataset_id)
+    for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
+        count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
+        if count:
+            raise conflict(f"{count} {what} refer to dataset {dataset_id}; delete them first")
+    session.delete(row)
+
+
+# -- runs ------------------------------------------------------------------------------------------------
+
+
+def run(session: Session, run_id: str) -> RunRow:
+    """The run's row, or a 404."""
+    row = session.scalar(select(RunRow).where(RunRow.id == run_id))
+    if row is None:
+        raise not_found("run", run_id)
+    return row
+
+
+def delete_run(session: Session, run_id: str) -> None:
+    """Delete a run that has ended, with its history."""
+    _delete_ended(session, run(session, run_id), "run")
+
+
+def history(session: Session, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
+    """Generations of a run after sequence ``after``, ascending."""
+    query = select(GenerationRow).where(GenerationRow.run_id == run_id, GenerationRow.sequence > after)
+    return list(session.scalars(query.order_by(GenerationRow.sequence).limit(limit)))
+
+
+def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
+    """Where the run goes on, or None at its start."""
+    return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
+
+
+# -- diagnoses ---------------------------------------------------------------------------------------------
+
+
+def diagnosis(session: Session, diagnosis_id: str) -> DiagnosisRow:
+    """The diagnosis's row, or a 404."""
+    row = session.scalar(select(DiagnosisRow).where(DiagnosisRow.id == diagnosis_id))
+    if row is None:
+        raise not_found("diagnosis", diagnosis_id)
+    return row
+
+
+def delete_diagnosis(session: Session, diagnosis_id: str) -> None:
+    """Delete a diagnosis that has ended, with its finding."""
+    _delete_ended(session, diagnosis(session, diagnosis_id), "diagnosis")
+
+
+def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
+    """What a diagnosis found, as JSON; a 404, or a 409 before it has succeeded."""
+    row = diagnosis(session, diagnosis_id)
+    body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
+    if body is None:
+        raise conflict(
+            f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED", state=row.state
+        )
+    return body
+
+
+def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | None = None) -> list[StepRow]:
+    """Steps of a diagnosis after sequence ``after``, ascending."""
+    query = select(StepRow).where(StepRow.diagnosis_id == diagnosis_id, StepRow.sequence > after)
+    return list(session.scalars(query.order_by(StepRow.sequence).limit(limit)))
+
+
+# -- jobs of any kind ------------------------------------------------------------------------------------
+
+
+def admitted(session: Session, dataset_id: str, most: int) -> str | None:
+    """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
+    owner = dataset(session, dataset_id).owner
+    count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
+    if count >= most:
+        raise ProblemError(
+            429,
+            "too-many",
+            f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them",
+        )
+    return owner
+
+
+def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
+    his = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+    return session.scalar(his) or 0
+
+
+def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
+    return table.owner.is_(None) if owner is None else table.owner == owner
+
+
+def jobs_in(session: Session, table: type[JobRow], state: State) -> list[JobRow]:
+    """Jobs in ``state``, oldest first; one whose row cannot be read is logged and passed over."""
+    numbers = session.scalars(select(table.number).where(table.state == state.value).order_by(table.number)).all()
+    return [row for number in numbers if (row := _readable(session, table, number))]
+
+
+def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | None:
+    try:
+        row = session.get_one(table, number)
+        job(row)
+    except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a state
+        LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
+        return None
+    return row
+
+
+def _delete_ended(session: Session, row: JobRow, what: str) -> None:
+    if row.state in ACTIVE:
+        raise conflict(f"{what} {row.id} is {row.state}; cancel it first", state=row.state)
+    session.delete(row)
+
+
+def job(row: JobRow) -> Job:
+    """The row's job."""
+    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error, row.starts or 0)
+
+
+def put_job(row: JobRow, after: Job) -> None:
+    """Store a job in its row; the times follow from the states."""
+    row.state, row.wish = after.state.value, after.wish.value
+    row.generations, row.progress, row.error, row.starts = after.generations, after.progress, after.error, after.starts
+    if after.state is State.RUNNING and row.started_at is None:
+        row.started_at = now()
+    if after.state.final:
+        row.finished_at = now()
+    if after.state.final or after.state is State.PAUSED:
+        row.eta_seconds = None
+
+
+def spec(row: RunRow) -> CalibrationSpec:
+    """The row's specification."""
+    return spec_from(row.spec)
+
+
+def spec_from(values: dict[str, Any]) -> CalibrationSpec:
+    """A specification from its JSON form."""
+    tuples: dict[str, Any] = {
+        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes", "effects") if name in values
+    }
+    return CalibrationSpec(**(BEFORE_METHODS | values | tuples))
+
+
+def spec_json(given: CalibrationSpec) -> dict[str, Any]:
+    """A specification as JSON."""
+    plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
+    return plain
+
+
+# -- answers to repeated requests ------------------------------------------------------------------------
+
+
+# By the part of a location that says what is there.
+_MADE: dict[str, type[DatasetRow | RunRow | DiagnosisRow]] = {
+    "datasets": DatasetRow,
+    "runs": RunRow,
+    "diagnoses": DiagnosisRow,
+}
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """The key of a request that may be repeated, and what must be equal for it to be the same request."""
+
+    path: str
+    key: str
+    fingerprint: str
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer that created something."""
+
+    status: int
+    location: str
+    body: dict[str, Any]
+
+
+def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
+    """What the same request was answered before; a 422 when the key was used for another one.
+
+    A 409 when what it made was deleted since: to tell of it would be wrong, and to make it again unasked.
+    """
+    row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
+    if row is None or repeat is None:
+        return None
+    if row.fingerprint != repeat.fingerprint:
+        raise invalid(
+            "this Idempotency-Key was used for another request",
+            [error_item("header.Idempotency-Key", repeat.key, "use a new key for a new request")],
+        )
+    *_, kind, made = row.location.split("/")
+    if session.scalar(select(_MADE[kind].id).where(_MADE[kind].id == made)) is None:
+        raise conflict(f"{made}, which this Idempotency-Key made, was deleted; use a new key to make it again")
+    return Answer(row.status, row.location, row.body)
+
+
+def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
+    """Remember an answer together with what it created."""
+    if repeat:
+        session.add(
+            AnswerRow(
+                path=repeat.path,
+                key=repeat.key,
+                fingerprint=repeat.fingerprint,
+                status=answer.status,
+                location=answer.location,
+                body=answer.body,
+                created_at=now(),
+            )
+        )
+
+
+def forget_answers(session: Session) -> None:
+    """Drop answers that nobody will ask for again."""
+    session.execute(delete(AnswerRow).where(AnswerRow.created_at < timestamp(datetime.now(UTC) - ANSWERS_KEPT)))

@@ -1,0 +1,213 @@
+"""Tables of the database; `service/storage/migrations` creates and changes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import JSON, ForeignKey, LargeBinary, MetaData
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+NAMING = {
+    "ix": "ix_%(table_name)s_%(column_0_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class Table(DeclarativeBase):
+    """Base of all tables. Times are RFC 3339 text in UTC; ``number`` is the order of creation."""
+
+    metadata = MetaData(naming_convention=NAMING)
+    type_annotation_map = {dict[str, Any]: JSON, list[dict[str, Any]]: JSON}  # noqa: RUF012  # read by SQLAlchemy
+
+
+class OwnedRow:
+    """What belongs to someone: the owner of the key that made it; None where no key was asked for.
+
+    A job belongs to whom its dataset belongs to.
+    """
+
+    owner: Mapped[str | None] = mapped_column(index=True)
+
+
+class KeyRow(Table):
+    """An API key. ``sha256`` is of its secret, which is stored nowhere; a key that was revoked stays, to be told of."""
+
+    __tablename__ = "key"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    owner: Mapped[str]
+    scopes: Mapped[list[str]] = mapped_column(JSON)
+    sha256: Mapped[str] = mapped_column(unique=True)
+    created_at: Mapped[str]
+    revoked_at: Mapped[str | None]
+
+
+class DatasetRow(OwnedRow, Table):
+    """An uploaded dataset: what lists show; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
+
+    __tablename__ = "dataset"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    kind: Mapped[str] = mapped_column(server_default="tracks")
+    description: Mapped[str]
+    filename: Mapped[str]
+    created_at: Mapped[str]
+    sha256: Mapped[str]
+    size_bytes: Mapped[int]
+    markers: Mapped[int]
+    recordings: Mapped[list[dict[str, Any]]]
+
+
+class ArchiveRow(Table):
+    """The bytes of a dataset as they were uploaded."""
+
+    __tablename__ = "archive"
+
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ParsedRow(Table):
+    """A dataset in the project's own form (:mod:`records.files.parsed`), where its archive must not be opened again."""
+
+    __tablename__ = "parsed"
+
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class ClockRow(Table):
+    """The service's own clock, one row: seconds that the service has run, and the wall time when they were stored."""
+
+    __tablename__ = "clock"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    service_seconds: Mapped[float]
+    wall_time: Mapped[str]
+
+
+class JobRow(OwnedRow):
+    """What every job has; state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
+
+    ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
+    """
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
+    name: Mapped[str]
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
+    kind: Mapped[str] = mapped_column(server_default="tracks")
+    spec: Mapped[dict[str, Any]]
+    state: Mapped[str] = mapped_column(index=True)
+    wish: Mapped[str]
+    stage: Mapped[str | None]
+    progress: Mapped[float] = mapped_column(default=0.0)
+    eta_seconds: Mapped[float | None]
+    created_at: Mapped[str]
+    started_at: Mapped[str | None]
+    finished_at: Mapped[str | None]
+    generations: Mapped[int] = mapped_column(default=0)
+    evaluations: Mapped[int] = mapped_column(default=0)
+    elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
+    error: Mapped[str | None]
+    starts: Mapped[int] = mapped_column(default=0)
+    ended_at_service_seconds: Mapped[float | None]
+
+
+class RunRow(JobRow, Table):
+    """A calibration run."""
+
+    __tablename__ = "run"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    best_mm: Mapped[float | None]
+    best_mn: Mapped[float | None]
+    genome: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+
+
+class DiagnosisRow(JobRow, Table):
+    """A diagnosis; its ``generations`` are steps. ``run_id`` is the run that it started from, while that exists."""
+
+    __tablename__ = "diagnosis"
+    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
+
+    run_id: Mapped[str | None] = mapped_column(ForeignKey("run.id", ondelete="SET NULL"), index=True)
+    verdict: Mapped[str | None]
+    summary: Mapped[str | None]
+
+
+class FindingRow(Table):
+    """The Finding of a diagnosis that has succeeded; apart, because lists need no maps and overlays."""
+
+    __tablename__ = "finding"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
+class StepRow(Table):
+    """How far a diagnosis was at some time; ``sequence`` counts from 1, also over starts."""
+
+    __tablename__ = "step"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    sequence: Mapped[int] = mapped_column(primary_key=True)
+    stage: Mapped[str]
+    progress: Mapped[float]
+    evaluations: Mapped[int]
+    elapsed_seconds: Mapped[float]
+    eta_seconds: Mapped[float | None]
+
+
+class CheckpointRow(Table):
+    """All that a run needs to go on after its last stored generation."""
+
+    __tablename__ = "checkpoint"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
+class GenerationRow(Table):
+    """One finished generation of a run; ``sequence`` counts from 1 over all stages."""
+
+    __tablename__ = "generation"
+
+    run_id: Mapped[str] = mapped_column(ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
+    sequence: Mapped[int] = mapped_column(primary_key=True)
+    stage: Mapped[str]
+    generation: Mapped[int]
+    best: Mapped[float | None]
+    mean: Mapped[float | None]
+    diversity: Mapped[float | None]
+    best_mm: Mapped[float | None]
+    best_mn: Mapped[float | None]
+    evaluations: Mapped[int]
+    failed: Mapped[int]
+    reasons: Mapped[list[str]] = mapped_column(JSON)
+    elapsed_seconds: Mapped[float]
+    progress: Mapped[float]
+    eta_seconds: Mapped[float | None]
+
+
+class AnswerRow(Table):
+    """The answer to a request that carried an ``Idempotency-Key``, stored with what the request created."""
+
+    __tablename__ = "answer"
+
+    path: Mapped[str] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    fingerprint: Mapped[str]
+    status: Mapped[int]
+    location: Mapped[str]
+    body: Mapped[dict[str, Any]]
+    created_at: Mapped[str]

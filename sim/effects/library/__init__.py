@@ -1,0 +1,1 @@
+"""The effects, one file each, in a folder for each kind."""

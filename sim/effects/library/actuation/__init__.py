@@ -1,0 +1,1 @@
+"""Effects of the actuation: the drive, its hinge and its rods."""

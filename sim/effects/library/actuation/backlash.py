@@ -1,0 +1,74 @@
+"""Play where the driving rods hold the wing: it turns freely between two stops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.lanes.lanewise import angle, cosine_and_sine
+from wingfit.sim.kernels.lanes.matrices import load_matrix
+from wingfit.sim.kernels.lanes.vector import greatest, load, load0, magnitude, root, store, store0
+from wingfit.sim.kernels.laws import connector_port
+
+_EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
+
+
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+    """A pin about x that turns freely by half the play, b / 2, to either side, in series with the spring of rotation.
+
+    The spring keeps -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
+    g_1 Q_21 - g_2 Q_12. Behind a pin turned by psi it keeps -g_0 Q_00 - r cos(phi - psi), which is least at psi = phi
+    within the play and at the stop beyond. So cos(phi) becomes C(phi) and the moment about x, -r sin(phi), becomes
+    -r S, S = -C': zero within, the sine of phi -+ b / 2 beyond. What is added is the difference. From h before a stop
+    to h behind it, S is a parabola.
+    """
+    port = connector_port(frame)
+    for c in range(port.places):
+        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, whoever it is
+            continue
+        half, h = load(port.parameters, 1, c), load(port.parameters, 2, c)
+        g1, g2 = load(port.parameters, 3, c), load(port.parameters, 4, c)
+        Q = load_matrix(port.Q, c)
+        p, q = g1 * Q[4] + g2 * Q[8], g1 * Q[7] - g2 * Q[5]
+        r, phi = root(p * p + q * q), angle(q, p)
+        size = magnitude(phi)
+        beyond = greatest(size - half - h, 0.0)
+        x = greatest(size - half + h, 0.0) - beyond  # 0 to 2 h
+        cosine, sine = cosine_and_sine(beyond)
+        C = cosine - x * x * x / (12.0 * h) - h * beyond
+        S = (0.25 * x * x / h + sine) * phi / (size + 1e-300)
+        less, s = (C * p + S * q) / r - 1.0, (C * q - S * p) / r  # those of the pin
+        n = (Q[1] * g1 * less - Q[2] * g2 * s, Q[1] * g1 * s + Q[2] * g2 * less)
+        store(port.wrench, c, 0, load(port.wrench, c, 0) + q - r * S)
+        store(port.wrench, c, 1, load(port.wrench, c, 1) - n[1])
+        store(port.wrench, c, 2, load(port.wrench, c, 2) + n[0])
+        store(port.stiffness, c, 0, load(port.stiffness, c, 0) + 0.5 * r * x * cosine / h - p)
+        store0(port.stored, load0(port.stored) + p - r * C)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    """The play is of the spring, and no other law bends the root; the damper, foam glued to the rod, still acts."""
+    k = np.moveaxis(scene.lanes.stiffness[:, :3], 1, 0)
+    half, root = 0.5 * values["b"], ~Joints.of(scene.structure).within[:, None]
+    g1, g2 = 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])
+    scene.add_connector_law(_law, [root.astype(float), half, 2 * _EDGE * half, g1, g2])
+
+
+EFFECT = Effect(
+    name="backlash",
+    title="Backlash",
+    family="actuation",
+    port="connector",
+    size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "whole angle about x by which the wing turns freely on its rods"),),
+    power="conservative",
+    source="dead band between two stops (Dubowsky and Freudenstein 1971, Journal of Engineering for Industry 93, 305; "
+    "Nordin and Gutman 2002, Automatica 38, 1633, sect. 2), in series with the spring of Fasse (1997)",
+    signature="the wing lags by half the play after each reversal of the load at the root and jumps across; the jump "
+    "has one size, however small the load",
+    confused_with=("stroke_amplitude", "compliant_drive"),
+    wing=_wing,
+)

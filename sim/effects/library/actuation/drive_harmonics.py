@@ -1,0 +1,56 @@
+"""The drive adds second, third and fourth harmonics to the stroke that it is said to make."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+
+HARMONICS = {2: 0.02, 3: 0.02, 4: 0.01}
+"""Those added, with typical sizes: of a four-bar linkage that is off, each is smaller than the one before."""
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    amplitude = np.abs(scene.flap[:, 1])
+    for k in HARMONICS:
+        scene.add_harmonic(k, amplitude * (values[f"cos{k}"] - 1j * values[f"sin{k}"]))
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    """The rear rod makes the same error, later by its lag."""
+    rods, lag = scene.rods, scene.condition.phase_lag
+    rods.lengthened(max(HARMONICS))
+    amplitude = np.abs(rods.series[1, 0])
+    for k in HARMONICS:
+        error = amplitude * (values[f"cos{k}"] - 1j * values[f"sin{k}"])
+        rods.series[k] += error * np.exp(-1j * k * np.array([[0.0], [lag]]))
+
+
+EFFECT = Effect(
+    name="drive_harmonics",
+    title="Higher harmonics of the drive",
+    family="actuation",
+    port="drive",
+    size=tuple(
+        Parameter(
+            f"{wave}{k}",
+            "1",
+            -5.0 * typical,
+            5.0 * typical,
+            typical,
+            f"{'cosine' if wave == 'cos' else 'sine'} of harmonic {k} of the drive, in parts of its first harmonic",
+        )
+        for k, typical in HARMONICS.items()
+        for wave in ("cos", "sin")
+    ),
+    source=(
+        "zeta + a_1 sum_k [cos_k cos(2 pi k t*) + sin_k sin(2 pi k t*)], k = 2, 3, 4: the leading errors of a four-bar "
+        "linkage whose lengths are off (Freudenstein 1955)"
+    ),
+    signature="the same error two to four times a beat at the same drive phases in every condition",
+    confused_with=("stroke_amplitude", "tracker_lag"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

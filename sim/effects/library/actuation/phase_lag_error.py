@@ -1,0 +1,27 @@
+"""The rear driving rod is later than it is said to be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.wing import WingScene
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    harmonics = np.arange(len(scene.rods.series))
+    scene.rods.series[:, 1] *= np.exp(-1j * harmonics[:, None] * values["angle"])
+
+
+EFFECT = Effect(
+    name="phase_lag_error",
+    title="Phase lag error",
+    family="actuation",
+    port="drive",
+    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "by which the rear rod is later than told, of drive phase"),),
+    source="flap angle of the rear rod at drive phase psi - lag - angle (van der Grinten, section III-F: lags of 0, 3 "
+    "and 7 degrees); shift theorem of Fourier series (Bracewell 1965, ch. 6)",
+    signature="twist in phase with the flap rate, most where the wing moves fastest, the same in every condition",
+    confused_with=("hinge_tilt", "rolling_shutter"),
+    wing=_wing,
+)

@@ -1,0 +1,29 @@
+"""The wings flap about another angle than they are said to."""
+
+from __future__ import annotations
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.flap[:, 0] += values["angle"]
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    scene.rods.series[0] += values["angle"]
+
+
+EFFECT = Effect(
+    name="stroke_bias",
+    title="Stroke bias",
+    family="actuation",
+    port="drive",
+    size=(Parameter("angle", "rad", -0.2, 0.2, 0.03, "what is added to the flap angle at every phase"),),
+    source="the mean of the flap angle is larger by angle (eta of Armanini et al. 2016, Eqs. 20-21)",
+    signature="a constant rotation of the wing about its flapping axis; of forces, the pitch that follows the stroke",
+    confused_with=("camera_rotation", "balance_tilt"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

@@ -1,0 +1,106 @@
+"""Air that a wing must accelerate with itself, as inertia."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Station
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.wing.division import MAX_STRIPS
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+_MODES = 128  # of the flow about a section: entries of up to 8 bodies along the chord to 3e-4
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    scale, structure = values["k"] * scene.density, scene.structure
+    for strip, count in enumerate(structure.division.bodies):
+        joined, first = strip_matrix(structure, strip), structure.division.index(strip, 0)
+        for i in range(count):
+            for j in range(count):
+                block = joined[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
+                scene.add_air(first + i, first + j, block[:, :, None] * scale)
+
+
+def strip_matrix(structure: Structure, strip: int) -> Array:
+    """[6 n, 6 n] (m^3 to m^5): twice the kinetic energy of air of density one that a strip of n bodies moves.
+
+    A section of chord c = 2 b whose points move along its normal with w(x), x = cos t from edge to edge, makes a jump
+    of the velocity potential sqrt(1 - x^2) sum_k W_k U_k(x), U_k(x) = sin((k + 1) t) / sin t. With w = sum_k w_k U_k
+    it is W_k = 2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w: so a
+    section that heaves moves rho pi c^2 / 4 of air, one that pitches about its middle rho pi c^4 / 128 (Bisplinghoff,
+    Ashley and Halfman, Aeroelasticity (1955), ch. 5).
+    """
+    panel = structure.panels[structure.division.index(strip, 0)]
+    first, count = structure.division.index(strip, 0), structure.division.bodies[strip]
+    centres = tuple((float(b.centre[0]), float(b.centre[1])) for b in structure.bodies[first : first + count])
+    return _strip_matrix(structure.wing.stations, panel.y0, panel.y1, centres)
+
+
+@lru_cache(maxsize=4 * MAX_STRIPS)
+def _strip_matrix(
+    stations: tuple[Station, ...], y0: float, y1: float, centres: tuple[tuple[float, float], ...]
+) -> Array:
+    """The same from the planform, the strip's ends and its bodies' centres of mass (x, y), m; read-only."""
+    count = len(centres)
+    total = np.zeros((6 * count, 6 * count))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    middle, half = 0.5 * (y0 + y1), 0.5 * (y1 - y0)
+    span, edges, chords = np.array([(s.y, s.leading_edge, s.chord) for s in stations]).T
+    for node, weight in zip(nodes, weights, strict=True):
+        y = middle + half * node
+        b = 0.5 * float(np.interp(y, span, chords))
+        modes = np.zeros((_MODES, 6 * count))
+        for i, centre in enumerate(centres):
+            for column, constant, slope in _normal_motion(y, float(np.interp(y, span, edges)) + b, centre):
+                modes[:, 6 * i + column] = _modes(i / count, (i + 1) / count, constant, slope * b)
+        k = np.arange(1, _MODES + 1)
+        total += half * weight * math.pi * b * b * modes.T @ (modes / k[:, None])
+    total.setflags(write=False)
+    return total
+
+
+def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
+    """Velocity along the normal of a body's points at span ``y`` per component of its twist: at mid-chord, and by x."""
+    return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
+
+
+def _modes(s0: float, s1: float, constant: float, slope: float) -> Array:
+    """Coefficients by U_k of constant + slope x between two fractions of the chord, zero elsewhere; x in -1..1.
+
+    w_k = 2 / pi times the integral of w U_k sqrt(1 - x^2), with x = cos t that of w sin((k + 1) t) sin t.
+    """
+    t0, t1 = math.acos(max(min(2 * s1 - 1, 1.0), -1.0)), math.acos(max(min(2 * s0 - 1, 1.0), -1.0))
+    m = np.arange(1, _MODES + 1)
+
+    def cosines(n: npt.NDArray[np.int64]) -> Array:
+        """Integral of cos(n t)."""
+        safe = np.where(n == 0, 1, n)
+        return np.where(n == 0, t1 - t0, (np.sin(safe * t1) - np.sin(safe * t0)) / safe)
+
+    even = 0.5 * (cosines(m - 1) - cosines(m + 1))
+    odd = 0.25 * (cosines(m - 2) - cosines(m + 2))  # times cos t
+    return np.asarray(2 / math.pi * (constant * even + slope * odd))
+
+
+EFFECT = Effect(
+    name="added_mass",
+    title="Added mass",
+    family="aerodynamics",
+    port="inertia",
+    size=(Parameter("k", "1", 0.0, 3.0, 1.0, "air carried along, as a part of that of plates in unbounded flow"),),
+    power="conservative",
+    source="Theodorsen (1935), NACA Report 496, noncirculatory part; Lamb, Hydrodynamics (1932), section 71; "
+    "Ellington, Philosophical Transactions B 305, 17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
+    signature="swings later and wider, as if the wing were heavier across its plane; grows with density and the "
+    "acceleration, little with the airspeed",
+    confused_with=("lumped_mass", "rotational_circulation"),
+    wing=_wing,
+)

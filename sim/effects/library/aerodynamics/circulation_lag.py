@@ -1,0 +1,87 @@
+"""Circulation follows the wing late, while the vortices that it sheds are near (Wagner)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
+from wingfit.sim.kernels.lanes.vector import load, store
+from wingfit.sim.kernels.laws import AFTER, strip_port
+
+Array = npt.NDArray[np.float64]
+
+DEFICIT = (0.165, 0.335)  # R. T. Jones (1940): phi(s) = 1 - sum_i DEFICIT_i exp(-RATE_i s), s in half chords
+RATE = (0.0455, 0.3)  # per half chord travelled
+_FELT = 0.1  # a late circulation, as speed times lift coefficient, moves the wing by this part of its own way
+
+
+def wagner(s: npt.ArrayLike) -> Array:
+    """Part of its final circulation that a wing has ``s`` half chords after a step (Jones 1940)."""
+    travelled = np.asarray(s, float)
+    return np.asarray(1.0 - sum(a * np.exp(-b * travelled) for a, b in zip(DEFICIT, RATE, strict=True)))
+
+
+def _lag(scene: VehicleScene, values: Values) -> None:
+    """Gamma - share sum_i DEFICIT_i (Gamma - x_i), with x_i' = RATE_i rate (2 V / c) (Gamma - x_i)."""
+    flow = scene.flow
+    per_metre = values["rate"][:, None] * (2.0 / scene.stations.chord)
+    share, quasi_steady = values["share"][:, None, None], flow.circulation
+    delayed = quasi_steady * (1.0 - share * sum(DEFICIT))
+    for a, b in zip(DEFICIT, RATE, strict=True):
+        late = scene.follow(b * per_metre, quasi_steady)
+        late *= share * a
+        delayed += late
+    flow.circulation = delayed
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.after("circulation", lambda: _lag(scene, values))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """The same on strips: of twice Gamma over the chord, which is speed times lift coefficient."""
+    if moment != AFTER:
+        return
+    port = strip_port(frame)
+    for s in range(port.places):
+        share = load(port.parameters, 0, s)
+        half_chords = load(port.parameters, 1, s) * load(port.flow, s, SPEED) * (2.0 / port.geometry[s, MEAN_CHORD])
+        quasi_steady = load(port.loads, s, CIRCULATION)
+        lacking = quasi_steady * 0.0
+        for k in range(2):
+            fading = half_chords * RATE[k]
+            deficit = quasi_steady - load(port.state, k, s)
+            store(port.rate, k, s, fading * deficit)
+            store(port.decay, k, s, fading)
+            lacking += deficit * DEFICIT[k]
+        store(port.loads, s, CIRCULATION, quasi_steady - share * lacking)
+        at_once = 1.0 - share * (DEFICIT[0] + DEFICIT[1])
+        store(port.loads, s, LIFT_SLOPE, load(port.loads, s, LIFT_SLOPE) * at_once)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    seconds = _FELT / scene.angular_rate
+    scene.add_strip_law(_law, [values["share"], values["rate"]], states=[seconds, seconds])
+
+
+EFFECT = Effect(
+    name="circulation_lag",
+    title="Lagged circulation (Wagner, Theodorsen)",
+    family="aerodynamics",
+    port="air",
+    size=(Parameter("share", "1", 0.0, 1.5, 1.0, "part of Wagner's deficit; 1 is a thin wing in plane flow"),),
+    shape=(Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states in parts of that in plane flow", scale="log"),),
+    memory="two late circulations at each station or strip",
+    source="Wagner (1925) in the approximation of R. T. Jones (1940, NACA Report 681), which for a steady swing is "
+    "Theodorsen's function (1935, NACA Report 496); states: Leishman (2006, ch. 8)",
+    signature="lift that comes late and swings less, by the same half chords at any frequency",
+    confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

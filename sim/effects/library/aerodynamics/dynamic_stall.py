@@ -1,0 +1,92 @@
+"""The flow leaves the upper surface late and comes back late: dynamic stall with one state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
+from wingfit.sim.kernels.lanes.lanewise import exponential
+from wingfit.sim.kernels.lanes.vector import greatest, least, load, magnitude, root, store
+from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.vehicle.states import separate, steady_attachment
+
+_RECENT = 0.25  # chords travelled over which the rate of alpha of a strip is taken
+_STEEPEST = 50.0  # exponent beyond which exp only overflows
+_METRES = 0.01  # m, felt of either state
+
+
+def _stall(scene: VehicleScene, values: Values) -> None:
+    """tau_1 X' + X = X_0(alpha - tau_2 alpha'), times tau in chords travelled.
+
+    Circulation of the angle of attack times 1 - share (1 - ((1 + sqrt X) / 2)^2).
+    """
+    flow, chord = scene.flow, scene.stations.chord
+    stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
+    steady = np.empty_like(flow.speed)
+    steady_attachment(flow.along, flow.normal, flow.speed, chord, stall, scene.step, steady)
+    attached = scene.follow(1.0 / (values["delay"][:, None] * chord), steady)
+    separate(attached, values["share"], scene.wings.rotation, flow.circulation)
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.after("circulation", lambda: _stall(scene, values))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """The same on strips, whose states are the separated part 1 - X, and alpha as it was a moment ago.
+
+    That follows alpha with _RECENT chords travelled; by what it is behind, alpha' is known without accelerations.
+    """
+    if moment != AFTER:
+        return
+    port = strip_port(frame)
+    for s in range(port.places):
+        chords = load(port.flow, s, SPEED) * (1.0 / port.geometry[s, MEAN_CHORD])
+        alpha, separated = magnitude(load(port.flow, s, ALPHA)), load(port.state, 0, s)
+        gained = alpha - load(port.state, 1, s)
+        seen = alpha - load(port.parameters, 4, s) * (1.0 / _RECENT) * gained
+        steep = (load(port.parameters, 1, s) - seen) / load(port.parameters, 2, s)
+        steady = 1.0 / (exponential(least(greatest(steep, -_STEEPEST), _STEEPEST)) + 1.0)
+        relaxing, following = chords / load(port.parameters, 3, s), chords * (1.0 / _RECENT)
+        store(port.rate, 0, s, relaxing * (steady - separated))
+        store(port.decay, 0, s, relaxing)
+        store(port.rate, 1, s, following * gained)
+        store(port.decay, 1, s, following)
+        half = root(least(greatest(1.0 - separated, 0.0), 1.0)) * 0.5 + 0.5
+        left = 1.0 - load(port.parameters, 0, s) * (1.0 - half * half)
+        store(port.loads, s, CIRCULATION, load(port.loads, s, CIRCULATION) * left)
+        store(port.loads, s, LIFT_SLOPE, load(port.loads, s, LIFT_SLOPE) * left)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    names = ("share", "angle", "width", "delay", "advance")
+    scene.add_strip_law(_law, [values[name] for name in names], states=[_METRES, _METRES])
+
+
+EFFECT = Effect(
+    name="dynamic_stall",
+    title="Dynamic stall",
+    family="aerodynamics",
+    port="air",
+    size=(Parameter("share", "1", 0.0, 1.0, 0.5, "part of Kirchhoff's loss of lift; 1 is all of it"),),
+    shape=(
+        Parameter("angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow leaves half of the chord"),
+        Parameter("width", "rad", 0.02, 0.3, 0.08, "over which it leaves", scale="log"),
+        Parameter("delay", "1", 0.2, 10.0, 0.5, "tau_1: of relaxation, in chords travelled", scale="log"),
+        Parameter("advance", "1", 0.0, 10.0, 2.0, "tau_2: of the onset with the rate of alpha, in chords travelled"),
+    ),
+    memory="the attached part of the chord at each station or strip; of a strip also its last angle of attack",
+    source=(
+        "Goman and Khrabrov (1994, Journal of Aircraft 31, 1109): tau_1 X' + X = X_0(alpha - tau_2 alpha'), with "
+        "X_0 = 1 / (1 + exp((alpha - angle) / width)); Kirchhoff's law of lift, ((1 + sqrt X) / 2)^2"
+    ),
+    signature="lift breaks down late in each stroke at high angles of attack and comes back with a loop",
+    confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

@@ -1,0 +1,123 @@
+"""What the air carries moves the air: wings meet a stream of their own making."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import AREA, CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
+from wingfit.sim.kernels.lanes.vector import load, load1, root, store
+from wingfit.sim.kernels.laws import BEFORE, strip_port
+from wingfit.sim.vehicle.states import settled_inflow
+
+Array = npt.NDArray[np.float64]
+
+_STILL = 1e-12  # m^2/s^2, keeps the mass flow differentiable in still air
+_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+
+
+def apparent_mass(density: Array, area: Array) -> Array:
+    """Of the air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 (Tuckerman 1925; Pitt and Peters 1981)."""
+    return np.asarray(8.0 / 3.0 * density * (area / np.pi) ** 1.5)
+
+
+def swept_area(span: float, stroke: Array, wings: int) -> Array:
+    """Area (m^2) that ``wings`` of ``span`` (m) sweep with a ``stroke`` (rad) from end to end (Ellington 1984, III)."""
+    return np.asarray(span**2 * np.minimum(0.5 * wings * stroke, np.pi))
+
+
+def _induce(scene: VehicleScene, values: Values) -> None:
+    """Along body x, through the disc that the wings sweep.
+
+    m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, solved for its periodic state. T is linear in v
+    between none and hover's, then about the solution once more. It is computed at every second instant, the inflow
+    being smooth. The rate of change of the inflow is left out of the added mass.
+    """
+    vehicle, air, wings = scene.setting.vehicle, scene.setting.condition, scene.wings.every(2)
+    flap, share = scene.angles.flap[:, 0], values["share"][:, None]
+    area = swept_area(vehicle.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
+    flux, mass = 2.0 * scene.density * area, apparent_mass(scene.density, area) * values["inertia"]
+    stream = scene.airspeed[:, None] * [np.cos(air.angle_of_attack), np.sin(air.angle_of_attack)]
+    met = scene.forward(scene.inflow)[:, ::2]
+
+    def thrust(inflow: Array | float) -> Array:
+        return share * wings.forces(wings.flow(met + inflow))[:, 0]
+
+    still = thrust(0.0)
+    mean = still.mean(axis=1)
+    # never zero: the slope is a difference over it
+    hover = np.copysign(np.sqrt(np.abs(mean) / np.maximum(flux, 1e-12)) + 1e-3, mean)[:, None]
+    slope, inflow = (still - thrust(hover)) / hover, np.empty_like(still)
+    settled_inflow(still, slope, flux, mass, stream, 2.0 * scene.step, inflow)
+    settled_inflow(thrust(inflow) + slope * inflow, slope, flux, mass, stream, 2.0 * scene.step, inflow)
+    between = 0.5 * (inflow + np.roll(inflow, -1, axis=1))
+    scene.inflow = scene.inflow + np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.after("inflow", lambda: _induce(scene, values))
+
+
+def slices(edges: Array) -> Array:
+    """Areas (m^2) that strips between ``edges`` [S + 1] (m from the middle) cut from a disc that ends with the last.
+
+    With an elliptic load their inflow is even, that of a lifting line (Prandtl 1918; Glauert 1926).
+    """
+    x, tip = edges / edges[-1], edges[-1]
+    return np.asarray(tip**2 * np.diff(x * np.sqrt(1.0 - x**2) + np.arcsin(x)))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """v' = -share L / m - 2 rho A |U + v| v / m in the world, L being the lift of a strip; A and m are its slice's."""
+    port = strip_port(frame)
+    for s in range(port.places):
+        if moment == BEFORE:
+            for i in range(3):
+                store(port.induced, s, i, load(port.induced, s, i) + load(port.state, i, s))
+            continue
+        pushed = load(port.parameters, 0, s) * load(port.loads, s, CIRCULATION)
+        along, across = pushed * load(port.flow, s, STREAM_C), pushed * load(port.flow, s, STREAM_N)
+        square = pushed * 0.0 + _STILL
+        for i in range(3):
+            through = load1(port.wind, i) + load(port.state, i, s)
+            square += through * through
+        through = root(square)
+        washed = load(port.parameters, 1, s)
+        for i in range(3):
+            v = load(port.state, i, s)
+            lift = along * load(port.flow, s, NORMAL_X + i) - across * load(port.flow, s, CHORD_X + i)
+            store(port.rate, i, s, -lift - washed * through * v)
+            more = v * (load1(port.wind, i) + v) / through
+            store(port.decay, i, s, washed * (through + more))
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    """Through the disc about the span of the wing and its mirror image, by which a wing in a stream is carried."""
+    structure = scene.structure
+    edges = structure.planform.strips(structure.division)
+    depth = apparent_mass(np.array(1.0), np.array(np.pi * edges[-1] ** 2)) / (np.pi * edges[-1] ** 2)
+    mass = depth * values["inertia"]  # over density and area
+    area = structure.wiring.geometry[:, AREA] / slices(edges)
+    parameters = [0.5 * area[:, None] * values["share"] / mass, 2.0 / mass]
+    scene.add_strip_law(_law, parameters, states=[_FELT / scene.angular_rate] * 3)
+
+
+EFFECT = Effect(
+    name="induced_inflow",
+    title="Induced inflow",
+    family="aerodynamics",
+    port="air",
+    size=(Parameter("share", "1", 0.0, 2.0, 0.5, "force that drives the inflow, in parts of the thrust or lift"),),
+    shape=(Parameter("inertia", "1", 0.1, 3.0, 1.0, "mass of that air, in parts of a disc's", scale="log"),),
+    memory="the mean inflow through the swept disc; of a wing in a tunnel the inflow of each strip",
+    source="momentum theory (Glauert 1926) with the apparent mass of Pitt and Peters (1981, Vertica 5, 21)",
+    signature="less force on average, most so in hover and least in fast flight",
+    confused_with=("tip_loss", "airspeed_error", "residual_air"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

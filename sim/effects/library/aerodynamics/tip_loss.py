@@ -1,0 +1,77 @@
+"""Circulation falls to zero at the tip, where the trailing vortex leaves the wing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE
+from wingfit.sim.kernels.lanes.vector import load, store
+from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+_PIECES = 64  # of a strip
+
+
+def prandtl(to_tip: Array, spacing: Array) -> Array:
+    """Prandtl's factor F on circulation, ``to_tip`` (m) from the tip, of vortex sheets ``spacing`` (m) apart.
+
+    F = 2 / pi arccos exp(-pi to_tip / spacing) (Prandtl in Betz 1919; Glauert 1935, division L, chapter VII); the
+    arguments broadcast.
+    """
+    return np.asarray(2.0 / np.pi * np.arccos(np.exp(-np.pi * to_tip / spacing)))
+
+
+def strip_factors(structure: Structure, spacing: Array) -> Array:
+    """Mean of Prandtl's factor over the area of every strip, [S, W]."""
+    edges = structure.planform.strips(structure.division)
+    u = (np.arange(_PIECES) + 0.5) / _PIECES  # pieces grow with u^2: near the tip the factor is as a root
+    y = edges[1:, None] - np.diff(edges)[:, None] * u**2
+    weight = structure.planform.chord(y) * u
+    factor = prandtl((edges[-1] - y)[..., None], spacing)
+    return np.asarray(np.einsum("sp,spw->sw", weight / weight.sum(axis=1, keepdims=True), factor))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """Circulation times the strip's factor."""
+    if moment != AFTER:
+        return
+    port = strip_port(frame)
+    for s in range(port.places):
+        factor = load(port.parameters, 0, s)
+        store(port.loads, s, CIRCULATION, factor * load(port.loads, s, CIRCULATION))
+        store(port.loads, s, LIFT_SLOPE, factor * load(port.loads, s, LIFT_SLOPE))
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    scene.add_strip_law(_law, [strip_factors(scene.structure, values["spacing"])])
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    span = scene.setting.vehicle.span
+    scene.load(lambda r: prandtl(span - r, values["spacing"][:, None]))
+
+
+EFFECT = Effect(
+    name="tip_loss",
+    title="Tip loss",
+    family="aerodynamics",
+    port="air",
+    size=(
+        Parameter(
+            "spacing", "m", 0.0, 2.0, 0.5, "distance between the vortex sheets of successive strokes", of="chord"
+        ),
+    ),
+    source="Prandtl in Betz (1919); Glauert (1935, Aerodynamic Theory, division L, chapter VII): F = 2/pi arccos e^-f",
+    signature="less load and less bending of the outer wing only, at the phases of large lift",
+    confused_with=("induced_inflow", "residual_air", "dynamic_stall"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

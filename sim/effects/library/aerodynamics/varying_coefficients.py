@@ -1,0 +1,60 @@
+"""Coefficients of circulation that are not the same in slow flight as in fast flight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+
+REFERENCE_FREQUENCY = 12.0  # Hz: there, and at the pitch below, coefficients are what their genes say
+REFERENCE_PITCH = 1.0  # rad; both lie amid the eight tests of the source
+LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
+
+
+def factor(frequency: float, pitch: float, by_frequency: Array, by_pitch: Array) -> Array:
+    """What a coefficient [B] is multiplied by at a flap frequency (Hz) and body pitch (rad); never below zero."""
+    more = by_frequency * (frequency / REFERENCE_FREQUENCY - 1.0) + by_pitch * (pitch - REFERENCE_PITCH)
+    return np.asarray(np.maximum(1.0 + more, 0.0))
+
+
+def _vary(scene: VehicleScene, values: Values) -> None:
+    """Terms and stations read their coefficients from the scene; of the effect of a fling it is ``scene.fling``."""
+    here = scene.setting.condition
+
+    def changed(kind: str) -> Array:
+        slopes = (values[f"{kind}_by_{variable}"] for variable in ("frequency", "pitch"))
+        return factor(here.flap_frequency, here.angle_of_attack, *slopes)
+
+    lift, fling = changed("lift"), changed("fling")
+    factors = dict.fromkeys(LIFT, lift) | {"C_F": fling}
+    scene.genes = {name: value * factors[name] if name in factors else value for name, value in scene.genes.items()}
+    scene.fling = scene.fling * fling
+
+
+EFFECT = Effect(
+    name="varying_coefficients",
+    title="Coefficients that vary with flight",
+    family="aerodynamics",
+    port="air",
+    size=(
+        Parameter("lift_by_frequency", "1", -8.0, 8.0, -3.5, "change of C_l or K_l with f / 12 Hz, in parts"),
+        Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "change of C_l or K_l with body pitch, in parts"),
+        Parameter(
+            "fling_by_frequency", "1", -8.0, 8.0, 1.6, "change of the fling coefficient with f / 12 Hz, in parts"
+        ),
+        Parameter(
+            "fling_by_pitch", "1/rad", -2.0, 2.0, 0.3, "change of the fling coefficient with body pitch, in parts"
+        ),
+    ),
+    source=(
+        "Armanini et al. (2016), Eq. 23: C_l and C_F are affine in flap frequency and body pitch, C_r is their mean; "
+        "sizes from Table 8"
+    ),
+    signature=(
+        "each recording by itself fits, all together do not: lift falls short in some conditions and is too large in "
+        "others, with the same shape over the beat"
+    ),
+    confused_with=("circulation_lag", "tip_loss", "mass_offset"),
+    vehicle=_vary,
+)

@@ -1,0 +1,59 @@
+"""Friction of the air along the wing's skin, in a laminar boundary layer."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.arrays import MEAN_CHORD, PUSH_C, STREAM_C
+from wingfit.sim.kernels.lanes.vector import load, magnitude, root, store
+from wingfit.sim.kernels.laws import AFTER, strip_port
+
+Array = npt.NDArray[np.float64]
+
+_BLASIUS = 2 * 1.328  # both faces
+
+
+def viscosity(temperature: float) -> float:
+    """Dynamic viscosity of air, Pa s, at ``temperature`` in K, whatever its pressure (Sutherland 1893)."""
+    return 1.458e-6 * temperature * math.sqrt(temperature) / (temperature + 110.4)
+
+
+def _law(frame: Any, moment: int) -> None:
+    """C_D = 2.656 / sqrt(Re) along the chord, Re of the chord and of the stream along it."""
+    if moment != AFTER:
+        return
+    port = strip_port(frame)
+    for s in range(port.places):
+        along = load(port.flow, s, STREAM_C)
+        more = load(port.parameters, 0, s) * root(magnitude(along)) * along
+        store(port.loads, s, PUSH_C, load(port.loads, s, PUSH_C) + more)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    chord = scene.structure.wiring.geometry[:, MEAN_CHORD, None]
+    mu = viscosity(scene.condition.temperature)
+    with np.errstate(divide="ignore"):
+        kinematic = np.where(scene.density > 0.0, mu / scene.density, 0.0)
+    scene.add_strip_law(_law, [_BLASIUS * values["part"] * np.sqrt(kinematic / chord)])
+
+
+EFFECT = Effect(
+    name="viscous_drag",
+    title="Viscous drag",
+    family="aerodynamics",
+    port="air",
+    size=(
+        Parameter("part", "1", 0.0, 20.0, 2.0, "friction in parts of that on a smooth flat plate; rough skin has more"),
+    ),
+    power="dissipative",
+    source="Blasius (1908): 1.328 / sqrt(Re) a face of a plate; Schlichting (1979), Boundary-Layer Theory, ch. VII",
+    signature="a pull backwards as the 3/2 power of the speed; in thin air it falls as the root of the density only",
+    confused_with=("plate_drag", "residual_air"),
+    wing=_wing,
+)

@@ -1,0 +1,97 @@
+"""After each reversal the wing meets the air that its last stroke set in motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import CHORD_X, MEAN_CHORD, NORMAL_X, SPEED, STREAM_C, STREAM_N
+from wingfit.sim.kernels.lanes.vector import greatest, least, load, load1, store
+from wingfit.sim.kernels.laws import BEFORE, strip_port
+from wingfit.sim.vehicle.states import overtake
+
+_RECENT = 1 / 64  # of a beat, over which the velocity of a strip is taken
+_STILL = 1e-12  # m^2/s^2, keeps the part of the wake that goes along defined where the wing rests
+_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+
+
+def _meet_wake(scene: VehicleScene, values: Values) -> None:
+    """The air moves at share (w - k u), w' = V / (chords c) (u - w): u = r zeta' is the wing's velocity, w the wake's.
+
+    k, in 0 to 1, is the part of u for which the wing takes its wake along: the air about it that it has just set in
+    motion is no gust to it. So there is none at a start from rest (Birch and Dickinson 2003) nor in steady motion,
+    share (w - u) while the wing slows down and share w after the reversal. The memory fades with the chords travelled,
+    so that it lasts through the reversal, where the wing hardly moves.
+    """
+    flow, places = scene.flow, scene.stations
+    own = np.broadcast_to(scene.angles.flap[:, 1, :, None] * places.r, flow.speed.shape).copy()
+    air = scene.follow(1.0 / (values["chords"][:, None] * places.chord), own)
+    overtake(own, values["share"], air)
+    scene.wings.gust(flow, air)
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.after("wake", lambda: _meet_wake(scene, values))
+
+
+def _law(frame: Any, moment: int) -> None:
+    """The same on strips, across the flapping axis: of y and z the wake's velocity, then the wing's of a moment ago.
+
+    The velocity of the wing is not known before the flow; what follows it within _RECENT takes its place. k = w.u / u^2
+    as far as that lies in 0 to 1: w less its part along u, no longer than u.
+    """
+    port = strip_port(frame)
+    for s in range(port.places):
+        if moment == BEFORE:
+            share = load(port.parameters, 0, s)
+            wy, wz = load(port.state, 0, s), load(port.state, 1, s)
+            uy, uz = load(port.state, 2, s), load(port.state, 3, s)
+            k = least(greatest((wy * uy + wz * uz) / (uy * uy + uz * uz + _STILL), 0.0), 1.0)
+            store(port.induced, s, 1, load(port.induced, s, 1) + share * (wy - k * uy))
+            store(port.induced, s, 2, load(port.induced, s, 2) + share * (wz - k * uz))
+            continue
+        along, across = -load(port.flow, s, STREAM_C), -load(port.flow, s, STREAM_N)
+        for i in range(3):
+            air = load1(port.wind, i) + load(port.induced, s, i)
+            along += air * load(port.flow, s, CHORD_X + i)
+            across += air * load(port.flow, s, NORMAL_X + i)
+        fading = load(port.flow, s, SPEED) * (1.0 / port.geometry[s, MEAN_CHORD]) / load(port.parameters, 1, s)
+        recent = load(port.parameters, 2, s)
+        for i in range(2):
+            u = along * load(port.flow, s, CHORD_X + 1 + i) + across * load(port.flow, s, NORMAL_X + 1 + i)
+            store(port.rate, i, s, fading * (u - load(port.state, i, s)))
+            store(port.decay, i, s, fading)
+            store(port.rate, 2 + i, s, recent * (u - load(port.state, 2 + i, s)))
+            store(port.decay, 2 + i, s, recent)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    recent = np.full(LANES, scene.condition.flap_frequency / _RECENT)
+    seconds = [_FELT / scene.angular_rate] * 4
+    scene.add_strip_law(_law, [values["share"], values["chords"], recent], states=seconds)
+
+
+EFFECT = Effect(
+    name="wake_capture",
+    title="Wake capture",
+    family="aerodynamics",
+    port="air",
+    size=(Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the wake, in parts of the wing's own before"),),
+    shape=(Parameter("chords", "1", 0.5, 10.0, 2.0, "chords travelled in which the wake fades", scale="log"),),
+    memory="the velocity of the wake at each station or strip; of a strip also its own last velocity",
+    source=(
+        "what remains of force after quasi-steady terms at reversal: Dickinson, Lehmann and Sane (1999), Sane and "
+        "Dickinson (2002); of a wake that moves as the wing did, and of the first stroke from rest, which has none: "
+        "Birch and Dickinson (2003). One fading state is the least model of it"
+    ),
+    signature="soon after each reversal a push the way the last stroke went, which enlarges what circulation there is; "
+    "it dies out within the stroke, and a first stroke from rest has none",
+    confused_with=("circulation_lag", "clap_and_peel", "drive_harmonics"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

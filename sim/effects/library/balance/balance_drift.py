@@ -1,0 +1,43 @@
+"""The zero of the balance wanders: steadily, and as it warms up."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.weights import along_axes
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    since = (sampling.times - sampling.times[:, :1])[:, :, None]
+    warm = -np.expm1(-since / values["time"][:, None, None])
+    steady = along_axes(sampling, values["x"], values["z"])
+    thermal = along_axes(sampling, values["thermal_x"], values["thermal_z"])
+    sampling.added += since * steady[:, None] + warm * thermal[:, None]
+
+
+EFFECT = Effect(
+    name="balance_drift",
+    title="Balance drift",
+    family="measurement",
+    port="observation",
+    size=(
+        *(
+            Parameter(axis, "1/s", -0.1, 0.1, 0.005, f"steady drift along {axis}, in weights of the vehicle per second")
+            for axis in "xz"
+        ),
+        *(
+            Parameter(f"thermal_{axis}", "1", -0.3, 0.3, 0.01, f"force along {axis} after warming up, in weights")
+            for axis in "xz"
+        ),
+    ),
+    shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "in which the balance has warmed up to 63 %", scale="log"),),
+    memory="temperature of the gauges, from the first sample of a recording",
+    source="F' = F + a t + b (1 - exp(-t / tau)): zero drift and first-order warming of strain gauges (Doebelin 2004, "
+    "Measurement Systems)",
+    signature="the mean over a beat moves from the first to the last beat; the shape of the beat stays",
+    confused_with=("balance_offset",),
+    observe=_observe,
+    observed=("forces",),
+)

@@ -1,0 +1,29 @@
+"""The axes of the balance are turned against those of the body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    c, s = (turn(values["angle"])[:, None] for turn in (np.cos, np.sin))
+    x, z = sampling.beat[..., 0], sampling.beat[..., 1]
+    sampling.beat = np.stack([c * x - s * z, s * x + c * z], axis=-1)
+
+
+EFFECT = Effect(
+    name="balance_tilt",
+    title="Balance axes tilted",
+    family="measurement",
+    port="observation",
+    size=(Parameter("angle", "rad", -0.2, 0.2, 0.02, "by which the balance's x is nose up from the body's x"),),
+    source="rotation of axes, X' = X cos a - Z sin a, Z' = X sin a + Z cos a (Barlow, Rae and Pope 1999, Low-Speed "
+    "Wind Tunnel Testing, chapter 7: alignment of a balance)",
+    signature="each force axis shows a part of the other, alike at every phase and in every condition",
+    confused_with=("balance_offset", "scale_error"),
+    observe=_observe,
+    observed=("forces",),
+)

@@ -1,0 +1,1 @@
+"""Faults of cameras and of the tracking of markers."""

@@ -1,0 +1,36 @@
+"""One camera of the pair sees each instant later than the other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.stereo import PLACES, Stereo
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    cameras = Stereo.of(values)
+    inner = cameras.image(sampling.beat, -1.0)
+    sampling.filtered(np.exp(2j * np.pi * sampling.harmonics * values["delay"][:, None]))
+    outer = cameras.image(sampling.beat, 1.0)
+    sampling.beat = cameras.points(inner, outer)
+
+
+EFFECT = Effect(
+    name="camera_desync",
+    title="Cameras out of step",
+    family="measurement",
+    port="observation",
+    size=(
+        Parameter("delay", "s", -0.01, 0.01, 0.002, "by which the outer camera's image is later than the inner one's"),
+    ),
+    shape=PLACES,
+    source="triangulation of two images of different instants (Hartley and Zisserman 2004, chapter 12; Bradley et al. "
+    "2009, Synchronization and rolling shutter compensation for consumer video camera arrays)",
+    signature="markers are too near or too far by their speed along the cameras' base line: an error of depth that "
+    "changes sign with the stroke and grows with the flapping frequency",
+    confused_with=("rolling_shutter", "clock_offset", "tracker_lag"),
+    observe=_observe,
+    observed=("tracks",),
+)

@@ -1,0 +1,30 @@
+"""The origin of the cameras' frame is not where it is said to be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    shift = np.stack([values["x"], values["y"], values["z"]], axis=1)
+    sampling.beat = sampling.beat + shift[:, None, None, :]
+
+
+EFFECT = Effect(
+    name="camera_shift",
+    title="Camera frame shifted",
+    family="measurement",
+    port="observation",
+    size=tuple(
+        Parameter(axis, "m", -0.2, 0.2, 0.02, f"shift of all recorded positions along {axis}", of="chord")
+        for axis in "xyz"
+    ),
+    source="rigid motion of the measured frame, p' = p + s (Luhmann et al. 2014, Close-Range Photogrammetry)",
+    signature="every marker is off by the same vector at every phase, in every condition",
+    confused_with=("hinge_offset", "camera_rotation"),
+    observe=_observe,
+    observed=("tracks",),
+)

@@ -1,0 +1,49 @@
+"""Lens distortion that the calibration of the cameras has not removed."""
+
+from __future__ import annotations
+
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.stereo import PLACES, Stereo
+
+
+def distorted(u: Array, v: Array, values: Values) -> tuple[Array, Array]:
+    """Image coordinates ``u``, ``v`` [B, n, M] in focal lengths from the principal point, distorted (Brown 1971).
+
+    u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2), and alike with p1 and p2 exchanged for v'.
+    """
+    k1, k2, p1, p2 = (values[name][:, None, None] for name in ("k1", "k2", "p1", "p2"))
+    r2 = u * u + v * v
+    radial = 1.0 + k1 * r2 + k2 * r2 * r2
+    return (
+        u * radial + 2.0 * p1 * u * v + p2 * (r2 + 2.0 * u * u),
+        v * radial + 2.0 * p2 * u * v + p1 * (r2 + 2.0 * v * v),
+    )
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    cameras = Stereo.of(values)
+    inner, outer = (distorted(*cameras.image(sampling.beat, side), values) for side in (-1.0, 1.0))
+    sampling.beat = cameras.points(inner, outer)
+
+
+EFFECT = Effect(
+    name="lens_distortion",
+    title="Lens distortion not removed",
+    family="measurement",
+    port="observation",
+    size=(
+        Parameter("k1", "1", -0.25, 0.25, -0.1, "radial distortion, third order; negative for a barrel"),
+        Parameter("k2", "1", -0.1, 0.1, 0.01, "radial distortion, fifth order"),
+        Parameter("p1", "1", -0.02, 0.02, 0.001, "tangential distortion, of a lens off its axis along the span"),
+        Parameter("p2", "1", -0.02, 0.02, 0.001, "tangential distortion, of a lens off its axis along the chord"),
+    ),
+    shape=PLACES,
+    source="Brown-Conrady model: Brown 1971, Close-range camera calibration; Conrady 1919. An action camera has k1 of "
+    "about -0.25; a calibration at another field of view leaves part of it",
+    signature="displacements grow with the third power of the distance from the middle of the image, at rest as in "
+    "motion, alike in every condition",
+    confused_with=("scale_error", "camera_rotation"),
+    observe=_observe,
+    observed=("tracks",),
+)

@@ -1,0 +1,60 @@
+"""The rows of an image are read one after the other, while the wing moves on; a pair of cameras reads its own each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values, measure
+from wingfit.sim.effects.ports.observation import Sampling, between
+from wingfit.sim.effects.ports.stereo import PLACES, Stereo
+
+_ROUNDS = 2  # in each an error falls by the marker's speed over that of the read-out, a few hundredths
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    wing, frequency = sampling.wing, sampling.recording.condition.flap_frequency
+    span, chord = measure(wing, "span"), measure(wing, "chord")
+    aft, out = (frequency * values[name][:, None, None] for name in ("along_chord", "along_span"))
+    cameras, images = _cameras(sampling, span), []
+    for side in (-1.0, 1.0):
+        points = sampling.beat
+        for _ in range(_ROUNDS + 1):  # a marker is seen when the row is read in which it then is
+            rows = cameras.image(points, side)[1] * cameras.distance
+            later = aft * points[..., 0] / chord + out * rows / span  # beats after the middle row
+            points = np.stack([between(one)(beats) for one, beats in zip(sampling.beat, later, strict=True)])
+        images.append(cameras.image(points, side))
+    sampling.beat = cameras.points(images[0], images[1])
+
+
+def _cameras(sampling: Sampling, span: float) -> Stereo:
+    """A pair as it usually stands, aimed at the middle of the span.
+
+    Where it stands hardly matters: a read-out of T along the span makes a height wrong by T z v / b, v the speed along
+    the span, whatever the distance between the cameras.
+    """
+    typical = {place.name: place.typical for place in PLACES}
+    wing, distance = sampling.wing, typical["distance"] * span
+    middle = 0.5 * (wing.stations[0].y + wing.stations[-1].y)
+    places = (0.0, middle, distance, typical["base"] * distance)
+    return Stereo(*(np.full((len(sampling.beat), 1, 1), place) for place in places))
+
+
+EFFECT = Effect(
+    name="rolling_shutter",
+    title="Rolling shutter",
+    family="measurement",
+    port="observation",
+    size=(
+        Parameter(
+            "along_span", "s", -0.02, 0.02, 0.004, "time in which the read-out passes the span, from root to tip"
+        ),
+        Parameter("along_chord", "s", -0.01, 0.01, 0.0005, "time in which it passes the mean chord, aft"),
+    ),
+    source="Meingast, Geyer and Sastry 2005, Geometric models of rolling-shutter cameras; Liang, Chang and Chen 2008. "
+    "An action camera reads an image in 10 to 20 ms; a flash in the dark avoids the fault",
+    signature="a lag that grows steadily along the span (or chord), in proportion to the flapping frequency; along the "
+    "span heights are wrong as well, where two cameras read a marker in different rows",
+    confused_with=("camera_desync", "phase_lag_error", "tracker_lag"),
+    observe=_observe,
+    observed=("tracks",),
+)

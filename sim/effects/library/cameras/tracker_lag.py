@@ -1,0 +1,82 @@
+"""The tracker smooths: a Kalman filter of constant acceleration, from frame to frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling
+
+_BISECTIONS = 60
+
+
+def steady_gains(smoothing: Array) -> tuple[Array, Array, Array]:
+    """Steady gains alpha, beta, gamma [B] of the filter, for ``smoothing`` = sigma_w / (sigma_v T^2) > 0 [B].
+
+    Position, velocity per frame and acceleration per frame^2 are corrected by alpha, beta and gamma times the
+    innovation. With s^2 = 1 - alpha: beta = 2 (1 - s)^2, gamma = beta^2 / (2 alpha), and the tracking index
+    sigma_v T^2 / sigma_w = gamma / s (Kalata 1984; Bar-Shalom, Li and Kirubarajan 2001, section 6.5).
+    """
+    low, high = np.zeros(len(smoothing)), np.ones(len(smoothing))
+    for _ in range(_BISECTIONS):  # of 2 (1 - s)^3 x smoothing = s (1 + s), whose one root lies in (0, 1)
+        s = 0.5 * (low + high)
+        above = s * (1.0 + s) > 2.0 * (1.0 - s) ** 3 * smoothing
+        low, high = np.where(above, low, s), np.where(above, s, high)
+    s = 0.5 * (low + high)
+    return 1.0 - s * s, 2.0 * (1.0 - s) ** 2, 2.0 * (1.0 - s) ** 3 / (1.0 + s)
+
+
+def response(smoothing: Array, angle: Array) -> npt.NDArray[np.complex128]:
+    """Gain and phase [B, K] of the filtered position for a sine that turns by ``angle`` [K] rad from frame to frame.
+
+    N / (N + (1 - alpha) d^3) with d = 1 - q, q = exp(-i angle) and N = alpha d^2 + beta q d + gamma q (q + d / 2).
+    """
+    alpha, beta, gamma = (gain[:, None] for gain in steady_gains(smoothing))
+    q = np.exp(-1j * angle)
+    d = 1.0 - q
+    passed = alpha * d * d + beta * q * d + gamma * q * (q + 0.5 * d)
+    return np.asarray(passed / (passed + (1.0 - alpha) * d * d * d))
+
+
+def apparent_step(times: Array, frequency: float) -> float:
+    """Angle (rad) by which a beat of ``frequency`` (Hz) seems to turn from frame to frame, in [-pi, pi].
+
+    Strobed frames are each from another beat: flashed slightly faster than it flaps, a wing seems to go backwards.
+    """
+    beats = float(np.median(np.diff(times))) * frequency
+    return 2.0 * np.pi * (beats - round(beats))
+
+
+def _observe(sampling: Sampling, values: Values) -> None:
+    recording = sampling.recording
+    step = apparent_step(recording.times, recording.condition.flap_frequency)
+    order = np.arange(sampling.beat.shape[1] // 2 + 1)
+    sampling.filtered(response(values["smoothing"], order * step))
+
+
+EFFECT = Effect(
+    name="tracker_lag",
+    title="Tracker lag and smoothing",
+    family="measurement",
+    port="observation",
+    size=(
+        Parameter(
+            "smoothing",
+            "1",
+            0.0,
+            100.0,
+            2.0,
+            "what the tracker takes the measurement's deviation for, over that of "
+            "the change of acceleration from frame to frame times the square of their distance in time",
+        ),
+    ),
+    memory="position, velocity and acceleration of each marker, from frame to frame",
+    source="Kalman filter of constant acceleration in steady state: Kalata 1984, The tracking index; Bar-Shalom, Li "
+    "and Kirubarajan 2001, Estimation with Applications to Tracking and Navigation, sections 6.3.3 and 6.5",
+    signature="higher harmonics are smaller and late in the order of the frames, which under a strobe faster than the "
+    "wing is early in the beat; the same at every flapping frequency with as many frames to the apparent beat",
+    confused_with=("camera_desync", "rolling_shutter"),
+    observe=_observe,
+    observed=("tracks",),
+)

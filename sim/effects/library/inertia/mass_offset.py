@@ -1,0 +1,55 @@
+"""The mass of the wing lies behind the axis about which it pitches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.wing import WingScene
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    """The mass of every body lies further aft; its inertia about its own centre is what it was (Steiner's theorem)."""
+    aft = np.zeros((3, len(values["distance"])))
+    aft[0] = values["distance"]
+    across = np.zeros((3, *aft.shape))
+    across[1, 1] = across[2, 2] = aft[0] ** 2
+    for n, body in enumerate(scene.structure.bodies):
+        scene.add_mass(n, np.zeros_like(aft[0]), body.mass * aft, body.mass * across)
+
+
+def _shift_mass(scene: VehicleScene, values: Values) -> None:
+    """-m times the acceleration of -e (sin theta, cos theta): mass is taken as at the axis without it (Eqs. 12-14)."""
+    places, (cosine, sine) = scene.stations, scene.wings.turns
+    rate, acceleration = scene.angles.pitch[:, 1], scene.angles.pitch[:, 2]
+    mass = places.mass * places.weight * scene.setting.vehicle.wing_mass
+    once, twice = mass * places.twist, mass * places.twist**2
+    moment = (values["distance"] * scene.mass_factor)[:, None]
+    x = acceleration * scene.over_span(cosine, once) - rate**2 * scene.over_span(sine, twice)
+    z = -acceleration * scene.over_span(sine, once) - rate**2 * scene.over_span(cosine, twice)
+    scene.push(moment * x, moment * z)
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.after("mass", lambda: _shift_mass(scene, values))
+
+
+EFFECT = Effect(
+    name="mass_offset",
+    title="Centre of mass off its place along the chord",
+    family="inertia",
+    port="inertia",
+    size=(
+        Parameter(
+            "distance", "m", -0.3, 0.3, 0.05, "how far the mass lies nearer the trailing edge than told", of="chord"
+        ),
+    ),
+    power="conservative",
+    source="Newton's second law for a point fixed to a turning wing, F = -m d^2/dt^2 (offset vector); Goldstein, "
+    "Classical Mechanics (1980), ch. 5: inertia about another point than the centre of mass",
+    signature="torsion and force in phase with the accelerations of flap and pitch, in vacuum as in air",
+    confused_with=("lumped_mass", "drive_harmonics", "stroke_bias"),
+    wing=_wing,
+    vehicle=_vehicle,
+)

@@ -1,0 +1,1 @@
+"""Faults of a recording of any kind: its clock and its scale."""

@@ -1,0 +1,1 @@
+"""Effects of the structure: stiffness, play and damping of the wing."""

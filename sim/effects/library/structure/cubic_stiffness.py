@@ -1,0 +1,89 @@
+"""Bending that grows stiffer, or softer, the further the wing bends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
+from wingfit.sim.kernels.laws import connector_port
+
+Array = npt.NDArray[np.float64]
+
+_SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangent loses 5/4 of it at most
+
+
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+    """A potential of s, the sine of the bending, from the axial part of Q.
+
+    V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2: cubic for c = 0, else
+    levelling off at k s / (2 c). A relative turning r makes s' = (tr Q - Q) r / 2; the moment is -(tr Q - Q^T) V_s / 2.
+    """
+    port = connector_port(frame)
+    stored = load0(port.stored)
+    for c in range(port.places):
+        q0, q1, q2, q3 = load(port.Q, c, 0), load(port.Q, c, 1), load(port.Q, c, 2), load(port.Q, c, 3)
+        q4, q5, q6 = load(port.Q, c, 4), load(port.Q, c, 5), load(port.Q, c, 6)
+        # of k and b about x and y one is zero: a connector bends about one axis and twists about the other
+        kx, ky = load(port.parameters, 0, c), load(port.parameters, 1, c)
+        bx, by = load(port.parameters, 2, c), load(port.parameters, 3, c)
+        sx, sy, trace = 0.5 * (load(port.Q, c, 7) - q5), 0.5 * (q2 - q6), q0 + q4 + load(port.Q, c, 8)
+        level, u = load(port.parameters, 4, c), bx * sx * sx + by * sy * sy
+        part = 1.0 / (1.0 + level * u)
+        more = (u + 0.5 * level * u * u) * part * part
+        gx, gy = 0.5 * kx * sx * more, 0.5 * ky * sy * more
+        store(port.wrench, c, 0, load(port.wrench, c, 0) - (trace - q0) * gx + q3 * gy)
+        store(port.wrench, c, 1, load(port.wrench, c, 1) + q1 * gx - (trace - q4) * gy)
+        store(port.wrench, c, 2, load(port.wrench, c, 2) + q2 * gx + q5 * gy)
+        steeper = more + 2.0 * u * part * part * part
+        store(port.stiffness, c, 0, load(port.stiffness, c, 0) + kx * steeper)
+        store(port.stiffness, c, 1, load(port.stiffness, c, 1) + ky * steeper)
+        stored += (kx + ky) * u * u * part / (4.0 * (bx + by))
+    store0(port.stored, stored)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    joints = Joints.of(scene.structure)
+    slope, level = shape(values["change"])
+    k = joints.bending(scene.lanes.stiffness * slope)
+    about_x, per = joints.along_span, 1.0 / joints.part**2
+    b = [np.repeat(np.where(mask, per, 0.0)[:, None], len(slope), axis=1) for mask in (about_x, ~about_x)]
+    scene.add_connector_law(_law, [*k, *b, level])
+
+
+def shape(change: Array) -> tuple[Array, Array]:
+    """E and c of the part E (u + c u^2 / 2) / (1 + c u)^2 by which the stiffness changes: ``change`` at u = 1.
+
+    Hardening is cubic. Softening is so at first and levels off at -E / (2 c) = _SOFTEST.
+    """
+    level = 1.0 / np.sqrt(1.0 - np.maximum(-change, 0.0) / _SOFTEST) - 1.0
+    return np.where(change > 0.0, change, -2.0 * _SOFTEST * level), level
+
+
+EFFECT = Effect(
+    name="cubic_stiffness",
+    title="Cubic bending stiffness",
+    family="structure",
+    port="connector",
+    size=(
+        Parameter(
+            "change",
+            "1",
+            -0.5,
+            10.0,
+            3.0,
+            "part by which bending stiffness, as moment over angle, grows where bent by one radian over the span",
+        ),
+    ),
+    power="conservative",
+    source="Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918); Nayfeh and Mook, Nonlinear "
+    "Oscillations (1979), ch. 4; softening made to level off",
+    signature="swings less than in proportion where it is driven harder (more if softening), with third harmonics",
+    confused_with=("damage", "hysteresis", "rod_slip"),
+    wing=_wing,
+)

@@ -1,0 +1,57 @@
+"""A place along the span where the wing has lost stiffness, or where a repair has added some."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+
+Array = npt.NDArray[np.float64]
+
+_POINTS = 64  # along a connector: exact to 1e-3 for the narrowest damage on four strips
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    factor = remaining(Joints.of(scene.structure), values)[:, None]
+    scene.lanes.stiffness[:] *= factor
+    scene.lanes.damping[:] *= factor  # the foam that is gone damps no more
+
+
+def remaining(joints: Joints, values: Values) -> Array:
+    """Part [C, W] of their stiffness that connectors keep; at s of the span 1 - d exp(-((s - s_0) / w)^2 / 2) is left.
+
+    Along the span pieces bear the same load one after the other, so their compliances add; along the chord they stand
+    side by side.
+    """
+    s = joints.reach[:, :1] + (np.arange(_POINTS) + 0.5) / _POINTS * np.diff(joints.reach)
+    away = (s[:, :, None] - values["station"]) / values["width"]
+    left = 1.0 - values["loss"] * np.exp(-0.5 * away**2)
+    in_a_row, abreast = 1.0 / (1.0 / left).mean(axis=1), left.mean(axis=1)
+    return np.asarray(np.where(joints.along_span[:, None], in_a_row, abreast))
+
+
+EFFECT = Effect(
+    name="damage",
+    title="Local loss of stiffness",
+    family="structure",
+    port="connector",
+    size=(
+        Parameter(
+            "loss", "1", -2.0, 0.9, 0.5, "part of the stiffness, and of its damping, lost there; gained if negative"
+        ),
+    ),
+    shape=(
+        Parameter("station", "1", 0.0, 1.0, 0.5, "where it is, part of the span from root to tip", place=True),
+        Parameter(
+            "width", "1", 0.02, 0.3, 0.06, "how far it reaches (standard deviation), part of the span", place=True
+        ),
+    ),
+    source="Christides and Barr, International Journal of Mechanical Sciences 26, 639 (1984): a crack as a local loss "
+    "of bending stiffness; Sinha, Friswell and Edwards, Journal of Sound and Vibration 251, 13 (2002)",
+    signature="a kink: all that lies outboard of one station swings further than told, all inboard as told",
+    confused_with=("cubic_stiffness", "lumped_mass"),
+    wing=_wing,
+)

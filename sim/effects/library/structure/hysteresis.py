@@ -1,0 +1,72 @@
+"""Bending and torsion that yield and stay behind: hysteresis after Bouc and Wen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.lanes.lanewise import power
+from wingfit.sim.kernels.lanes.vector import load, load0, load1, magnitude, store, store0, store1
+from wingfit.sim.kernels.laws import connector_port
+
+_METRES = [0.1, 0.1]  # one radian is felt a chord away
+_TINY = 1e-30
+
+
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+    """z' = r - beta |r| |z|^(n - 1) z - gamma r |z|^n, z in parts of its largest and beta + gamma = 1; moment -k z."""
+    port = connector_port(frame)
+    stored, lost = load0(port.stored), load0(port.lost)
+    for k in range(2):  # about x and y
+        state, rate, decay, drive, pull = port.state[k], port.rate[k], port.decay[k], port.drive[k], port.pull[k]
+        for c in range(port.places):
+            spring, per = load(port.parameters, k, c), load(port.parameters, 2, c)
+            gamma, n = load(port.parameters, 3, c), load(port.parameters, 4, c)
+            z, r = load1(state, c), load(port.twist, c, k)
+            q, speed = z * per, magnitude(r)
+            size = magnitude(q)
+            less = power(size, n - 1.0)
+            beta = 1.0 - gamma
+            yielding = less * (beta * speed * q + gamma * r * size)
+            store1(rate, c, r - yielding)
+            store1(decay, c, n * per * less * (beta * speed + gamma * r * q / (size + _TINY)))
+            store1(drive, c, 1.0 - less * (beta * q * r / (speed + _TINY) + gamma * size))
+            store1(pull, c, spring)
+            store(port.wrench, c, k, load(port.wrench, c, k) - spring * z)
+            stored += 0.5 * spring * z * z
+            lost += spring * z * yielding
+    store0(port.stored, stored)
+    store0(port.lost, lost)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    joints = Joints.of(scene.structure)
+    spring = joints.out_of_plane(scene.lanes.stiffness * values["k"])
+    per = 1.0 / (joints.part[:, None] * values["yield_angle"])
+    parameters = [*spring, per, values["gamma"], values["n"]]
+    scene.add_connector_law(_law, parameters, axes=[0, 1], states=_METRES)
+
+
+EFFECT = Effect(
+    name="hysteresis",
+    title="Hysteresis",
+    family="structure",
+    port="connector",
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that yields, as a part of the stiffness that stays"),),
+    shape=(
+        Parameter(
+            "yield_angle", "rad", 0.01, 1.0, 0.1, "bending or twist of the whole span at which it yields", scale="log"
+        ),
+        Parameter("gamma", "1", -0.5, 0.5, 0.5, "shape of the loop: gamma of beta + gamma = 1"),
+        Parameter("n", "1", 1.0, 4.0, 1.0, "how sharply it yields"),
+    ),
+    power="dissipative",
+    memory="what has not yielded yet of bending and of twist, per connector",
+    source="Bouc (1967), Forced vibration of mechanical systems with hysteresis; Wen, Journal of the Engineering "
+    "Mechanics Division ASCE 102, 249 (1976); Ikhouane and Rodellar, Systems with Hysteresis (2007)",
+    signature="loses the same energy in every beat however fast it flaps; stiffer in small swings than in large",
+    confused_with=("viscoelastic", "rod_slip"),
+    wing=_wing,
+)

@@ -1,0 +1,103 @@
+"""Carbon rods that slide in their straw: they hold by dry friction, and not at all within their play."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, store, store0, store1
+from wingfit.sim.kernels.laws import connector_port
+
+Array = npt.NDArray[np.float64]
+
+_METRES = [0.1]  # a bending of one radian is felt a chord away
+_FOAM_ROW = 4  # of stiffness: stretching along the span, which the rods leave to the foam
+_TINY = 1e-30
+_SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic motion depends on how it began
+
+
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+    """Moment -k h, h being what of w is beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
+
+    Dahl's friction: pulled on, rods slip the more the nearer h is to its largest; pulled back, they hold as springs.
+    The last term lets them shake back to where they lie unloaded, at a rate of e per sweep of w_max = play + h_max.
+    """
+    port = connector_port(frame)
+    state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
+    stored, lost = load0(port.stored), load0(port.lost)
+    for c in range(port.places):
+        if port.parameters[4, c, 0] == 0.0:  # no rods here, whoever it is
+            store1(rate, c, 0.0)
+            store1(decay, c, 0.0)
+            store1(drive, c, 0.0)
+            store1(pull, c, 0.0)
+            continue
+        spring, play, per = load(port.parameters, 0, c), load(port.parameters, 1, c), load(port.parameters, 2, c)
+        shake = load(port.parameters, 3, c)
+        w, r = load1(state, c), load(port.twist, c, 0)
+        held = greatest(w - play, 0.0) + least(w + play, 0.0)
+        size, speed = magnitude(held), magnitude(r)
+        side, ahead = held / (size + _TINY), r / (speed + _TINY)
+        slip = 0.5 * per * (r * size + speed * held) + shake * speed * w
+        store1(rate, c, r - slip)
+        store1(decay, c, 0.5 * per * (r * side + speed * side * side) + shake * speed)
+        store1(drive, c, 1.0 - 0.5 * per * (size + ahead * held) - shake * ahead * w)
+        store1(pull, c, spring * side * side)
+        store(port.wrench, c, 0, load(port.wrench, c, 0) - spring * held)
+        stored += 0.5 * spring * held * held
+        lost += spring * held * slip
+    store0(port.stored, stored)
+    store0(port.lost, lost)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    joints = Joints.of(scene.structure)
+    part = joints.part[:, None]
+    play, most = part * values["clearance"], part * values["friction"]
+    slipping = joints.within & np.array([c.rods.any() for c in scene.structure.connectors])
+    spring, mask = values["stick"] * of_rods(scene), slipping[:, None].astype(float)
+    scene.add_connector_law(_law, [spring, play, 1.0 / most, _SHAKE / (play + most), mask], axes=[0], states=_METRES)
+
+
+def of_rods(scene: WingScene) -> Array:
+    """What rods add [C, W] to the bending stiffness of their connectors, N m/rad.
+
+    All of it but the foam's, whose modulus is told by stretching along the span. In its plane the wing is too stiff for
+    rods to slip.
+    """
+    connectors, stiffness = scene.structure.connectors, scene.lanes.stiffness
+    found = np.zeros_like(stiffness[:, 0])
+    for k, c in enumerate(connectors):
+        if c.rods.any():
+            modulus = stiffness[k, _FOAM_ROW] / c.foam[_FOAM_ROW] if c.foam[_FOAM_ROW] else 0.0
+            found[k] = stiffness[k, 0] - modulus * c.foam[0]
+    return found
+
+
+EFFECT = Effect(
+    name="rod_slip",
+    title="Rods that slip in their straw",
+    family="structure",
+    port="connector",
+    size=(
+        Parameter("friction", "rad", 0.0, 0.5, 0.05, "bending of the whole span that friction holds before rods slip"),
+    ),
+    shape=(
+        Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bending of the whole span, to either side, within their play"),
+        Parameter(
+            "stick", "1", 0.02, 1.0, 0.3, "stiffness of rods that hold, as a part of what rods add anyway", scale="log"
+        ),
+    ),
+    power="dissipative",
+    memory="bending carried by friction, of each connector with rods",
+    source="Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158 (1968): friction; Visintin, Differential "
+    "Models of Hysteresis (1994): play",
+    signature="stiffer in small swings than in large; the bending lags behind the load where the stroke turns round",
+    confused_with=("hysteresis", "cubic_stiffness"),
+    wing=_wing,
+)

@@ -1,0 +1,57 @@
+"""Foam that relaxes: a standard linear solid, whose second spring stands behind a dashpot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.joints import Joints
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels.lanes.vector import load, load0, load1, store, store0, store1
+from wingfit.sim.kernels.laws import connector_port
+
+_METRES = [0.1, 0.1]  # a strain of one radian is felt a chord away
+
+
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+    """A Maxwell element about x and y, beside the spring and the damper: z' = r - z / tau, wrench -k z."""
+    port = connector_port(frame)
+    stored, lost = load0(port.stored), load0(port.lost)
+    for k in range(2):
+        state, rate, decay, drive, pull = port.state[k], port.rate[k], port.decay[k], port.drive[k], port.pull[k]
+        for c in range(port.places):
+            spring, fading = load(port.parameters, k, c), load(port.parameters, 2, c)
+            z = load1(state, c)
+            fades, force = z * fading, spring * z
+            store1(rate, c, load(port.twist, c, k) - fades)
+            store1(decay, c, fading)
+            store1(drive, c, 1.0)
+            store1(pull, c, spring)
+            store(port.wrench, c, k, load(port.wrench, c, k) - force)
+            stored += 0.5 * force * z
+            lost += force * fades
+    store0(port.stored, stored)
+    store0(port.lost, lost)
+
+
+def _wing(scene: WingScene, values: Values) -> None:
+    """Bending and torsion only: in its plane and across its sections the wing hardly strains."""
+    spring = Joints.of(scene.structure).out_of_plane(scene.lanes.stiffness * values["k"])
+    scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
+
+
+EFFECT = Effect(
+    name="viscoelastic",
+    title="Viscoelastic relaxation",
+    family="structure",
+    port="connector",
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that relaxes, as a part of the stiffness that stays"),),
+    shape=(Parameter("tau", "s", 0.002, 0.5, 0.05, "relaxation time", scale="log"),),
+    power="dissipative",
+    memory="strain of the second spring in bending and in torsion, per connector",
+    source="Zener, Elasticity and Anelasticity of Metals (1948): standard linear solid; Ferry, Viscoelastic Properties "
+    "of Polymers (1980), ch. 1",
+    signature="bends less and later when flapped faster: stiffness and loss depend on the frequency, not on the air",
+    confused_with=("hysteresis",),
+    wing=_wing,
+)

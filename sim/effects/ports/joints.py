@@ -1,0 +1,58 @@
+"""Where the connectors of a wing lie and what they join, for effects of the structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.wing.structure import SPANWISE_MODULUS, Structure
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Of C connectors.
+
+    Attributes:
+        along_span: [C]: joins neighbours along the span (or the root with its drive), bends about the chord and twists
+            about the span; else neighbours along the chord, the other way round.
+        part: [C]: length of wing that it stands for, as a part of the span: an angle over this is a curvature in
+            radians over the span, which means the same in every division.
+        within: [C]: joins two bodies of the wing; the others join the root to a driving rod. There bending is left to
+            the plain spring, which the play of ``backlash`` is in series with: a law beside it would bridge the play.
+        reach: [C, 2]: from and to which part of the span, from root to tip, that wing lies.
+    """
+
+    along_span: npt.NDArray[np.bool_]
+    part: Array
+    within: npt.NDArray[np.bool_]
+    reach: Array
+
+    @classmethod
+    def of(cls, structure: Structure) -> Joints:
+        """Those of a wing."""
+        edges = structure.planform.strips(structure.division)
+        root, span = edges[0], edges[-1] - edges[0]
+        along = np.array([c.modulus == SPANWISE_MODULUS for c in structure.connectors])
+        part, reach = np.zeros(len(along)), np.zeros((len(along), 2))
+        for k, c in enumerate(structure.connectors):
+            outer, panel = structure.bodies[c.second].centroid, structure.panels[c.second]
+            inner = structure.bodies[c.first].centroid if c.first >= 0 else np.array([outer[0], root, 0.0])
+            part[k] = (outer - inner)[1 if along[k] else 0] / span
+            ends = (inner[1], outer[1]) if along[k] else (panel.y0, panel.y1)
+            reach[k] = (np.array(ends) - root) / span
+        within = np.array([c.first >= 0 for c in structure.connectors])
+        return cls(along, part, within, reach)
+
+    def out_of_plane(self, stiffness: Array) -> tuple[Array, Array]:
+        """Of stiffness [C, 6, W] that about x and about y [C, W], without what the root bends about x."""
+        return np.where(self.within[:, None], stiffness[:, 0], 0.0), stiffness[:, 1]
+
+    def bending(self, stiffness: Array) -> tuple[Array, Array]:
+        """Of :meth:`out_of_plane`, each zero where that is torsion."""
+        about_x, about_y = self.out_of_plane(stiffness)
+        along = self.along_span[:, None]
+        return np.where(along, about_x, 0.0), np.where(along, 0.0, about_y)

@@ -1,0 +1,68 @@
+"""A pair of cameras above the wing, for faults that differ between the two images.
+
+Pinhole cameras at equal heights look down along -z; the line between them is parallel to the span. Where a point lies
+is found from the two images as photogrammetry does: its distance from their difference.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.effects.contract import Parameter, Values
+
+Array = npt.NDArray[np.float64]
+
+PLACES = (
+    Parameter("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),
+    Parameter("y", "m", 0.0, 1.0, 0.5, "y of that point", "span"),
+    Parameter("distance", "m", 2.0, 10.0, 2.5, "height of the cameras above z = 0", "span"),
+    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras, in parts of their height"),
+)
+"""Shape parameters of an effect that needs the cameras: a metre or two away, seen under some 20 degrees."""
+
+
+@dataclass(frozen=True)
+class Stereo:
+    """Two cameras of each of B individuals.
+
+    Attributes:
+        x, y: point of the plane z = 0 that both aim at, m [B, 1, 1].
+        distance: height of the cameras above that plane, m [B, 1, 1].
+        base: distance between them, m [B, 1, 1].
+    """
+
+    x: Array
+    y: Array
+    distance: Array
+    base: Array
+
+    @classmethod
+    def of(cls, values: Values) -> Stereo:
+        """The pair that the parameters PLACES [B] describe."""
+        x, y, distance, base = (values[p.name][:, None, None] for p in PLACES)
+        return cls(x, y, distance, base * distance)
+
+    def image(self, points: Array, side: float) -> tuple[Array, Array]:
+        """Images [B, n, M] of ``points`` [B, n, M, 3], in focal lengths, from the image of the point aimed at.
+
+        ``side`` is -1 for the camera nearer the root and 1 for the other.
+        """
+        depth = self.distance - points[..., 2]
+        camera = self.y + 0.5 * side * self.base
+        u = (points[..., 0] - self.x) / depth
+        v = (points[..., 1] - camera) / depth + 0.5 * side * self.base / self.distance
+        return u, v
+
+    def points(self, inner: tuple[Array, Array], outer: tuple[Array, Array]) -> Array:
+        """Points [B, n, M, 3] that have the images ``inner`` and ``outer``; where rays miss, half-way between them.
+
+        Distance = base / disparity (Hartley and Zisserman 2004, Multiple View Geometry; parallel cameras).
+        """
+        disparity = inner[1] - outer[1] + self.base / self.distance
+        depth = self.base / disparity
+        x = self.x + 0.5 * (inner[0] + outer[0]) * depth
+        y = self.y + 0.5 * (inner[1] + outer[1]) * depth
+        return np.stack([x, y, self.distance - depth], axis=-1)

@@ -1,0 +1,238 @@
+"""A vehicle about to be simulated: what effects may change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Condition, Vehicle, WingMotion
+from wingfit.sim.atmosphere import density
+from wingfit.sim.kernels import LANES
+from wingfit.sim.vehicle.elements import PROJECTION, Side
+from wingfit.sim.vehicle.flow import Flow, StationedWings
+from wingfit.sim.vehicle.motion import Angles, angles_of, flap_series
+from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
+from wingfit.sim.vehicle.states import followed
+from wingfit.sim.vehicle.stations import Stations, span_sums, stations
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+ROTATION_POINT = 0.75  # Eq. 4
+# What each stage of a scene changes may be read in those that come after it.
+Stage = Literal["mass", "inflow", "wake", "circulation"]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all individuals share: the vehicle in a condition, and how finely a beat is computed.
+
+    ``motion`` is that of the recording or, without one, of the vehicle; ``r`` [E] are the middles of the elements, m.
+    """
+
+    vehicle: Vehicle
+    terms: tuple[str, ...]
+    motion: WingMotion
+    condition: Condition
+    instants: int
+    peel_width: float
+    r: Array
+
+
+@dataclass
+class VehicleScene:
+    """B individuals of one vehicle in one condition. Effects change it in place.
+
+    What depends on nothing that effects change is set at once, in the order of the registry: the drive, stream, mass
+    and loading. What reads these or the flow waits for its stage (:meth:`after`).
+
+    Attributes:
+        setting: what all share.
+        genes: coefficients and parameters of the motion by name, [B]; zero for a term that is off.
+        flap: series [B, K + 1] of the flap angle in rad, Re sum_k flap_k exp(2 pi i k t*).
+        airspeed: [B], m/s.
+        density: [B] of the air, kg/m^3.
+        mass_factor: [B], what the mass of the wings is multiplied by.
+        inflow: [B, n], m/s: added to the stream along body x over the beat.
+        loading: [B, E + 8]: what circulation is multiplied by at the elements, then at the stations.
+        fling: [B]: coefficient of circulation 1/2 C c^2 (-theta_w') while the wings peel, beyond that of the terms.
+        added: [B, 2, n]: forces of all wings along body x and z besides those of the terms, N.
+    """
+
+    setting: Setting
+    genes: Mapping[str, Array]
+    flap: Complex
+    airspeed: Array
+    density: Array
+    mass_factor: Array
+    inflow: Array
+    loading: Array
+    fling: Array
+    added: Array
+    _waiting: dict[Stage, list[Callable[[], None]]] = field(default_factory=dict, repr=False)
+    _base: Array | None = field(default=None, repr=False)
+
+    @classmethod
+    def of(cls, setting: Setting, genes: Mapping[str, Array], count: int) -> VehicleScene:
+        """``count`` vehicles without effects; ``genes`` [count] as far as there are any."""
+        air, n = setting.condition, setting.instants
+        flap = flap_series(setting.motion.flap, genes, count, n)
+        if len(flap) < count:
+            flap = np.repeat(flap, count, axis=0)
+        return cls(
+            setting,
+            genes,
+            flap,
+            airspeed=np.full(count, air.airspeed),
+            density=np.full(count, density(air.pressure, air.temperature)),
+            mass_factor=np.ones(count),
+            inflow=np.zeros((count, n)),
+            loading=np.ones((count, len(setting.r) + LANES)),
+            fling=np.zeros(count),
+            added=np.zeros((count, 2, n)),
+        )
+
+    def __len__(self) -> int:
+        """Individuals."""
+        return len(self.flap)
+
+    @property
+    def step(self) -> float:
+        """Between instants, s."""
+        return 1.0 / (self.setting.condition.flap_frequency * self.setting.instants)
+
+    def after(self, stage: Stage, action: Callable[[], None]) -> None:
+        """Do ``action`` when ``stage`` comes, after all effects have set what they can at once."""
+        self._waiting.setdefault(stage, []).append(action)
+
+    def settle(self) -> None:
+        """Do what waits, stage by stage."""
+        for stage in get_args(Stage):
+            for action in self._waiting.pop(stage, []):
+                action()
+
+    # -- for effects of the drive ------------------------------------------------------------------------------
+
+    def add_harmonic(self, k: int, coefficient: npt.NDArray[np.complex128]) -> None:
+        """Add Re coefficient exp(2 pi i k t*), ``coefficient`` [B] in rad, to the flap angle."""
+        if self.flap.shape[1] <= k:
+            self.flap = np.pad(self.flap, ((0, 0), (0, k + 1 - self.flap.shape[1])))
+        self.flap[:, k] += coefficient
+
+    @cached_property
+    def angles(self) -> Angles:
+        """Motion of the wings, which stays as it is from then on."""
+        self.flap.setflags(write=False)
+        own = self.setting
+        return angles_of(
+            self.flap,
+            own.motion,
+            self.genes,
+            own.condition.flap_frequency,
+            own.instants,
+            own.vehicle.claps,
+            own.peel_width,
+        )
+
+    # -- for effects of the loading ----------------------------------------------------------------------------
+
+    @cached_property
+    def stations(self) -> Stations:
+        """Eight places along the wing."""
+        return stations(self.setting.vehicle, self.setting.motion)
+
+    def load(self, law: Callable[[Array], Array]) -> None:
+        """Multiply circulation by ``law``, which is given distances from the flapping axis [m] and returns [B, m]."""
+        self.loading *= law(np.concatenate([self.setting.r, self.stations.r]))
+
+    # -- for effects of the flow -------------------------------------------------------------------------------
+
+    @cached_property
+    def wings(self) -> StationedWings:
+        """The wings at eight stations; motion, stream and loading stay as they are from then on."""
+        own = self.setting.vehicle
+        for read in (self.airspeed, self.density, self.loading, self.fling):
+            read.setflags(write=False)
+        rows = self.rows(float(self.stations.twist[0]))
+        sides = tuple((rows.copy(), side) for side in self.each_side(rows))
+        lift, drag = self._coefficients("C_l", "K_l"), self._coefficients("C_D0", "C_Dpi2", "K_d")
+        loading = self.loading[:, -LANES:].copy()
+        turning, fling = self._turning()
+        return StationedWings(
+            self.stations, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)
+        )
+
+    @cached_property
+    def flow(self) -> Flow:
+        """The flow at the stations, for effects to change; the inflow stays as it is from then on."""
+        self.inflow.setflags(write=False)
+        flow = self.wings.flow(self.forward(self.inflow))
+        self._base = self.wings.forces(flow)
+        return flow
+
+    def follow(self, share: Array, target: Array) -> Array:
+        """Periodic solution x of x' = share speed (target - x); ``share`` [B, 8] in 1/m, ``target`` as in the flow."""
+        out = np.empty_like(target)
+        followed(self.flow.speed, share, target, self.step, out)
+        return out
+
+    def over_span(self, values: Array, weight: Array) -> Array:
+        """Sum [B, n] of ``values`` [B, n, 8] times ``weight`` [8]."""
+        out = np.empty(values.shape[:2])
+        span_sums(values, weight, out)
+        return out
+
+    def push(self, x: Array, z: Array) -> None:
+        """Add a force of every wing: ``x`` [B, n] along body x, ``z`` along its side's z before the dihedral, N."""
+        for rows, side in self.wings.sides:
+            self.added[:, 0] += self.wings.alike * x
+            self.added[:, 1] += self.wings.alike * side.sign * rows[:, PROJECTION] * z
+
+    # -- for the model -----------------------------------------------------------------------------------------
+
+    def rows(self, half_step: float) -> Array:
+        """Motion [B, 14, n] of elements of which the first has ``half_step`` of the twist at the pitch station."""
+        return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
+
+    def each_side(self, rows: Array) -> Iterator[Side]:
+        """The sides of the vehicle, ``rows`` [B, 14, n] being set for each in turn."""
+        below = self.airspeed * np.sin(self.setting.condition.angle_of_attack)
+        for upper in uppers(self.setting.vehicle):
+            yield set_side(rows, self.setting.vehicle, self._flap, below, upper)
+
+    def finish(self) -> Array:
+        """All forces besides those of the terms [B, 2, n], N: what effects added, and what they changed in the flow."""
+        if self._base is None:
+            return self.added
+        return np.asarray(self.added + (self.wings.forces(self.flow) - self._base))
+
+    def forward(self, inflow: Array) -> Array:
+        """Speed of the stream [B, n] along body x with an ``inflow`` [B, n], m/s."""
+        return np.asarray((self.airspeed * np.cos(self.setting.condition.angle_of_attack))[:, None] + inflow)
+
+    @cached_property
+    def _flap(self) -> tuple[Array, Array, Array]:
+        """Cosine and sine of the flap angle, and its rate, [B, n]."""
+        flap = self.angles.flap
+        return np.cos(flap[:, 0]), np.sin(flap[:, 0]), flap[:, 1]
+
+    def _turning(self) -> tuple[Array, Array]:
+        """[B, n] each, rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, and what fling adds to it.
+
+        The term puts C_F in the place of C_R while the wings peel (Eqs. 4, 7). Here that of C_R goes on, and C_F + C_R
+        is added: the two are the same until one of them is late or stalls, which fling between two wings does not.
+        """
+        on, rate = float("clap_and_peel" in self.setting.terms), self.angles.pitch[:, 1]
+        rotation, fling = self._coefficients("C_r", "C_F").T[:, :, None]
+        turn = rotation * (ROTATION_POINT - self.setting.vehicle.pitch_axis)
+        more = (fling + turn) * on + self.fling[:, None]
+        return np.asarray(turn * rate), np.asarray(-more * self.angles.peel * rate)
+
+    def _coefficients(self, *names: str) -> Array:
+        """Genes [B, names], zero for terms that are off."""
+        return np.stack([self.genes.get(name, np.zeros(len(self))) for name in names], axis=1)

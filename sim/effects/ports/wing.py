@@ -1,0 +1,166 @@
+"""A wing about to be simulated, eight individuals at a time: what effects may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Condition
+from wingfit.sim.atmosphere import density
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import Lanes, Laws, Setting
+from wingfit.sim.kernels.lanes.memory import aligned
+from wingfit.sim.kernels.laws import Law, address
+from wingfit.sim.solver.scene import setting
+from wingfit.sim.wing.drive import RodDrive
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+_SEA_LEVEL, _LEAST_FELT = 1.2, 1e-3  # kg/m^3; part
+_LEAST_STROKE = 0.01  # rad, of a drive that is held
+
+
+@dataclass
+class WingScene:
+    """What the kernels will be given for one group of lanes under a condition. Effects change it in place.
+
+    Every lane is an individual for which the effect is on. ``lanes``: stiffness, damping, coefficients, shares and
+    ``hinge`` (:class:`wingfit.sim.kernels.arrays.Lanes`); change their values. ``density`` [W], ``wind`` [3, W]: of the
+    stream. ``rods``: how they are driven; ``motor`` [MOTOR, W] or empty: how the drive gives way to its load
+    (:mod:`wingfit.sim.kernels.motor`). The methods add masses and laws.
+    """
+
+    structure: Structure
+    condition: Condition
+    lanes: Lanes
+    rods: RodDrive
+    density: Array
+    wind: Array
+    motor: Array = field(default_factory=lambda: np.zeros((0, LANES)))
+    _weights: dict[int, Array] = field(default_factory=dict)
+    _air: dict[tuple[int, int], Array] = field(default_factory=dict)
+    _strip: list[list[int]] = field(default_factory=list)
+    _connector: list[list[int]] = field(default_factory=list)
+    _parameters: list[Array] = field(default_factory=list)
+    _axes: list[int] = field(default_factory=list)
+    _sizes: list[Array] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, structure: Structure, condition: Condition, lanes: Lanes) -> WingScene:
+        """The scene of a wing without effects."""
+        here = setting(condition, 1)
+        rods = RodDrive.of(structure.wing.drive, condition.phase_lag, LANES)
+        return cls(structure, condition, lanes, rods, here.density, here.wind)
+
+    @property
+    def angular_rate(self) -> float:
+        """2 pi times the flap frequency, rad/s."""
+        return 2 * np.pi * self.condition.flap_frequency
+
+    def body_at(self, station: Array, fraction: Array) -> tuple[npt.NDArray[np.int64], Array]:
+        """Bodies [W] under places of the wing, and the places [W, 3] from their centres of mass, m.
+
+        ``station``: part of the span from root to tip, ``fraction``: part of the chord from the leading edge.
+        """
+        planform, division = self.structure.planform, self.structure.division
+        edges = planform.strips(division)
+        y = edges[0] + station * (edges[-1] - edges[0])
+        x = planform.leading_edge(y) + fraction * planform.chord(y)
+        strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(division.bodies) - 1)
+        count = np.array(division.bodies)[strip]
+        along = np.minimum((fraction * count).astype(np.int64), count - 1)
+        body = np.array([division.index(int(s), int(k)) for s, k in zip(strip, along, strict=True)], np.int64)
+        centre = np.array([self.structure.bodies[n].centre for n in body])
+        return body, np.stack([x, y, np.zeros_like(x)], axis=1) - centre
+
+    def add_mass(self, body: int, mass: Array, first_moment: Array, second_moment: Array) -> None:
+        """Add weight to a body: ``mass`` [W] (kg), its first moment [3, W] (kg m) and its inertia [3, 3, W] (kg m^2).
+
+        Both about the body's centre of mass, in its frame; a mass that moves within a body has no mass of its own.
+        """
+        block = np.zeros((6, 6, LANES))
+        skew = np.zeros((3, 3, LANES))
+        x, y, z = first_moment
+        skew[0, 1], skew[0, 2], skew[1, 2] = -z, y, -x
+        skew -= np.swapaxes(skew, 0, 1)
+        block[:3, :3], block[:3, 3:], block[3:, :3] = second_moment, skew, -skew
+        block[[3, 4, 5], [3, 4, 5]] = mass
+        self._weights[body] = self._weights.get(body, 0.0) + block
+
+    def add_point_mass(self, body: int, mass: Array, place: Array) -> None:
+        """Add a point of ``mass`` [W] (kg) at ``place`` [3, W] (m) from a body's centre of mass."""
+        square = np.eye(3)[:, :, None] * (place**2).sum(axis=0) - place[:, None] * place[None]
+        self.add_mass(body, mass, mass * place, mass * square)
+
+    def add_air(self, first: int, second: int, block: Array) -> None:
+        """Add [6, 6, W] to the matrix that joins the momenta of air moved by two bodies (moment, force; turn, move).
+
+        Bodies of one strip only; for two different ones give both orders, each the transpose of the other. Air is moved
+        along the normal: of the block only the rows and columns of turning about x and y and moving along z count.
+        """
+        self._air[first, second] = self._air.get((first, second), 0.0) + block
+
+    def add_strip_law(self, law: Law, parameters: list[Array], states: list[float] | None = None) -> None:
+        """Let a law of the air act on every strip.
+
+        ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: one number for each of its states, by
+        which a state is multiplied to be comparable with metres of motion (for the way to the periodic motion), in air
+        of sea level: in thinner air it is felt less.
+        """
+        felt = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_FELT)
+        sizes = [size * min(felt, 1.0) for size in states or []]
+        self._add(self._strip, len(self.structure.wiring.geometry), law, parameters, sizes)
+
+    def add_connector_law(
+        self, law: Law, parameters: list[Array], axes: list[int] | None = None, states: list[float] | None = None
+    ) -> None:
+        """Let a law act on every connector; ``parameters`` [W] or [C, W].
+
+        ``axes``: of each state, the axis along which it pulls: 0 to 2 rotation about x, y, z of the first body, 3 to 5
+        translation; ``states`` as for a strip.
+        """
+        self._add(self._connector, len(self.structure.connectors), law, parameters, states or [])
+        self._connector[-1][5] = len(self._axes)
+        self._axes += axes or []
+
+    def _add(self, laws: list[list[int]], places: int, law: Law, parameters: list[Array], states: list[float]) -> None:
+        at, first = sum(map(len, self._parameters)), sum(map(len, self._sizes))
+        laws.append([address(law), len(parameters), len(states), at, first, 0])
+        self._parameters += [np.broadcast_to(values, (places, LANES)) for values in parameters]
+        self._sizes += [np.full(places, size) for size in states]
+
+    @property
+    def _motor_sizes(self) -> Array:
+        """Of the motor's states, if it gives way: a lead is felt as motion at the speed of the outer wing."""
+        wing = self.structure.planform.wing
+        stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as told: the same for every individual
+        lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)
+        return np.array([lead, lead / self.angular_rate, 1e-3] if len(self.motor) else [])
+
+    def frozen(self) -> Lanes:
+        """What the kernels are given."""
+        solid = sorted(self._weights)
+        pairs = [(n, n, n) for n in solid]
+        pairs += [(i, j, self.structure.position[i, j]) for i, j in sorted(self._air)]
+        blocks = [self._weights[n] for n in solid] + [self._air[pair] for pair in sorted(self._air)]
+        laws = Laws(
+            strip=np.array(self._strip, np.int64).reshape(-1, 6),
+            connector=np.array(self._connector, np.int64).reshape(-1, 6),
+            axes=np.array(self._axes, np.int64),
+            parameters=aligned(np.concatenate([*self._parameters, np.zeros((0, LANES))])),
+            size=np.concatenate([*self._sizes, self._motor_sizes]),
+            motor=aligned(self.motor),
+        )
+        return self.lanes._replace(
+            pairs=np.array(pairs, np.int64).reshape(-1, 3),
+            masses=aligned(np.array(blocks).reshape(-1, 36, LANES)),
+            weighing=len(solid),
+            laws=laws,
+        )
+
+    def setting(self, steps: int) -> Setting:
+        """The condition as the kernels see it, with ``steps`` a beat."""
+        return setting(self.condition, steps)._replace(density=aligned(self.density), wind=aligned(self.wind))

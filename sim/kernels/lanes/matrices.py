@@ -1,0 +1,241 @@
+"""3 x 3 matrices and 3-vectors of lanes, as tuples in registers: the algebra of frames inside kernels.
+
+A matrix is nine lane vectors, row by row; e~ is the matrix of the cross product, e~ x = e x x.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels.jit import inlined
+from wingfit.sim.kernels.lanes.vector import Vector, load, store
+
+Array = npt.NDArray[np.float64]
+Three = tuple[Vector, Vector, Vector]
+Nine = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]
+
+
+@inlined
+def load_vector(array: Array, n: int, k: int) -> Three:
+    """Elements k, k + 1, k + 2 of row n."""
+    return load(array, n, k), load(array, n, k + 1), load(array, n, k + 2)
+
+
+@inlined
+def load_matrix(array: Array, n: int) -> Nine:
+    """The nine elements of row n."""
+    return (
+        load(array, n, 0), load(array, n, 1), load(array, n, 2),
+        load(array, n, 3), load(array, n, 4), load(array, n, 5),
+        load(array, n, 6), load(array, n, 7), load(array, n, 8),
+    )  # fmt: skip
+
+
+@inlined
+def load_inertia(inertia: Array, n: int) -> Nine:
+    """The inertia of body n, [N, 9], as a matrix of numbers that are the same in all lanes."""
+    return (
+        inertia[n, 0], inertia[n, 1], inertia[n, 2],
+        inertia[n, 3], inertia[n, 4], inertia[n, 5],
+        inertia[n, 6], inertia[n, 7], inertia[n, 8],
+    )  # fmt: skip
+
+
+@inlined
+def gyroscopic(inertia: Nine, omega: Three) -> Nine:
+    """Change of omega x (I omega) by omega: omega~ I - (I omega)~."""
+    return plus(skew_times(omega, inertia), scaled(-1.0, skew(times(inertia, omega))))
+
+
+@inlined
+def plus(A: Nine, B: Nine) -> Nine:
+    """A + B."""
+    return (
+        A[0] + B[0], A[1] + B[1], A[2] + B[2],
+        A[3] + B[3], A[4] + B[4], A[5] + B[5],
+        A[6] + B[6], A[7] + B[7], A[8] + B[8],
+    )  # fmt: skip
+
+
+@inlined
+def scaled(factor: float, A: Nine) -> Nine:
+    """Factor times A."""
+    return (
+        factor * A[0], factor * A[1], factor * A[2],
+        factor * A[3], factor * A[4], factor * A[5],
+        factor * A[6], factor * A[7], factor * A[8],
+    )  # fmt: skip
+
+
+@inlined
+def transposed(A: Nine) -> Nine:
+    """A^T."""
+    return A[0], A[3], A[6], A[1], A[4], A[7], A[2], A[5], A[8]
+
+
+@inlined
+def product(A: Nine, B: Nine) -> Nine:
+    """A B."""
+    return (
+        A[0] * B[0] + A[1] * B[3] + A[2] * B[6], A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
+        A[0] * B[2] + A[1] * B[5] + A[2] * B[8],
+        A[3] * B[0] + A[4] * B[3] + A[5] * B[6], A[3] * B[1] + A[4] * B[4] + A[5] * B[7],
+        A[3] * B[2] + A[4] * B[5] + A[5] * B[8],
+        A[6] * B[0] + A[7] * B[3] + A[8] * B[6], A[6] * B[1] + A[7] * B[4] + A[8] * B[7],
+        A[6] * B[2] + A[7] * B[5] + A[8] * B[8],
+    )  # fmt: skip
+
+
+@inlined
+def times(A: Nine, x: Three) -> Three:
+    """A x."""
+    return (
+        A[0] * x[0] + A[1] * x[1] + A[2] * x[2],
+        A[3] * x[0] + A[4] * x[1] + A[5] * x[2],
+        A[6] * x[0] + A[7] * x[1] + A[8] * x[2],
+    )
+
+
+@inlined
+def columns_scaled(A: Nine, s: Three) -> Nine:
+    """A diag(s)."""
+    return (
+        A[0] * s[0], A[1] * s[1], A[2] * s[2],
+        A[3] * s[0], A[4] * s[1], A[5] * s[2],
+        A[6] * s[0], A[7] * s[1], A[8] * s[2],
+    )  # fmt: skip
+
+
+@inlined
+def rows_scaled(s: Three, A: Nine) -> Nine:
+    """diag(s) A."""
+    return (
+        s[0] * A[0], s[0] * A[1], s[0] * A[2],
+        s[1] * A[3], s[1] * A[4], s[1] * A[5],
+        s[2] * A[6], s[2] * A[7], s[2] * A[8],
+    )  # fmt: skip
+
+
+@inlined
+def cross(a: Three, b: Three) -> Three:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def skew(e: Three) -> Nine:
+    """e~."""
+    zero = e[0] - e[0]
+    return zero, -e[2], e[1], e[2], zero, -e[0], -e[1], e[0], zero
+
+
+@inlined
+def skew_times(e: Three, A: Nine) -> Nine:
+    """e~ A."""
+    return (
+        e[1] * A[6] - e[2] * A[3], e[1] * A[7] - e[2] * A[4], e[1] * A[8] - e[2] * A[5],
+        e[2] * A[0] - e[0] * A[6], e[2] * A[1] - e[0] * A[7], e[2] * A[2] - e[0] * A[8],
+        e[0] * A[3] - e[1] * A[0], e[0] * A[4] - e[1] * A[1], e[0] * A[5] - e[1] * A[2],
+    )  # fmt: skip
+
+
+@inlined
+def times_skew(A: Nine, e: Three) -> Nine:
+    """A e~."""
+    return (
+        A[1] * e[2] - A[2] * e[1], A[2] * e[0] - A[0] * e[2], A[0] * e[1] - A[1] * e[0],
+        A[4] * e[2] - A[5] * e[1], A[5] * e[0] - A[3] * e[2], A[3] * e[1] - A[4] * e[0],
+        A[7] * e[2] - A[8] * e[1], A[8] * e[0] - A[6] * e[2], A[6] * e[1] - A[7] * e[0],
+    )  # fmt: skip
+
+
+@inlined
+def trace_minus(A: Nine) -> Nine:
+    """tr(A) I - A."""
+    return (
+        A[4] + A[8], -A[1], -A[2],
+        -A[3], A[0] + A[8], -A[5],
+        -A[6], -A[7], A[0] + A[4],
+    )  # fmt: skip
+
+
+@inlined
+def axial(A: Nine) -> Three:
+    """The vector a with a~ = A - A^T."""
+    return A[7] - A[5], A[2] - A[6], A[3] - A[1]
+
+
+@inlined
+def outer(a: Three, b: Three) -> Nine:
+    """a b^T."""
+    return (
+        a[0] * b[0], a[0] * b[1], a[0] * b[2],
+        a[1] * b[0], a[1] * b[1], a[1] * b[2],
+        a[2] * b[0], a[2] * b[1], a[2] * b[2],
+    )  # fmt: skip
+
+
+@inlined
+def with_diagonal(A: Nine, s: Three) -> Nine:
+    """A + diag(s)."""
+    return A[0] + s[0], A[1], A[2], A[3], A[4] + s[1], A[5], A[6], A[7], A[8] + s[2]
+
+
+@inlined
+def co_stiffness(k: Three) -> Three:
+    """Diagonal of G = tr(K) / 2 - K (thesis Eq. 5)."""
+    return 0.5 * (k[1] + k[2] - k[0]), 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])
+
+
+@inlined
+def co_stiffness_matrix(K: Nine) -> Nine:
+    """G = tr(K) / 2 - K of a full matrix."""
+    half = 0.5 * (K[0] + K[4] + K[8])
+    return half - K[0], -K[1], -K[2], -K[3], half - K[4], -K[5], -K[6], -K[7], half - K[8]
+
+
+@inlined
+def _add_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
+    """Add A to the quarter of block m that starts at element ``at``."""
+    store(blocks, m, at, load(blocks, m, at) + A[0])
+    store(blocks, m, at + 1, load(blocks, m, at + 1) + A[1])
+    store(blocks, m, at + 2, load(blocks, m, at + 2) + A[2])
+    store(blocks, m, at + 6, load(blocks, m, at + 6) + A[3])
+    store(blocks, m, at + 7, load(blocks, m, at + 7) + A[4])
+    store(blocks, m, at + 8, load(blocks, m, at + 8) + A[5])
+    store(blocks, m, at + 12, load(blocks, m, at + 12) + A[6])
+    store(blocks, m, at + 13, load(blocks, m, at + 13) + A[7])
+    store(blocks, m, at + 14, load(blocks, m, at + 14) + A[8])
+
+
+@inlined
+def add_to_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> None:
+    """Add the 6 x 6 matrix of four to block m of ``blocks`` [NB, 36, W]."""
+    _add_quarter(blocks, m, 0, A[0])
+    _add_quarter(blocks, m, 3, A[1])
+    _add_quarter(blocks, m, 18, A[2])
+    _add_quarter(blocks, m, 21, A[3])
+
+
+@inlined
+def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
+    """Put A into the quarter of block m that starts at element ``at``."""
+    store(blocks, m, at, A[0])
+    store(blocks, m, at + 1, A[1])
+    store(blocks, m, at + 2, A[2])
+    store(blocks, m, at + 6, A[3])
+    store(blocks, m, at + 7, A[4])
+    store(blocks, m, at + 8, A[5])
+    store(blocks, m, at + 12, A[6])
+    store(blocks, m, at + 13, A[7])
+    store(blocks, m, at + 14, A[8])
+
+
+@inlined
+def set_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> None:
+    """Put the 6 x 6 matrix of four into block m of ``blocks`` [NB, 36, W]."""
+    _set_quarter(blocks, m, 0, A[0])
+    _set_quarter(blocks, m, 3, A[1])
+    _set_quarter(blocks, m, 18, A[2])
+    _set_quarter(blocks, m, 21, A[3])

@@ -1,0 +1,40 @@
+"""Arrays whose groups of lanes each fill one cache line: a group that straddles two costs twice as much to load."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels import LANES
+
+Array = npt.NDArray[np.float64]
+
+_LINE = 8 * LANES
+
+
+def zeros(shape: tuple[int, ...]) -> Array:
+    """Zeros [..., LANES] that start on a cache line."""
+    count = math.prod(shape)
+    whole = np.zeros(count + LANES)
+    start = -whole.__array_interface__["data"][0] % _LINE // 8
+    return whole[start : start + count].reshape(shape)
+
+
+def aligned(array: npt.ArrayLike) -> Array:
+    """A copy of an array [..., LANES] that starts on a cache line."""
+    values = np.asarray(array, float)
+    out = zeros(values.shape)
+    out[...] = values
+    return out
+
+
+def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
+    """Zeros [..., LANES] of many shapes [...] by name, cut from one piece: a group of lanes asks for dozens."""
+    sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
+    whole, start, found = zeros((sum(sizes.values()),)), 0, {}
+    for name, size in sizes.items():
+        found[name] = whole[start : start + size].reshape(*shapes[name], LANES)
+        start += size
+    return found

@@ -1,0 +1,1 @@
+"""From initial conditions to a periodic beat of stated accuracy, for a batch of individuals."""

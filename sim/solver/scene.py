@@ -1,0 +1,105 @@
+"""What the kernels are given for a condition: the drive, the start, the setting, and room for what a beat leaves."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Condition
+from wingfit.sim.atmosphere import density
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import PORTS, STAGES, Setting, State, Trace
+from wingfit.sim.kernels.integrate import NODES, SLOPES
+from wingfit.sim.kernels.lanes.memory import aligned, zeros
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.wing.drive import RodDrive
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+
+def drive_table(
+    rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, giving_way: bool = False
+) -> Array:
+    """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
+
+    The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
+    A drive that gives way asks for two more derivatives, and for that share by itself, in the last row. The table is
+    shared by all that are driven alike, and only read.
+    """
+    ramp = numerics.ramp_beats
+    return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), giving_way)
+
+
+@lru_cache(maxsize=16)
+def _table(
+    series: bytes, shape: tuple[int, ...], frequency: float, ramp_beats: int, n: int, beat: int, giving_way: bool
+) -> Array:
+    rods = RodDrive(np.frombuffer(series, np.complex128).reshape(shape))
+    omega = 2 * np.pi * frequency
+    phases = (np.arange(n)[:, None] + NODES) / n
+    angle = rods.angles(2 * np.pi * phases) * omega ** np.arange(5.0)[:, None]
+    if beat < ramp_beats:
+        angle[..., :4, :] = _ramped(angle, (beat + phases)[..., None, None] / ramp_beats, frequency / ramp_beats)
+        angle[..., 4, :] = 0.0
+    slope = SLOPES[:, None, None] / (n * frequency)
+    share = slope * angle[:, :1, :, 3]  # of the change at the start of the step
+    table = zeros((n, STAGES, 2, 6 if giving_way else 3, LANES))
+    if giving_way:
+        table[..., :5, :], table[..., 5, :] = angle, share
+    else:
+        table[...] = angle[..., :3, :]
+        table[..., 2, :] += share
+    return table
+
+
+def _ramped(angle: Array, x: Array, rate: float) -> Array:
+    """Start from rest: 0 at x = 0, 1 from x = 1 on, without rate and acceleration at both; x grows at ``rate``."""
+    x = np.minimum(x, 1.0)
+    e = x**3 * (10 - 15 * x + 6 * x**2)
+    e1 = rate * 30 * x**2 * (1 - x) ** 2
+    e2 = rate**2 * 60 * x * (1 - x) * (1 - 2 * x)
+    e3 = rate**3 * 60 * (1 - 6 * x + 6 * x**2) * (x < 1)
+    a, a1, a2, a3, _ = np.moveaxis(angle, -2, 0)
+    return np.stack(
+        [e * a, e * a1 + e1 * a, e * a2 + 2 * e1 * a1 + e2 * a, e * a3 + 3 * (e1 * a2 + e2 * a1) + e3 * a], axis=-2
+    )
+
+
+def at_rest(structure: Structure, states: int = 0) -> State:
+    """All bodies at their rest pose, not moving, the rods horizontal, the effects' ``states`` zero."""
+    n = len(structure.bodies)
+    motion = (zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
+    state = State(*motion, zeros((states, LANES)))
+    state.R[:, [0, 4, 8]] = 1.0
+    hinge = structure.wing.hinge
+    state.p[:n] = np.array([body.centre for body in structure.bodies])[:, :, None]
+    state.p[n:] = np.array([0.0, hinge.y, hinge.z])[:, None]
+    return state
+
+
+def setting(condition: Condition, steps: int) -> Setting:
+    """The kernel's view of a condition, with ``steps`` a beat."""
+    a = condition.angle_of_attack
+    wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
+    step = 1.0 / (condition.flap_frequency * steps)
+    rho = np.full(LANES, density(condition.pressure, condition.temperature))
+    return Setting(aligned(rho), aligned(np.repeat(wind[:, None], LANES, axis=1)), condition.gravity, step)
+
+
+def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
+    """Empty arrays for one beat; those of the motion have no room unless asked for."""
+    kept, bodies = steps if with_motion else 0, len(structure.bodies) + 2
+    return Trace(
+        tracks=zeros((steps, len(structure.wing.markers), 3, LANES)),
+        rods=zeros((steps, 2, 6, LANES)),
+        air=zeros((steps, 3, LANES)),
+        power=zeros((steps, PORTS, LANES)),
+        energy=zeros((steps, 3, LANES)),
+        R=zeros((kept, bodies, 9, LANES)),
+        p=zeros((kept, bodies, 3, LANES)),
+        V=zeros((kept, bodies, 6, LANES)),
+        z=zeros((kept, states, LANES)),
+    )

@@ -1,0 +1,369 @@
+"""A flapping vehicle as a model: genomes in, forces of its wings out, sampled and filtered like a recording.
+
+Quasi-steady blade elements with clap-and-peel (Armanini et al. 2016). Forces are sums of terms, each a coefficient
+times what depends on the motion alone; so a search over coefficients computes the elements once.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import EstimateError, Gene, Recording, Vehicle
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.effects import registry
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.ports.observation import Sampling, apply, observed
+from wingfit.sim.effects.ports.vehicle import ROTATION_POINT, Setting, VehicleScene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.model import Observation, genome_batch
+from wingfit.sim.vehicle.elements import CURVE_ROWS, PEELED, ROWS, Constants, synthesise, synthesise_at, wing_forces
+from wingfit.sim.vehicle.motion import motion_genes
+from wingfit.sim.vehicle.rows import mirrored
+from wingfit.sim.vehicle.sampling import passed, passing, phases, series_of, turns
+from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+
+ADDED_MASS_POINT = 0.5  # d, chords: where the added mass's acceleration is taken (Armanini et al. 2016, below Eq. 19)
+_KEPT = 64  # motions whose elements are remembered, per recording
+_DEFINITION = ("vehicle", "terms", "elements", "instants", "peel_width", "effects")
+
+
+@dataclass(frozen=True)
+class BladeElementWing:
+    """Vehicle whose wings move as prescribed, for forces on a balance or in flight.
+
+    ``terms`` are names of :data:`wingfit.sim.vehicle.terms.TERMS`. A beat is computed at ``instants`` equal steps with
+    ``elements`` along each wing. ``peel_width`` in beats smooths the end of the peel (0: it switches, as printed).
+    ``effects`` are names of :data:`wingfit.sim.effects.registry.EFFECTS` whose genes are appended.
+    """
+
+    vehicle: Vehicle
+    terms: tuple[str, ...] = chosen("proposed")
+    elements: int = 40
+    instants: int = 400
+    peel_width: float = 0.0
+    effects: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in self.terms:
+            if name not in TERMS:
+                raise ValueError(f"unknown term {name!r}; there are {', '.join(TERMS)}")
+        if self.elements < 1 or self.instants < LANES or self.instants % LANES:
+            raise ValueError(
+                f"{self.elements} elements and {self.instants} instants; there must be at least one element, and a "
+                f"positive multiple of {LANES} instants"
+            )
+        if not 0 <= self.peel_width <= 0.5:
+            raise ValueError(f"peel_width is {self.peel_width:g} beats; it must lie in [0, 0.5]")
+        _check_effects(self)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Pickle the definition only; whatever was computed from it is computed again."""
+        return {name: self.__dict__[name] for name in _DEFINITION}
+
+    @cached_property
+    def genes(self) -> tuple[Gene, ...]:
+        """Coefficients of the terms, parameters of the wings' motion, then genes of the effects.
+
+        EstimateError for an estimate of no use.
+        """
+        coefficients = [gene for name in TERMS for gene in TERMS[name].genes if name in self.terms]
+        if not self.vehicle.claps:
+            coefficients = [gene for gene in coefficients if gene.name != "C_F"]
+        genes = (*coefficients, *motion_genes(self.vehicle.motion))
+        _check_estimates(self.vehicle, genes)
+        own = tuple(replace(gene, nominal=self.vehicle.estimates.get(gene.name, gene.nominal)) for gene in genes)
+        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.vehicle)))
+
+    @cached_property
+    def chosen(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they act."""
+        return registry.chosen(self.effects, self.vehicle)
+
+    def with_effects(self, *names: str) -> BladeElementWing:
+        """The same vehicle with more effects; their genes are appended, switched off."""
+        return replace(self, effects=(*self.effects, *names))
+
+    @cached_property
+    def searched(self) -> tuple[str, ...]:
+        """What the seed estimates: lift, rotational and fling coefficients; and all genes of effects.
+
+        Drag and motion are fixed beforehand.
+        """
+        added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
+        return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
+
+    @one_blas_thread
+    def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
+        """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
+        batch = genome_batch(self.genes, genomes)
+        out = np.empty((len(batch), 2, self.instants))
+        for effects, members in self._alike(batch):
+            for start in range(0, len(members), LANES):  # blocks that stay in the cache
+                block = members[start : start + LANES]
+                if effects:
+                    weights, rows, added = self._changed(effects, batch[block], recording)
+                    out[block] = [_sum(w, row) + more for w, row, more in zip(weights, rows, added, strict=True)]
+                else:
+                    weights = self._weights(self._coefficients(batch[block]), len(block))
+                    found = self._remembered(batch[block], recording)
+                    out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
+        return out.transpose(0, 2, 1)
+
+    def term_forces(self, genome: npt.ArrayLike, recording: Recording) -> dict[str, Array]:
+        """Forces [n, 2] of each term (N), and of the effects beside them; together they are :meth:`beat`."""
+        batch = genome_batch(self.genes, np.asarray(genome, float)[None])
+        ((effects, _),) = self._alike(batch)
+        parts = dict[str, Array]()
+        if effects:
+            weights, rows, added = self._changed(effects, batch, recording)
+            parts["effects"] = added[0].T
+        else:
+            weights = self._weights(self._coefficients(batch), len(batch))
+            rows = self._rows(batch, recording)
+        for name, weight, row in zip(self._active, weights[0], rows[0], strict=True):
+            parts[_ROWS[name]] = parts.get(_ROWS[name], 0.0) + weight * row.T
+        return parts
+
+    @one_blas_thread
+    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+        """Forces [B, T, C] of ``genomes`` [B, G] at the recording's instants and along its axes, low-passed like it."""
+        if recording.kind != "forces":
+            raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
+        batch = genome_batch(self.genes, genomes)
+        beat = self.beat(batch, recording)
+        watched, sampling = self._seen(batch, beat, recording)
+        beat[watched] = sampling.beat
+        basis, wanted = self._basis(recording)
+        axes = ["xz".index(axis) for axis in recording.forces]
+        series = series_of(beat[:, :, axes].transpose(0, 2, 1), self._harmonics, recording)[:, :, wanted]
+        series = np.ascontiguousarray(series)
+        channels = np.empty((len(batch), len(recording.times), len(axes)))
+        synthesise(basis, series, channels)
+        for k, times, added in zip(watched, sampling.times, sampling.added, strict=True):
+            if not np.array_equal(times, recording.times):
+                synthesise_at(phases(recording, times), series[k], channels[k])
+            channels[k] += passed(added, recording)
+        good = [bool(np.isfinite(forces).all()) for forces in channels]
+        return Observation(channels, tuple(None if fine else "the forces are not finite" for fine in good))
+
+    # -- effects -----------------------------------------------------------------------------------------------
+
+    def _alike(self, batch: Array) -> list[tuple[tuple[Effect, ...], Places]]:
+        """Individuals in groups for which the same effects on the vehicle are on."""
+        acting = [effect for effect in self.chosen if effect.vehicle]
+        on = [~effect.off(effect.values(self.genes, batch)) for effect in acting]
+        groups: dict[tuple[Effect, ...], list[int]] = {}
+        for k in range(len(batch)):
+            groups.setdefault(tuple(e for e, each in zip(acting, on, strict=True) if each[k]), []).append(k)
+        return [(effects, np.array(members)) for effects, members in groups.items()]
+
+    def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array, Array]:
+        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; others [B, 2, n]."""
+        moving = {} if recording.motion else self._moving(batch)
+        scene = self._scene(moving | self._coefficients(batch), len(batch), recording)
+        for effect in effects:
+            if effect.vehicle:
+                effect.vehicle(scene, effect.values(self.genes, batch))
+        scene.settle()
+        return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
+
+    def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Places, Sampling]:
+        """Individuals for whom an effect on the observation is on, and what the balance makes of their ``beat``."""
+        effects = observed(self.chosen, self.genes, batch, "forces")
+        on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
+        watched = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
+        times, added = (np.zeros((len(watched), *shape)) for shape in (recording.times.shape, recording.values.shape))
+        sampling = Sampling(self.vehicle, recording, beat[watched], times + recording.times, added)
+        apply(effects, self.genes, batch[watched], sampling)
+        return watched, sampling
+
+    # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
+
+    def _coefficients(self, batch: Array) -> dict[str, Array]:
+        """Those of the terms that are on, [B]."""
+        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in _COEFFICIENTS}
+
+    def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
+        """[B, rows]: what each row of ``count`` individuals is multiplied by."""
+        zero, one = np.zeros(count), np.ones(count)
+
+        def value(name: str) -> Array:
+            return coefficients.get(name, zero)
+
+        lever = ROTATION_POINT - self.vehicle.pitch_axis
+        scale = {
+            "inertial": one,
+            "translation": value("C_l"),
+            "rotation": value("C_r") * lever,
+            "clap_and_peel": -value("C_F"),  # theta_fling' = -theta_w'
+            "added_mass": one,
+            "viscous_0": value("C_D0"),
+            "viscous_90": value("C_Dpi2"),
+            "wing_acceleration": one,
+            "lift_curve": value("K_l"),
+            "drag_curve": value("K_d"),
+        }
+        return np.stack([scale[row] for row in self._active], axis=1)
+
+    @cached_property
+    def _active(self) -> tuple[str, ...]:
+        """Rows of the terms that are on."""
+        return tuple(row for row, term in _ROWS.items() if term in self.terms)
+
+    @cached_property
+    def _memory(self) -> WeakKeyDictionary[Recording, OrderedDict[bytes, Array]]:
+        return WeakKeyDictionary()
+
+    def _moving(self, batch: Array) -> dict[str, Array]:
+        """Genes [B] of the wings' motion, in the order of the model."""
+        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in self._motion_names}
+
+    @cached_property
+    def _motion_names(self) -> frozenset[str]:
+        return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
+
+    def _remembered(self, batch: Array, recording: Recording) -> list[Array]:
+        """Forces of each active row [rows, 2, n] of every individual; those of the last few motions are remembered."""
+        kept = self._memory.setdefault(recording, OrderedDict())
+        motions = np.stack(list(self._moving(batch).values()) or [np.zeros(len(batch))], axis=1)
+        keys = [motion.tobytes() for motion in motions]
+        new = {key: row for row, key in enumerate(keys) if key not in kept}
+        found = dict(zip(new, self._rows(batch[list(new.values())], recording), strict=True)) if new else {}
+        answer = [found[key] if key in found else kept[key] for key in keys]
+        kept.update(found)
+        while len(kept) > _KEPT:
+            kept.popitem(last=False)
+        return answer
+
+    def _rows(self, batch: Array, recording: Recording) -> Array:
+        """Forces of each active row [B, rows, 2, n] of all wings, for the motions that ``batch`` [B, G] prescribes."""
+        moving = {} if recording.motion else self._moving(batch)
+        found = self._wings(self._scene(moving, len(batch) if moving else 1, recording))
+        return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
+
+    def _scene(self, genes: dict[str, Array], count: int, recording: Recording) -> VehicleScene:
+        """``count`` vehicles in the recording's condition; ``genes`` [count] of those that the scene depends on."""
+        motion, r = recording.motion or self.vehicle.motion, self._span[0]
+        setting = Setting(self.vehicle, self.terms, motion, recording.condition, self.instants, self.peel_width, r)
+        return VehicleScene.of(setting, genes, count)
+
+    def _wings(self, scene: VehicleScene) -> Array:
+        """Forces of each active row [B, rows, 2, n] of all wings of a scene."""
+        vehicle, n, motion = self.vehicle, self.instants, scene.setting.motion
+        r, chord, mass, width = self._span
+        first, step = np.array([r[0], width]) / (motion.pitch_station * vehicle.span)
+        constants = Constants(vehicle.thickness, width, first, step, ADDED_MASS_POINT)
+        curves = len(CURVE_ROWS) if "steady_curves" in self.terms else 0
+        found = np.zeros((len(scene), len(ROWS) + curves, 2, n // LANES, LANES))
+        rows = scene.rows(first)
+        if "effective_chord" not in self.terms:
+            rows[:, PEELED] = 1.0
+        masses, loading = scene.mass_factor[:, None] * mass, scene.loading[:, : len(r)].copy()
+        grouped = rows.reshape(*rows.shape[:2], -1, LANES)
+        for side in scene.each_side(rows):
+            wing_forces(grouped, side, r, chord, masses, scene.density.copy(), loading, constants, found)
+        each = found.reshape(len(found), -1, 2, n)
+        each *= mirrored(vehicle)
+        peel = scene.angles.peel[:, None] * ("clap_and_peel" in self.terms)
+        out = np.empty((len(each), len(self._active), 2, n))
+        for k, name in enumerate(self._active):
+            factor = {"rotation": 1.0 - peel, "clap_and_peel": peel}.get(name)
+            row = each[:, _PLACES[name]]
+            out[:, k] = row if factor is None else row * factor
+        if scene.fling.any():
+            scene.added -= scene.fling[:, None, None] * scene.angles.peel[:, None] * each[:, ROWS.index("rotation")]
+        return out
+
+    @cached_property
+    def _span(self) -> tuple[Array, Array, Array, float]:
+        """Middles of the elements (m), their chords (m) and masses per length (kg/m), and their common width (m)."""
+        vehicle = self.vehicle
+        width = vehicle.span / self.elements
+        r = np.asarray((np.arange(self.elements) + 0.5) * width, np.float64)
+        at, chords = [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
+        chord: Array = np.asarray(np.interp(r, at, chords))
+        mass: Array = chord / float(np.trapezoid(chords, at)) * vehicle.wing_mass  # c / (c_mean R) M_wing (Eq. 14)
+        return r, chord, mass, width
+
+    @property
+    def _harmonics(self) -> int:
+        return (self.instants - 1) // 2
+
+    def _basis(self, recording: Recording) -> tuple[Array, npt.NDArray[np.int64]]:
+        """Cosines and sines [K, T] at the recording's instants, and their places in a series: only what passes."""
+        wanted = passing(recording, self._harmonics)
+        if self._last_basis.get("recording") is not recording:
+            basis = turns(wanted, self._harmonics, recording)
+            self._last_basis.update(recording=recording, basis=basis)
+        return self._last_basis["basis"], wanted
+
+    @cached_property
+    def _last_basis(self) -> dict[str, Any]:
+        return {}  # of one recording only: those of long unfiltered recordings fill memory
+
+
+# What each row of the elements belongs to.
+_ROWS = {
+    "inertial": "inertial",
+    "translation": "translation",
+    "rotation": "rotation",
+    "clap_and_peel": "clap_and_peel",
+    "added_mass": "added_mass",
+    "viscous_0": "viscous",
+    "viscous_90": "viscous",
+    "wing_acceleration": "wing_acceleration",
+    "lift_curve": "steady_curves",
+    "drag_curve": "steady_curves",
+}
+# Where the elements put it: peel decides at which instants the circulation of a pitching wing counts as which.
+_PLACES = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
+
+
+# Genes that the flow at the stations depends on; a scene without effects depends on the motion alone.
+_COEFFICIENTS = ("C_l", "C_r", "C_F", "C_D0", "C_Dpi2", "K_l", "K_d")
+
+
+def _check_effects(model: BladeElementWing) -> None:
+    """Refuse effects that are unknown, or terms of the model already, or need wings that meet."""
+    for effect in registry.chosen(model.effects, model.vehicle):
+        if effect.name in model.terms:
+            raise ValueError(
+                f"effect {effect.name!r} is a term of this model already; name no such effect, or leave out the term"
+            )
+        if effect.name == "clap_and_peel" and not model.vehicle.claps:
+            raise ValueError("effect 'clap_and_peel' needs wings that meet, and vehicle.claps is false: leave it out")
+
+
+def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
+    """Refuse estimates that no model of ``vehicle`` takes; those for terms that are off must be good as well."""
+    known = {gene.name: gene for term in TERMS.values() for gene in term.genes} | {gene.name: gene for gene in genes}
+    remedy = "change vehicle.estimates in dataset.yaml"
+    for name, value in vehicle.estimates.items():
+        if name not in known:
+            raise EstimateError(
+                f"estimate for unknown gene {name!r}; vehicles have {', '.join(sorted(known))}: {remedy}"
+            )
+        try:
+            known[name].check(value)
+        except ValueError as error:
+            raise EstimateError(f"estimate of {error}: {remedy}") from None
+
+
+def _sum(weights: Array, rows: Array) -> Array:
+    """Weighted sum of ``rows`` [rows, ...], always in the same order, so that it does not depend on the batch."""
+    total = np.zeros(rows.shape[1:])
+    for weight, row in zip(weights, rows, strict=True):
+        if weight != 0.0:
+            total += weight * row
+    return total

@@ -1,0 +1,281 @@
+"""The forces of all blade elements, instant by instant, by physical term (Armanini et al. 2016, Eqs. 1-15, 18-19).
+
+Nothing here depends on a coefficient: each term is computed for a coefficient of one, so that a force is a weighted sum
+of these rows. Instants are independent of each other, and eight of them fill a vector of the processor.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.jit import allocating, inlined, kernel
+from wingfit.sim.kernels.lanes.vector import Vector, load, load3, root, store3
+
+Array = npt.NDArray[np.float64]
+
+ROWS = ("inertial", "translation", "rotation", "added_mass", "viscous_0", "viscous_90", "wing_acceleration")
+CURVE_ROWS = ("lift_curve", "drag_curve")
+(
+    FLAP_RATE,  # zeta', rad/s
+    FLAP_ACCELERATION,  # zeta'', rad/s^2
+    PITCH_RATE,  # theta_w' at the pitch station, rad/s
+    PITCH_ACCELERATION,  # rad/s^2
+    DIHEDRAL,  # cosine of the wing's angle to the horizontal
+    DIHEDRAL_RATE,  # of that cosine, 1/s
+    PROJECTION,  # the cosine of Eq. 15
+    PEELED,  # c_eff / c
+    COSINE,  # of theta_w at the first element
+    SINE,
+    STEP_COSINE,  # of the change of theta_w from one element to the next: the twist is linear in span
+    STEP_SINE,
+    FORWARD,  # speed of the stream along body x, induced inflow included, m/s
+    DOWNWARD,  # speed of the stream along this side's z at zero dihedral, m/s
+) = range(14)
+STILL = 1e-30  # m^2/s^2, keeps a direction defined without flow
+CHUNK = 80
+DEGREE = math.pi / 180
+
+
+class Side(NamedTuple):
+    """The stream as the wings of one side meet it, in axes mirrored at the body's plane for the upper side.
+
+    Attributes:
+        stream: sign of the stream along the chord.
+        printed: 1 where the whole of the stream normal to the wing shrinks with the dihedral, as printed (Eqs. 18-19);
+            0 where only what comes from below does: so no work is gained or lost between velocities and forces.
+        sign: of this side's z in body axes.
+    """
+
+    stream: float
+    printed: float
+    sign: float
+
+
+class Constants(NamedTuple):
+    """What is the same for all elements.
+
+    Thickness b and width dr of an element (m), share of the twist at the pitch station that the first element has and
+    its step to the next, d of the added mass (chords).
+    """
+
+    thickness: float
+    width: float
+    twist: float
+    twist_step: float
+    point: float
+
+
+@inlined
+def velocities(
+    ct: Vector, st: Vector, swing: Vector, u: Vector, w: Vector, whole: Vector, stream: float
+) -> tuple[Vector, Vector]:
+    """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19).
+
+    ``swing`` is that of its flapping, ``u`` and ``w`` are those of the stream along body x and this side's z.
+    """
+    vx = swing * ct + (u * st + w * ct) * stream
+    vz = whole * (u * ct - w * st) - swing * st
+    return vx, vz
+
+
+@inlined
+def _element_forces(
+    motion: Array,
+    side: Side,
+    r: Array,
+    chord: Array,
+    mass: Array,
+    rho: float,
+    loading: Array,
+    constants: Constants,
+    out: Array,
+) -> None:
+    """The rows of ROWS for one individual: ``motion`` [14, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
+    dr, d = constants.width, constants.point
+    m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
+    for g in range(motion.shape[1]):
+        flap_rate, flap_acceleration = load(motion, FLAP_RATE, g), load(motion, FLAP_ACCELERATION, g)
+        pitch_rate, pitch_acceleration = load(motion, PITCH_RATE, g), load(motion, PITCH_ACCELERATION, g)
+        lam, lam_rate = load(motion, DIHEDRAL, g), load(motion, DIHEDRAL_RATE, g)
+        forward, downward = load(motion, FORWARD, g), load(motion, DOWNWARD, g)
+        w = (lam * (1.0 - side.printed) + side.printed) * downward
+        w_rate = lam_rate * (downward * (1.0 - side.printed))
+        whole, whole_rate = lam * side.printed + (1.0 - side.printed), lam_rate * side.printed
+        peeled = load(motion, PEELED, g)
+        added = peeled * peeled * (0.25 * math.pi * rho)  # m22 / c^2, Eq. 10
+        ct, st = load(motion, COSINE, g), load(motion, SINE, g)
+        step_ct, step_st = load(motion, STEP_COSINE, g), load(motion, STEP_SINE, g)
+        x0 = lam * 0.0
+        x1, x2, x3, x4, x5, x6, z0, z1, z2, z3, z4, z5, z6 = x0, x0, x0, x0, x0, x0, x0, x0, x0, x0, x0, x0, x0
+        for e in range(len(r)):
+            q, c, mw = constants.twist + e * constants.twist_step, chord[e], mass[e]
+            rate, swing = pitch_rate * q, flap_rate * r[e]
+            vx, vz = velocities(ct, st, swing, forward, w, whole, side.stream)
+            along, across = forward * st + w * ct, forward * ct - w * st
+            turn = flap_acceleration * r[e]
+            ax = turn * ct - swing * rate * st + (rate * across + w_rate * ct) * side.stream
+            az = whole_rate * across - turn * st - swing * rate * ct - whole * (rate * along + w_rate * st)
+            ub, wb = vx * st + vz * ct, vx * ct - vz * st  # velocity in body axes
+            m22 = added * (c * c)
+            # inertial: m1 v_z theta', -m2 v_x theta' (Eqs. 12-14)
+            fx, fz = (m22 + mw) * vz * rate, vx * rate * (-mw - m11)
+            x0 += fx * st + fz * ct
+            z0 += fx * ct - fz * st
+            # circulation: -rho Gamma (v_z, -v_x) (Eq. 8); Gamma = 1/2 c |V| sin 2 alpha (Eqs. 2, 3)
+            per_speed = (rho * c) / root(vx * vx + vz * vz + STILL)
+            gamma = -vx * vz * (per_speed * loading[e])
+            x1 += gamma * wb
+            z1 -= gamma * ub
+            gamma = rate * (0.5 * rho * c * c * loading[e])  # Gamma = 1/2 c^2 theta' (Eq. 2)
+            x2 += gamma * wb
+            z2 -= gamma * ub
+            # added mass (Eq. 9), its acceleration taken d chords behind the axis of pitch (Eqs. 18-19)
+            fx, fz = ax * -m11, m22 * (pitch_acceleration * (q * d * c) - az)
+            x3 += fx * st + fz * ct
+            z3 += fx * ct - fz * st
+            # viscous: -1/2 rho c C_D |V| V with cos^2 alpha, then sin^2 alpha (Eq. 11)
+            drag = vx * vx * per_speed * 0.5
+            x4 -= drag * ub
+            z4 -= drag * wb
+            drag = vz * vz * per_speed * 0.5
+            x5 -= drag * ub
+            z5 -= drag * wb
+            # what Eqs. 12-14 leave out of the wing's own inertia
+            x6 -= (ax * st + az * ct) * mw
+            z6 -= (ax * ct - az * st) * mw
+            ct, st = ct * step_ct - st * step_st, st * step_ct + ct * step_st
+        projection = load(motion, PROJECTION, g) * (side.sign * dr)  # Eq. 15
+        for row, x, z in (
+            (0, x0, z0),
+            (1, x1, z1),
+            (2, x2, z2),
+            (3, x3, z3),
+            (4, x4, z4),
+            (5, x5, z5),
+            (6, x6, z6),
+        ):
+            store3(out, row, 0, g, load3(out, row, 0, g) + x * dr)
+            store3(out, row, 1, g, load3(out, row, 1, g) + z * projection)
+
+
+@inlined
+def curve_lift(alpha: float) -> float:
+    """C_L of a revolving model wing at ``alpha`` degrees, 0 to 90 (Dickinson, Lehmann and Sane 1999)."""
+    return 0.225 + 1.58 * math.sin((2.13 * alpha - 7.20) * DEGREE)
+
+
+@inlined
+def curve_drag(alpha: float) -> float:
+    """C_D of the same."""
+    return 1.92 - 1.55 * math.cos((2.04 * alpha - 9.82) * DEGREE)
+
+
+@inlined
+def _curve_forces(
+    motion: Array, side: Side, r: Array, chord: Array, rho: float, loading: Array, constants: Constants, out: Array
+) -> None:
+    """Lift and drag by measured steady curves: ``out`` [2, 2, n / 8, 8], in the order of CURVE_ROWS.
+
+    Measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
+    """
+    for g in range(motion.shape[1]):
+        for k in range(LANES):
+            ct, st = motion[COSINE, g, k], motion[SINE, g, k]
+            step_ct, step_st = motion[STEP_COSINE, g, k], motion[STEP_SINE, g, k]
+            lam = motion[DIHEDRAL, g, k]
+            forward = motion[FORWARD, g, k]
+            w = motion[DOWNWARD, g, k] * (side.printed + (1.0 - side.printed) * lam)
+            whole = (1.0 - side.printed) + side.printed * lam
+            projection = side.sign * motion[PROJECTION, g, k]
+            for e in range(len(r)):
+                vx, vz = velocities(ct, st, motion[FLAP_RATE, g, k] * r[e], forward, w, whole, side.stream)
+                ub, wb = vx * st + vz * ct, vx * ct - vz * st
+                alpha = math.atan2(abs(vz), abs(vx)) / DEGREE
+                lift, drag = curve_lift(alpha) * loading[e], curve_drag(alpha)
+                pressure = 0.5 * rho * chord[e] * constants.width * math.sqrt(vx * vx + vz * vz)
+                gamma = math.copysign(pressure * lift, -vx * vz)
+                out[0, 0, g, k] += gamma * wb
+                out[0, 1, g, k] -= gamma * ub * projection
+                out[1, 0, g, k] -= pressure * drag * ub
+                out[1, 1, g, k] -= pressure * drag * wb * projection
+                ct, st = ct * step_ct - st * step_st, st * step_ct + ct * step_st
+
+
+@kernel
+def wing_forces(
+    motion: Array,
+    side: Side,
+    r: Array,
+    chord: Array,
+    mass: Array,
+    density: Array,
+    loading: Array,
+    constants: Constants,
+    out: Array,
+) -> None:
+    """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
+
+    Args:
+        motion: [B, 14, n / 8, 8], rows as named above.
+        side: how the stream comes.
+        r: [E] distances from the flapping axis in equal steps, m.
+        chord: [E], m.
+        mass: [B, E] of the wing per length, kg/m.
+        density: [B] of the air, kg/m^3.
+        loading: [B, E], what circulation is multiplied by.
+        constants: of all elements.
+        out: is added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
+    """
+    for b in range(len(motion)):
+        _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
+        if out.shape[1] > len(ROWS):
+            _curve_forces(motion[b], side, r, chord, density[b], loading[b], constants, out[b, len(ROWS) :])
+
+
+@allocating
+def synthesise(basis: Array, series: Array, out: Array) -> None:
+    """Sum Fourier series: ``out`` [B, T, A] from ``basis`` [K, T] and ``series`` [B, A, K], in one order for any B."""
+    K, T = basis.shape
+    total = np.empty(CHUNK)
+    for start in range(0, T, CHUNK):
+        size = min(CHUNK, T - start)
+        for b in range(series.shape[0]):
+            for a in range(series.shape[1]):
+                total[:] = 0.0
+                for k in range(K):
+                    for t in range(size):
+                        total[t] += series[b, a, k] * basis[k, start + t]
+                for t in range(size):
+                    out[b, start + t, a] = total[t]
+
+
+@allocating
+def synthesise_at(psi: Array, series: Array, out: Array) -> None:
+    """The same of one individual at its own phases ``psi`` [T] (rad): ``out`` [T, A] from ``series`` [A, 2 K + 1].
+
+    Turned from harmonic to harmonic, since sines of all would cost more than the rest of a beat.
+    """
+    A, K = len(series), (series.shape[1] - 1) // 2
+    dc, ds, c, s = np.empty((4, CHUNK))
+    total = np.empty((A, CHUNK))
+    for start in range(0, len(psi), CHUNK):
+        size = min(CHUNK, len(psi) - start)
+        for t in range(size):
+            dc[t], ds[t] = math.cos(psi[start + t]), math.sin(psi[start + t])
+            c[t], s[t] = 1.0, 0.0
+        for a in range(A):
+            total[a] = series[a, 0]
+        for k in range(1, K + 1):
+            for t in range(size):
+                c[t], s[t] = c[t] * dc[t] - s[t] * ds[t], s[t] * dc[t] + c[t] * ds[t]
+            for a in range(A):
+                for t in range(size):
+                    total[a, t] += series[a, k] * c[t] + series[a, K + k] * s[t]
+        for a in range(A):
+            for t in range(size):
+                out[start + t, a] = total[a, t]

@@ -1,0 +1,123 @@
+"""The wings of a batch at eight stations each: the flow that they meet and the forces that it makes on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels import LANES
+from wingfit.sim.vehicle.elements import FORWARD, Side
+from wingfit.sim.vehicle.stations import (
+    Stations,
+    station_circulation,
+    station_forces,
+    station_gust,
+    station_turns,
+    station_velocities,
+)
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Flow:
+    """The flow at eight stations of the lower wings, then of the upper ones where there are any: [sides, B, n, 8].
+
+    Axes of each side are those of the wing, mirrored at the body's plane for the upper one (Armanini et al. 2016,
+    Eqs. 2, 8, 18).
+
+    Attributes:
+        along, normal: velocity of the wing through the air along its chord and normal to it, m/s.
+        speed: m/s, never zero.
+        circulation: m^2/s, of all but fling, which comes on top as it is; its force per length is
+            -rho Gamma (normal, -along).
+    """
+
+    along: Array
+    normal: Array
+    speed: Array
+    circulation: Array
+
+
+@dataclass(frozen=True)
+class StationedWings:
+    """Wings of B individuals that move in a prescribed way, at n instants.
+
+    Attributes:
+        places: the stations.
+        sides: motion [B, 14, n] of each side that is computed, and how the stream meets it.
+        turning: [B, n], rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, of a wing by itself.
+        fling: [B, n], rad/s: the same of what wings that peel apart add to it (Eq. 7).
+        loading: [B, 8]: what circulation is multiplied by.
+        density: [B] of the air, kg/m^3.
+        lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
+        drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve.
+        alike: wings for each side that is computed.
+    """
+
+    places: Stations
+    sides: tuple[tuple[Array, Side], ...]
+    turning: Array
+    fling: Array
+    loading: Array
+    density: Array
+    lift: Array
+    drag: Array
+    alike: float
+
+    def every(self, k: int) -> StationedWings:
+        """The same at every ``k``-th instant."""
+        sides = tuple((rows[:, :, ::k].copy(), side) for rows, side in self.sides)
+        return replace(self, sides=sides, turning=self.turning[:, ::k].copy(), fling=self.fling[:, ::k].copy())
+
+    @cached_property
+    def turns(self) -> tuple[Array, Array]:
+        """Cosine and sine of the wing's pitch at the stations, [B, n, 8] each."""
+        cosine, sine = np.empty((2, *self.turning.shape, LANES))
+        station_turns(self.sides[0][0], cosine, sine)
+        return cosine, sine
+
+    @cached_property
+    def rotation(self) -> Array:
+        """Quasi-steady circulation [B, n, 8] that pitching makes, m^2/s: a part of that of the flow."""
+        return self._turned(self.turning)
+
+    def flow(self, forward: Array) -> Flow:
+        """Quasi-steady flow in a stream of ``forward`` [B, n] (m/s) along body x."""
+        flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, LANES)))
+        for k, (rows, side) in enumerate(self.sides):
+            rows[:, FORWARD] = forward
+            station_velocities(rows, side, self.places.r, *self.turns, flow.along[k], flow.normal[k])
+        self._circulate(flow)
+        return flow
+
+    def gust(self, flow: Flow, air: Array) -> None:
+        """Let the wings meet ``air`` [sides, B, n, 8] (m/s) that moves along their r zeta'; circulation follows."""
+        for k, moved in enumerate(air):
+            station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
+        self._circulate(flow)
+
+    def forces(self, flow: Flow) -> Array:
+        """Circulatory and viscous forces [B, 2, n] of all wings along body x and z, fling included, N."""
+        out = np.zeros((len(self.turning), 2, self.turning.shape[1]))
+        circulation = flow.circulation + self._turned(self.fling)
+        for k, (rows, side) in enumerate(self.sides):
+            moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
+            station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)
+        out *= self.alike
+        return out
+
+    def _turned(self, rate: Array) -> Array:
+        """Circulation [B, n, 8] at the stations (m^2/s) for a ``rate`` [B, n] at the pitch station (Eq. 2)."""
+        lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading
+        return np.asarray(rate[:, :, None] * lever[:, None])
+
+    def _circulate(self, flow: Flow) -> None:
+        """Set speed and quasi-steady circulation from the velocities."""
+        places = self.places
+        for k in range(len(self.sides)):
+            velocity, found = (flow.along[k], flow.normal[k]), (flow.speed[k], flow.circulation[k])
+            station_circulation(*velocity, self.turning, self.lift, places.twist, places.chord, self.loading, *found)

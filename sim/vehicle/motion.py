@@ -1,0 +1,198 @@
+"""The prescribed motion of the wings: flap angle and pitch with their derivatives, whether recorded or by formula.
+
+Every flap law is a Fourier series in the end, so that all derivatives belong to one and the same smooth motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Flap, FourierFlap, FourierPitch, Gene, PassivePitch, Pitch, SplitCycleFlap, WingMotion
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+HARMONICS = 100  # of the split cycle, before its smoothing
+SPLITS = (-12.0, 2.5)  # rad per beat: the wings open for 17 to 83 % of it
+_NO_SPLIT = 1e-7  # rad per beat
+
+# field of the motion, gene, unit, half width of the box, description
+_FLAP_GENES = (
+    ("amplitude", "A", "rad", 0.2, "amplitude of the flap angle (Armanini et al. 2016, Eqs. 20-21)"),
+    ("bias", "eta", "rad", 0.2, "mean of the flap angle (Eqs. 20-21)"),
+    ("split", "delta", "rad", 0.35, "split-cycle parameter: how much longer the wings open than close (Eqs. 20-21)"),
+)
+_PITCH_GENES = (
+    ("constant", "C_theta0", "rad", 0.3, "wing pitch at rest, less pi/2 (Eq. 17)"),
+    ("flap", "C_theta1", "1", 1.0, "wing pitch per flap angle (Eq. 17)"),
+    ("flap_rate", "C_theta2", "s", 0.02, "wing pitch per flap rate (Eq. 17)"),
+    ("flap_rate_squared", "C_theta3", "s^2", 0.001, "wing pitch per flap rate squared (Eq. 17)"),
+)
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Over one beat in n equal steps from t* = 0, for B individuals; derivatives by time in s.
+
+    ``flap`` [B, 3, n] and ``pitch`` [B, 3, n] (at the pitch station) with their first two derivatives; ``peel`` [B, n]
+    is 1 while the wings peel apart and 0 after, ``peeled`` [n] the part of the chord that has come apart.
+    """
+
+    flap: Array
+    pitch: Array
+    peel: Array
+    peeled: Array
+
+
+def motion_genes(motion: WingMotion) -> tuple[Gene, ...]:
+    """Parameters of a motion given by formula; a motion given as a series has none."""
+    laws = ((motion.flap, SplitCycleFlap, _FLAP_GENES), (motion.pitch, PassivePitch, _PITCH_GENES))
+    return tuple(
+        Gene(name, unit, getattr(law, field), getattr(law, field) - half, getattr(law, field) + half, "linear", text)
+        for law, formula, rows in laws
+        if isinstance(law, formula)
+        for field, name, unit, half, text in rows
+    )
+
+
+def angles(
+    motion: WingMotion,
+    values: Mapping[str, Array],
+    frequency: float,
+    instants: int,
+    claps: bool,
+    peel_width: float = 0.0,
+) -> Angles:
+    """Flap angle, pitch and peel over one beat of ``instants`` equal steps at ``frequency`` (Hz), for B individuals.
+
+    ``values`` are genes [B] of the motion; a gene not named keeps the motion's own value. ``peel_width`` in beats is
+    the time in which fling circulation gives way to rotational circulation; at 0 it switches within one step, as
+    printed (Eq. 7).
+    """
+    count = max((len(v) for v in values.values()), default=1)
+    series = flap_series(motion.flap, values, count, instants)
+    return angles_of(series, motion, values, frequency, instants, claps, peel_width)
+
+
+def angles_of(
+    series: Complex,
+    motion: WingMotion,
+    values: Mapping[str, Array],
+    frequency: float,
+    instants: int,
+    claps: bool,
+    peel_width: float = 0.0,
+) -> Angles:
+    """The same of wings whose flap angle is a ``series`` [B, K + 1], as :func:`flap_series` gives it."""
+    flap = _derivatives(series, frequency, instants, 3)
+    pitch = _pitch(motion.pitch, values, flap, frequency, instants)
+    t_star = np.arange(instants) / instants
+    peel, peeled = np.zeros((len(series), instants)), np.ones(instants)
+    if claps:
+        peel = _peel(pitch[:, 1], t_star, max(peel_width, 1.0 / instants), motion.peel_end)
+        peeled = np.minimum(t_star / motion.peel_end, 1.0)
+        peeled[0] = np.sqrt(0.5)  # the chord closes in an instant: the mean of the squares before and after
+    return Angles(flap[:, :3], pitch, peel, peeled)
+
+
+def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
+    """Series [B, K + 1] of the flap angle: Re sum_k series_k exp(2 pi i k t*)."""
+    if isinstance(flap, FourierFlap):
+        return np.tile(_series(flap.mean, flap.cosine, flap.sine), (count, 1))
+    k = np.arange(min(HARMONICS, (instants - 1) // 2) + 1)
+    own = (("A", flap.amplitude), ("eta", flap.bias), ("delta", flap.split))
+    amplitude, bias, split = (_column(values, name, value) for name, value in own)
+    series = amplitude * split_cycle_series(split, len(k) - 1)
+    series[:, :1] += bias
+    return np.asarray(np.broadcast_to(series, (count, len(k))) * np.exp(-0.5 * (2 * np.pi * k * flap.smoothing) ** 2))
+
+
+def _column(values: Mapping[str, Array], name: str, own: float) -> Array:
+    """[B, 1] of a gene, or [1, 1] of the motion's own value."""
+    return np.asarray(values.get(name, np.array([own])), float)[:, None]
+
+
+def split_cycle_series(delta: Array, harmonics: int) -> Complex:
+    """Fourier series [B, harmonics + 1] of split cycles of unit amplitude and no bias (Eqs. 20-21), in closed form.
+
+    It opens as -cos((omega - delta) t*) until (omega - delta) t* = pi, and closes as -cos((omega + sigma) t* + xi),
+    with omega = 2 pi, sigma = delta omega / (omega - 2 delta), xi = -2 pi delta / (omega - 2 delta); ``delta`` [B, 1].
+    """
+    out = delta[~((SPLITS[0] <= delta) & (delta <= SPLITS[1]))]
+    if len(out):
+        raise ValueError(
+            f"the split-cycle parameter delta is {out[0]:g} rad; it must lie in [{SPLITS[0]:g}, {SPLITS[1]:g}] rad: "
+            "outside, one of the strokes takes less than a sixth of the beat"
+        )
+    omega = 2 * np.pi
+    delta = np.where(np.abs(delta) < _NO_SPLIT, _NO_SPLIT, delta)  # the closed form is 0 / 0 at zero
+    opening, closing = omega - delta, omega + delta * omega / (omega - 2 * delta)
+    b = 2 * np.pi * np.arange(harmonics + 1)
+    turns = 1.0 + np.exp(-1j * b * (np.pi / opening))
+    series = -1j * b * turns * (1.0 / (opening**2 - b**2) - 1.0 / (closing**2 - b**2))
+    series[:, 1:] *= 2
+    return np.asarray(series)
+
+
+def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: float, instants: int) -> Array:
+    """theta_w at the pitch station and its first two derivatives [B, 3, n] (Eq. 17)."""
+    if isinstance(pitch, FourierPitch):
+        series = np.tile(_series(pitch.mean, pitch.cosine, pitch.sine), (len(flap), 1))
+        return _derivatives(series, frequency, instants, 2)
+    own = {"C_theta0": pitch.constant, "C_theta1": pitch.flap, "C_theta2": pitch.flap_rate}
+    c0, c1, c2, c3 = (_column(values, n, v) for n, v in (*own.items(), ("C_theta3", pitch.flap_rate_squared)))
+    angle, rate, acceleration, jerk = np.moveaxis(flap, 1, 0)
+    slope = c2 + 2 * c3 * rate
+    value = np.pi / 2 + c0 + c1 * angle + (c2 + c3 * rate) * rate
+    first = c1 * rate + slope * acceleration
+    second = c1 * acceleration + slope * jerk + 2 * c3 * acceleration**2
+    return np.stack([value, first, second], axis=1)
+
+
+def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Array:
+    """1 while the wings peel, 0 after: t* >= 0 and theta_fling' = -theta_w' >= 0 (Eq. 7), ``pitch_rate`` being [B, n].
+
+    That is from the first instant at which the wing pitches so, which must come before t* = ``latest``, until it stops.
+    The end is a smooth step of ``width`` beats about the zero of the pitch rate, which is found between instants:
+    forces are smooth in the genes, and with some width in time as well.
+    """
+    n, rows = len(t_star), np.arange(len(pitch_rate))
+    fling = pitch_rate < 0
+    start = fling.argmax(axis=1)
+    ended = ~fling & (np.arange(n) > start[:, None])
+    k = np.maximum(ended.argmax(axis=1), 1)
+    after, before = pitch_rate[rows, k], pitch_rate[rows, k - 1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        end = (k - after / (after - before)) / n
+    weight = np.clip((end[:, None] - t_star) / width + 0.5, 0.0, 1.0)
+    weight = weight * weight * (3.0 - 2.0 * weight)
+    weight[~ended.any(axis=1)] = 1.0
+    weight[np.arange(n) < start[:, None]] = 0.0
+    weight[~fling.any(axis=1) | (t_star[start] >= latest)] = 0.0
+    weight[:, 0] *= 0.5  # it starts in an instant
+    return np.asarray(weight)
+
+
+def _series(mean: float, cosine: tuple[float, ...], sine: tuple[float, ...]) -> Complex:
+    pairs = zip_longest(cosine, sine, fillvalue=0.0)
+    return np.array([mean, *(complex(c, -s) for c, s in pairs)], np.complex128)
+
+
+def _derivatives(series: Complex, frequency: float, instants: int, orders: int) -> Array:
+    """Values and derivatives by time [B, orders + 1, n] of Re sum_k series_k exp(2 pi i k t*), given [B, K + 1]."""
+    last = series.shape[1] - 1
+    if 2 * last >= instants:
+        raise ValueError(
+            f"a motion of {last} harmonics needs more than {instants} instants of a beat; it must be 2 K + 1"
+        )
+    k = np.arange(last + 1)
+    order = np.arange(orders + 1)[:, None]
+    spectrum = np.zeros((len(series), orders + 1, instants // 2 + 1), np.complex128)
+    spectrum[:, :, : last + 1] = series[:, None] * (2j * np.pi * k * frequency) ** order * (0.5 * instants)
+    spectrum[:, :, 0] *= 2
+    return np.fft.irfft(spectrum, instants, axis=2)

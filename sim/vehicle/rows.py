@@ -1,0 +1,82 @@
+"""What the elements of all wings are told: rows of their motion, and how the stream meets each side."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Vehicle
+from wingfit.sim.vehicle.elements import (
+    COSINE,
+    DIHEDRAL,
+    DIHEDRAL_RATE,
+    DOWNWARD,
+    FLAP_ACCELERATION,
+    FLAP_RATE,
+    FORWARD,
+    PEELED,
+    PITCH_ACCELERATION,
+    PITCH_RATE,
+    PROJECTION,
+    SINE,
+    STEP_COSINE,
+    STEP_SINE,
+    Side,
+)
+from wingfit.sim.vehicle.motion import Angles
+
+Array = npt.NDArray[np.float64]
+
+ROW_COUNT = 14
+
+
+def uppers(vehicle: Vehicle) -> tuple[bool, ...]:
+    """Sides of ``vehicle`` that are computed: the lower wings, then the upper ones where they cross like an X."""
+    return (False, True) if vehicle.layout == "x4" else (False,)
+
+
+def mirrored(vehicle: Vehicle) -> float:
+    """Wings per computed side: left and right move alike."""
+    return 1.0 if vehicle.layout == "single" else 2.0
+
+
+def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: float) -> Array:
+    """Motion [B, 14, n] for the kernels, but for what depends on the side; ``forward`` is [B, n].
+
+    ``half_step`` is the share of the twist at the pitch station that the first element has. It lies half a step from
+    the root, so one pair of sine and cosine gives both of its turns.
+    """
+    flap, pitch = prescribed.flap, prescribed.pitch
+    rows = np.empty((len(flap), ROW_COUNT, flap.shape[2]))
+    rows[:, [FLAP_RATE, FLAP_ACCELERATION]] = flap[:, 1:]
+    rows[:, [PITCH_RATE, PITCH_ACCELERATION]] = pitch[:, 1:]
+    rows[:, PEELED] = prescribed.peeled
+    rows[:, FORWARD] = forward
+    set_twist(rows, pitch[:, 0], root, half_step)
+    return rows
+
+
+def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
+    """Set the turns of the first element and from one to the next; ``pitch`` [B, n] at the pitch station."""
+    half = half_step * (pitch - root)
+    c, s = np.cos(half), np.sin(half)
+    rows[:, COSINE], rows[:, SINE] = np.cos(root) * c - np.sin(root) * s, np.sin(root) * c + np.cos(root) * s
+    rows[:, STEP_COSINE], rows[:, STEP_SINE] = c * c - s * s, 2 * c * s
+
+
+def set_side(rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], below: Array, upper: bool) -> Side:
+    """Set the rows of the dihedral and of the stream for the lower wings, or for the upper ones.
+
+    In axes mirrored at the body's plane the upper wing moves like the lower one, in a stream from the other side. As
+    printed, Eq. 18 has the stream along the upper wing's chord from behind (docs/decisions/0005). Wings that are no X
+    move like lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate, [B, n] each; ``below``
+    [B] is the speed of the stream along body z, m/s.
+    """
+    cosine, sine, rate = flap
+    sign, printed = -1.0 if upper else 1.0, vehicle.velocities == "printed"
+    c, s = np.cos(vehicle.dihedral), np.sin(vehicle.dihedral)  # of the angle zeta_0 - sign zeta:
+    rows[:, DIHEDRAL] = c * cosine + sign * s * sine
+    rows[:, DIHEDRAL_RATE] = (sign * s * cosine - c * sine) * rate
+    rows[:, PROJECTION] = cosine if printed else rows[:, DIHEDRAL]
+    rows[:, DOWNWARD] = (sign * below)[:, None]
+    return Side(-1.0 if printed and upper else 1.0, float(printed), sign)

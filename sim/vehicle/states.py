@@ -1,0 +1,206 @@
+"""States of the air with their memory, in the periodic state of a prescribed beat."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.jit import allocating, inlined, kernel
+from wingfit.sim.kernels.lanes.vector import Vector, greatest, least, load0, load1, magnitude, root, store0, store1
+from wingfit.sim.vehicle.elements import STILL
+
+Array = npt.NDArray[np.float64]
+
+_SLOWEST = 1e-9  # least decay of a state in a step: in still air it keeps the mean of what it follows
+_ROUNDS = 60  # for the mean inflow without its correlation with the force
+_SWEEPS = 6  # for what the correlation changes
+
+
+@inlined
+def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
+    """Decay of a state in a step, what it gains of what it follows before and after, the latter being linear in time.
+
+    ``before`` and ``after`` are its rate times half the step. The decay is the Pade approximant (1, 2) of exp(-a),
+    which errs by a^4 / 72 and never exceeds one; the gains are those for which a constant is followed exactly.
+    """
+    a = greatest(before + after, _SLOWEST)
+    below = 1.0 / (a * (a * (1.0 / 6.0) + 2.0 / 3.0) + 1.0)
+    decay = (1.0 - a * (1.0 / 3.0)) * below
+    slope = (a * (1.0 / 6.0) + 1.0) * below  # (1 - decay) / a
+    return decay, slope - decay, 1.0 - slope
+
+
+@allocating
+def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
+    """Periodic solution x of x' = share speed (target - x) over one beat.
+
+    One sweep from zero, then another from where the first shows that the beat closes on itself: there is no transient.
+
+    Args:
+        speed: [sides, B, n, 8], m/s; its mean at the ends of a step counts in the step.
+        share: [B, 8], 1/m, not negative.
+        target: [sides, B, n, 8], linear over a step.
+        step: s.
+        out: x [sides, B, n, 8], is set.
+    """
+    n = speed.shape[2]
+    start, kept = np.zeros(LANES), np.ones(LANES)
+    for k in range(len(speed)):
+        for b in range(speed.shape[1]):
+            half = load0(share[b]) * (0.5 * step)
+            V, y, found = speed[k, b], target[k, b], out[k, b]
+            for again in range(2):
+                x = load0(start) * float(again)
+                product = x * 0.0 + 1.0
+                for t in range(n):
+                    if again:
+                        store1(found, t, x)
+                    later = t + 1 if t + 1 < n else 0
+                    decay, old, new = _step(load1(V, t) * half, load1(V, later) * half)
+                    x = x * decay + load1(y, t) * old + load1(y, later) * new
+                    product *= decay
+                store0(kept, product)
+                if not again:
+                    store0(start, x / (1.0 - product))
+
+
+@inlined
+def _angle(along: Vector, normal: Vector, speed: Vector) -> Vector:
+    """Angle of attack folded into 0 to pi / 2: twice the arc whose tangent is |normal| / (speed + |along|).
+
+    The arc by Abramowitz and Stegun (1964), 4.4.49, to 2e-8.
+    """
+    t = magnitude(normal) / (speed + magnitude(along))
+    q = t * t
+    arc = q * 0.0028662257 - 0.0161657367
+    for a in (0.0429096138, -0.0752896400, 0.1065626393, -0.1420889944, 0.1999355085, -0.3333314528, 1.0):
+        arc = arc * q + a
+    return arc * t * 2.0
+
+
+@inlined
+def _logistic(x: Vector) -> Vector:
+    """1 / (1 + exp x): the Pade approximant (4, 4) of exp(x / 64), squared six times."""
+    y = least(greatest(x, -50.0), 50.0) * (1.0 / 64.0)
+    q = y * y
+    even, odd = q * q * (1.0 / 1680.0) + q * (3.0 / 28.0) + 1.0, y * (q * (1.0 / 84.0) + 0.5)
+    power = (even + odd) / (even - odd)
+    for _ in range(6):
+        power *= power
+    return 1.0 / (power + 1.0)
+
+
+@kernel
+def steady_attachment(
+    along: Array, normal: Array, speed: Array, chord: Array, stall: Array, step: float, out: Array
+) -> None:
+    """X_0(alpha - tau_2 alpha') = 1 / (1 + exp((alpha - tau_2 alpha' - angle) / width)) over a beat.
+
+    Args:
+        along: [sides, B, n, 8], m/s.
+        normal: [sides, B, n, 8], m/s.
+        speed: [sides, B, n, 8], m/s.
+        chord: [8], m.
+        stall: [B, 3]: angle and width, rad, and tau_2 in chords travelled.
+        step: s.
+        out: X_0 [sides, B, n, 8], is set.
+    """
+    n = speed.shape[2]
+    for k in range(len(speed)):
+        for b in range(speed.shape[1]):
+            angle, width, advance = stall[b]
+            x, z, V = along[k, b], normal[k, b], speed[k, b]
+            lead = load0(chord) * (advance * 0.5 / step)
+            for t in range(n):
+                before, after = t - 1 if t else n - 1, t + 1 if t + 1 < n else 0
+                vx, vz, v = load1(x, t), load1(z, t), load1(V, t)
+                turned = vx * (load1(z, after) - load1(z, before)) - vz * (load1(x, after) - load1(x, before))
+                both = vx * vz
+                turned *= both / (magnitude(both) + STILL)  # folded: it rises where the flow turns to the normal
+                late = _angle(vx, vz, v) - turned * lead / (v * v * v)
+                store1(out[k, b], t, _logistic((late - angle) / width))
+
+
+@kernel
+def separate(attached: Array, share: Array, rotation: Array, circulation: Array) -> None:
+    """Multiply ``circulation`` [sides, B, n, 8] by 1 - share (1 - ((1 + sqrt X) / 2)^2), ``share`` [B].
+
+    What separation leaves of the lift where the flow is ``attached`` along the part X of the chord: Kirchhoff's law. It
+    is one of the angle of attack: the part of the circulation that is of ``rotation`` [B, n, 8] stays.
+    """
+    for k in range(len(attached)):
+        for b in range(len(share)):
+            lost, found, turned = share[b], circulation[k, b], rotation[b]
+            for t in range(attached.shape[2]):
+                half = root(greatest(load1(attached[k, b], t), 0.0)) * 0.5 + 0.5
+                stays = load1(turned, t)
+                store1(found, t, (load1(found, t) - stays) * (half * half * lost + (1.0 - lost)) + stays)
+
+
+@kernel
+def overtake(wing: Array, share: Array, wake: Array) -> None:
+    """Turn the velocity of the ``wake`` w into share (w - k u), which ``wing``, moving at u along the same line, meets.
+
+    k u is what the wing takes along: w between none and all of u. All [sides, B, n, 8] in m/s, ``share`` [B].
+    """
+    for k in range(len(wake)):
+        for b in range(len(share)):
+            part = share[b]
+            for t in range(wake.shape[2]):
+                u, w = load1(wing[k, b], t), load1(wake[k, b], t)
+                ahead = greatest(greatest(w, 0.0) - greatest(u, 0.0), 0.0)
+                behind = least(least(w, 0.0) - least(u, 0.0), 0.0)
+                store1(wake[k, b], t, (ahead + behind) * part)
+
+
+@kernel
+def settled_inflow(
+    force: Array, slope: Array, flux: Array, mass: Array, stream: Array, step: float, out: Array
+) -> None:
+    """Periodic inflow v of m v' + F V_T v = force - slope v, V_T^2 = (U_x + mean v)^2 + U_z^2, by the trapezoidal rule.
+
+    Args:
+        force: [B, n], N.
+        slope: [B, n], N s/m.
+        flux: [B], F = 2 rho A, kg/m.
+        mass: [B], m, kg.
+        stream: [B, 2], U through the disc and along it, m/s.
+        step: s.
+        out: [B, n], v in m/s, is set.
+    """
+    n = force.shape[1]
+    for b in range(len(force)):
+        f = s = 0.0
+        for t in range(n):
+            f += force[b, t] / n
+            s += slope[b, t] / n
+        mean = 0.0
+        for _ in range(_ROUNDS):
+            through = flux[b] * math.hypot(stream[b, 0] + mean, stream[b, 1]) + s
+            # halfway between the last guess and the next: it swings about the answer otherwise
+            mean = 0.5 * (mean + f / (through + flux[b] * 1e-3))
+        for _ in range(_SWEEPS):
+            through = flux[b] * math.hypot(stream[b, 0] + mean, stream[b, 1])
+            mean = 0.5 * (mean + _settle(force[b], slope[b], through, mass[b] / step, out[b]))
+
+
+@inlined
+def _settle(force: Array, slope: Array, through: float, inertia: float, out: Array) -> float:
+    """One periodic solution for a given mass flow, kg/s; its mean is returned."""
+    n, start, total = len(force), 0.0, 0.0
+    for again in range(2):
+        v, product, total = start, 1.0, 0.0
+        for t in range(n):
+            later = t + 1 if t + 1 < n else 0
+            out[t] = v
+            total += v / n
+            below = 1.0 / (inertia + 0.5 * (through + slope[later]))
+            decay = (inertia - 0.5 * (through + slope[t])) * below
+            v = v * decay + 0.5 * (force[t] + force[later]) * below
+            product *= decay
+        if not again:
+            start = v / (1.0 - product)
+    return total

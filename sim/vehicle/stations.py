@@ -1,0 +1,220 @@
+"""The flow at a few stations along each wing over the beat, for effects that act on it, and the forces it makes.
+
+Eight stations fill a vector of the processor, so that states which follow the flow are swept through the beat for all
+stations at once. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Vehicle, WingMotion
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.jit import allocating, inlined, kernel
+from wingfit.sim.kernels.lanes.vector import load0, load1, root, store1
+from wingfit.sim.vehicle.elements import (
+    COSINE,
+    DEGREE,
+    DIHEDRAL,
+    DOWNWARD,
+    FLAP_RATE,
+    FORWARD,
+    PROJECTION,
+    SINE,
+    STEP_COSINE,
+    STEP_SINE,
+    STILL,
+    Side,
+    curve_drag,
+    curve_lift,
+    velocities,
+)
+
+Array = npt.NDArray[np.float64]
+
+
+class Stations(NamedTuple):
+    """Eight places at the middles of equal parts of the span.
+
+    Attributes:
+        r: [8] distances from the flapping axis, m.
+        chord: [8], m.
+        weight: [8], m: what a value per length is multiplied by to integrate it along the span.
+        twist: [8] shares of the twist at the pitch station.
+        mass: [8] of the wing per length, as a part of its whole mass, 1/m.
+    """
+
+    r: Array
+    chord: Array
+    weight: Array
+    twist: Array
+    mass: Array
+
+
+def _weights() -> Array:
+    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly, as near to equal as can be."""
+    powers = _MIDDLES ** np.arange(4)[:, None]
+    lacking = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
+    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, lacking)
+
+
+_MIDDLES: Array = (np.arange(LANES) + 0.5) / LANES
+_WEIGHTS = _weights()
+
+
+def stations(vehicle: Vehicle, motion: WingMotion) -> Stations:
+    """Stations of the wings of ``vehicle``."""
+    r, at, chords = _MIDDLES * vehicle.span, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
+    chord = np.asarray(np.interp(r, at, chords))
+    twist = r / (motion.pitch_station * vehicle.span)
+    return Stations(r, chord, _WEIGHTS * vehicle.span, twist, chord / float(np.trapezoid(chords, at)))
+
+
+@kernel
+def span_sums(values: Array, weight: Array, out: Array) -> None:
+    """Sum ``values`` [B, n, 8] times ``weight`` [8] into ``out`` [B, n]."""
+    for b in range(len(values)):
+        for t in range(values.shape[1]):
+            total = 0.0
+            for e in range(LANES):
+                total += values[b, t, e] * weight[e]
+            out[b, t] = total
+
+
+@kernel
+def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
+    """Cosine and sine [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
+    for b in range(len(motion)):
+        for t in range(motion.shape[2]):
+            c, s = motion[b, COSINE, t], motion[b, SINE, t]
+            dc, ds = motion[b, STEP_COSINE, t], motion[b, STEP_SINE, t]
+            for e in range(cosine.shape[2]):
+                cosine[b, t, e], sine[b, t, e] = c, s
+                c, s = c * dc - s * ds, s * dc + c * ds
+
+
+@kernel
+def station_velocities(
+    motion: Array, side: Side, r: Array, cosine: Array, sine: Array, along: Array, normal: Array
+) -> None:
+    """Velocities through the air along the chord and normal to it [B, n, 8], m/s (Eqs. 18-19)."""
+    for b in range(len(motion)):
+        for t in range(motion.shape[2]):
+            ct, st = load1(cosine[b], t), load1(sine[b], t)
+            lam, w = motion[b, DIHEDRAL, t], motion[b, DOWNWARD, t]
+            whole = lam * side.printed + (1.0 - side.printed)
+            w *= lam * (1.0 - side.printed) + side.printed
+            nothing = ct * 0.0
+            swing = load0(r) * motion[b, FLAP_RATE, t]
+            vx, vz = velocities(
+                ct, st, swing, nothing + motion[b, FORWARD, t], nothing + w, nothing + whole, side.stream
+            )
+            store1(along[b], t, vx)
+            store1(normal[b], t, vz)
+
+
+@kernel
+def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: Array) -> None:
+    """Change the velocities [B, n, 8] for air that moves along r zeta' at ``air`` [B, n, 8] (m/s)."""
+    for b in range(len(air)):
+        for t in range(air.shape[1]):
+            moved = load1(air[b], t)
+            store1(along[b], t, load1(along[b], t) - moved * load1(cosine[b], t))
+            store1(normal[b], t, load1(normal[b], t) + moved * load1(sine[b], t))
+
+
+@inlined
+def _attack(along: float, normal: float) -> float:
+    """Angle of attack folded into 0 to 90 degrees."""
+    return math.atan2(abs(normal), abs(along)) / DEGREE
+
+
+@kernel
+def station_circulation(
+    along: Array,
+    normal: Array,
+    turning: Array,
+    coefficient: Array,
+    twist: Array,
+    chord: Array,
+    loading: Array,
+    speed: Array,
+    circulation: Array,
+) -> None:
+    """Speed (m/s) and quasi-steady circulation (m^2/s), positive as in Eq. 8, both [B, n, 8] (Eqs. 2-4, 7).
+
+    Args:
+        along: [B, n, 8], m/s.
+        normal: [B, n, 8], m/s.
+        turning: [B, n], C_R theta_w' at the pitch station or what takes its place in Eq. 2, rad/s.
+        coefficient: [B, 2], C_l of the sine law and the factor on the measured curve.
+        twist: [8], shares of that turning.
+        chord: [8], m.
+        loading: [B, 8], what circulation is multiplied by.
+        speed: is set.
+        circulation: is set.
+    """
+    for b in range(len(along)):
+        C_l, K_l = coefficient[b, 0], coefficient[b, 1]
+        half = load0(chord) * 0.5
+        share = load0(loading[b])
+        for t in range(along.shape[1]):
+            vx, vz = load1(along[b], t), load1(normal[b], t)
+            V = root(vx * vx + vz * vz + STILL)
+            gamma = half * (load0(chord) * load0(twist) * turning[b, t] - vx * vz / V * (2.0 * C_l))
+            store1(speed[b], t, V)
+            store1(circulation[b], t, gamma * share)
+            if K_l != 0.0:
+                for e in range(LANES):
+                    x, z = along[b, t, e], normal[b, t, e]
+                    lift = 0.5 * chord[e] * speed[b, t, e] * K_l * curve_lift(_attack(x, z)) * loading[b, e]
+                    circulation[b, t, e] += math.copysign(lift, -x * z)
+
+
+@allocating
+def station_forces(
+    motion: Array,
+    side: Side,
+    cosine: Array,
+    sine: Array,
+    along: Array,
+    normal: Array,
+    speed: Array,
+    circulation: Array,
+    places: Stations,
+    density: Array,
+    drag: Array,
+    out: Array,
+) -> None:
+    """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
+
+    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; else as above.
+    """
+    part = np.empty((2, LANES))
+    curve = np.empty(LANES)
+    for b in range(len(motion)):
+        chord, weight = load0(places.chord), load0(places.weight) * density[b]
+        C_D0, C_D90, K_d = drag[b, 0], drag[b, 1], drag[b, 2]
+        for t in range(motion.shape[2]):
+            ct, st = load1(cosine[b], t), load1(sine[b], t)
+            vx, vz, V = load1(along[b], t), load1(normal[b], t), load1(speed[b], t)
+            gamma = load1(circulation[b], t) * weight
+            friction = chord * weight * (vx * vx * C_D0 + vz * vz * C_D90) * 0.5 / V
+            if K_d != 0.0:
+                for e in range(LANES):
+                    angle = _attack(along[b, t, e], normal[b, t, e])
+                    curve[e] = 0.5 * K_d * places.chord[e] * curve_drag(angle)
+                friction += load0(curve) * weight * V
+            ub, wb = vx * st + vz * ct, vx * ct - vz * st
+            store1(part, 0, gamma * wb - friction * ub)
+            store1(part, 1, -(gamma * ub) - friction * wb)
+            x = z = 0.0
+            for e in range(LANES):
+                x += part[0, e]
+                z += part[1, e]
+            out[b, 0, t] += x
+            out[b, 1, t] += z * motion[b, PROJECTION, t] * side.sign

@@ -1,0 +1,248 @@
+"""A virtual wind-tunnel balance: force recordings of a DelFly-like vehicle whose coefficients are known.
+
+Vehicle, conditions and coefficients are those of Armanini, Caetano, de Croon, de Visser and Mulder (2016), Tables 3-5
+and 8. Their measured forces are not public; these are what their model says, with the faults of a real balance added.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
+
+from wingfit.records import (
+    ChordStation,
+    Condition,
+    Dataset,
+    PassivePitch,
+    Recording,
+    SplitCycleFlap,
+    Vehicle,
+    WingMotion,
+    save_dataset,
+)
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+
+Array = npt.NDArray[np.float64]
+
+AIR = (101_325.0, 293.15)  # Pa, K: of the tunnel; the source does not say
+DRAG = {"C_D0": 0.0, "C_Dpi2": 2.0}
+"""Drag coefficients, which the source fixes: 0 at zero angle (Table 6); that at 90 degrees cannot be read there, and is
+taken as a flat plate's, 2. It hardly acts on X, to which the coefficients are fitted."""
+LEAD_IN = 4  # beats before the recording begins and after it ends, in which filters settle
+ELEMENTS, INSTANTS = 80, 1600  # the truth is computed more finely than a calibration computes
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One condition of the source's Table 4, the coefficients found there (Table 8), and the vehicle's mass (kg)."""
+
+    name: str
+    condition: Condition
+    coefficients: dict[str, float]
+    mass: float
+
+
+def _trial(number: int, row: Sequence[float]) -> Trial:
+    speed, pitch, frequency, c_l, c_r, c_f = row
+    condition = Condition(frequency, 0.0, *AIR, airspeed=speed, angle_of_attack=math.radians(pitch))
+    mass = 17.4e-3 if speed < 1.0 else 18.4e-3
+    return Trial(f"test-{number}", condition, {"C_l": c_l, "C_r": c_r, "C_F": c_f}, mass)
+
+
+# V m/s, pitch deg, flap frequency Hz; C_l, C_r, C_F
+_TABLES = (
+    (0.30, 83, 13.3, 0.89, 1.49, 1.69),
+    (0.50, 74, 12.5, 1.22, 1.45, 1.57),
+    (0.55, 70, 12.5, 1.20, 1.45, 1.55),
+    (0.65, 71, 12.5, 1.24, 1.44, 1.58),
+    (0.70, 62, 11.7, 1.43, 1.39, 1.61),
+    (0.80, 65, 13.3, 0.90, 1.39, 1.66),
+    (1.00, 45, 11.7, 1.37, 1.41, 1.43),
+    (2.00, 31, 10.3, 2.02, 1.57, 0.67),
+)
+TRIALS = tuple(_trial(k + 1, row) for k, row in enumerate(_TABLES))
+HELD_OUT = ("test-3", "test-7")  # of the example: one amid the others, one off them
+
+
+@dataclass(frozen=True)
+class Balance:
+    """How forces are recorded, and what a balance does to them. Noise is per force axis.
+
+    Attributes:
+        rate: samples per second, Hz; the source's (3.2.2).
+        every: only every so many samples are kept, after an anti-aliasing filter; 1 keeps all.
+        beats: whole beats in a recording; the source's tests lasted some tens.
+        sensor: standard deviation of the white noise of a sample, N. The source's transducer resolves 0.149 gram-force.
+        resonance: natural frequency of the clamped body along x and z, Hz. A body of 17 g on a strut, bent by a
+            fuselage of carbon rod; above the harmonics that are looked at, or the forces could not be read at all.
+        damping: its damping ratio; clamped carbon structures have 1 to 3 %.
+        participation: part of the force that drives the resonance. Small, since the source clamps the body where the
+            forces act, to this end (3.2.2). At 40 Hz it makes the forces 1 % too large: a systematic error.
+        rattle: standard deviation of what motor, gears and the tunnel's 1 % turbulence excite in the resonance, N.
+        drift: standard deviation of the slow drift, N; small, since the zero is taken before each test.
+        drift_time: its correlation time, s; a transducer warms up in seconds to minutes.
+        scatter: relative standard deviation of the force from beat to beat: the flow separates anew in each.
+        timing: standard deviation of the instant at which a beat begins, beats: half a sample of 80 us. The phase comes
+            from a Hall sensor on the mechanism, read with the forces (3.2.2), beat by beat.
+        memory: correlation of the scatter from one beat to the next.
+        decimals: to which forces in N are rounded; below the noise.
+    """
+
+    rate: float = 12_500.0
+    every: int = 1
+    beats: int = 60
+    sensor: float = 1.5e-3
+    resonance: tuple[float, float] = (120.0, 95.0)
+    damping: float = 0.02
+    participation: float = 0.1
+    rattle: float = 8e-3
+    drift: float = 5e-4
+    drift_time: float = 5.0
+    scatter: float = 0.015
+    timing: float = 0.0005
+    memory: float = 0.3
+    decimals: int = 5
+
+
+EXAMPLE = Balance(every=10, beats=28, decimals=4)
+
+
+def delfly() -> Vehicle:
+    """The source's vehicle (Table 3) with the wing motion of Table 5 and Eqs. 17, 20, 21.
+
+    Root and tip chord as printed; the chord half-way out makes the surface of a pair of wings the 2.11 dm^2 of Table 3.
+    ``root_pitch`` is pi/2, a chord along the body: with the zero that is printed, the lift at 2 m/s is a third of the
+    vehicle's weight.
+    """
+    stations = (ChordStation(0.0, 0.085), ChordStation(0.0685, 0.0835), ChordStation(0.137, 0.056))
+    return Vehicle(
+        name="delfly",
+        layout="x4",
+        claps=True,
+        stations=stations,
+        wing_mass=0.29e-3,
+        thickness=1e-5,
+        pitch_axis=0.0,
+        dihedral=0.0,
+        mass=17.4e-3,
+        motion=WingMotion(
+            flap=SplitCycleFlap(amplitude=0.34, bias=0.34, split=0.35),
+            pitch=PassivePitch(0.3139, -1.1382, -0.0179, -0.0002),
+            root_pitch=math.pi / 2,
+        ),
+    )
+
+
+def blank_recording(condition: Condition, name: str = "blank", samples: int = 8) -> Recording:
+    """A recording of x and z over one beat without data, for simulating under ``condition``."""
+    times = np.arange(samples) / (samples * condition.flap_frequency)
+    values = np.full((samples, 2), np.nan)
+    return Recording(name, "wind_tunnel", condition, times, (), values, forces=("x", "z"))
+
+
+def true_beat(vehicle: Vehicle, trial: Trial) -> Array:
+    """Forces [n, 2] along x and z (N) over one beat, from the finely resolved model with the test's coefficients."""
+    model = BladeElementWing(vehicle, elements=ELEMENTS, instants=INSTANTS)
+    values = {gene.name: gene.nominal for gene in model.genes} | DRAG | trial.coefficients
+    return np.asarray(model.beat([list(values.values())], blank_recording(trial.condition))[0])
+
+
+@one_blas_thread
+def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator) -> Recording:
+    """Record the forces ``beat`` [n, 2], in N over one beat, on the balance."""
+    frequency = trial.condition.flap_frequency
+    lead = round(LEAD_IN * balance.rate / frequency)
+    samples = math.ceil(balance.beats * balance.rate / frequency)
+    samples += -samples % balance.every
+    at = np.asarray((np.arange(samples + 2 * lead) - lead) * frequency / balance.rate, np.float64)
+    phase = at + balance.timing * _by_beat(at, 0.0, rng)
+    grid = np.arange(len(beat)) / len(beat)
+    forces = np.stack([np.interp(phase, grid, force, period=1.0) for force in beat.T], axis=1)
+    forces = forces * (1.0 + balance.scatter * _by_beat(at, balance.memory, rng)[:, None])
+    measured = np.stack([_measured(force, k, balance, rng) for k, force in enumerate(forces.T)], axis=1)
+    kept = _thinned(measured, balance.every)[lead : lead + samples : balance.every]
+    return Recording(
+        name=trial.name,
+        rig="wind_tunnel",
+        condition=trial.condition,
+        times=np.round(np.arange(len(kept)) * balance.every / balance.rate, 9),
+        markers=(),
+        values=np.round(kept, balance.decimals),
+        forces=("x", "z"),
+        mass=trial.mass,
+    )
+
+
+def campaign(
+    seed: int = 1,
+    balance: Balance | None = None,
+    trials: Sequence[Trial] = TRIALS,
+    held_out: tuple[str, ...] = (),
+) -> Dataset:
+    """Record ``trials`` on the balance; the same seed gives the same noise."""
+    vehicle = delfly()
+    recordings = tuple(
+        record(true_beat(vehicle, trial), trial, balance or Balance(), np.random.default_rng([seed, 3, k]))
+        for k, trial in enumerate(trials)
+    )
+    text = f"Virtual balance, DelFly-like vehicle, seed {seed}: conditions and coefficients of Armanini et al. 2016"
+    return Dataset("delfly", vehicle, recordings, held_out, text)
+
+
+def write_campaign(path: Path, seed: int = 1, balance: Balance = EXAMPLE) -> Path:
+    """Write the small campaign to ``path`` (folder, .zip or .nc) and the truth beside it; returns the truth's path."""
+    save_dataset(campaign(seed, balance, held_out=HELD_OUT), path)
+    beside = path.with_name(path.stem + ".truth.json")
+    truth = {trial.name: DRAG | trial.coefficients for trial in TRIALS}
+    beside.write_text(json.dumps({"seed": seed, "coefficients": truth}, indent=2) + "\n", encoding="utf-8")
+    return beside
+
+
+def read_truth(path: Path) -> dict[str, dict[str, float]]:
+    """Coefficients by recording that :func:`write_campaign` left beside a dataset."""
+    truth: dict[str, dict[str, float]] = json.loads(path.read_text(encoding="utf-8"))["coefficients"]
+    return truth
+
+
+def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
+    """Unit noise with one value a beat, first-order autoregressive, linear in between; ``at`` [T] in beats."""
+    first = math.floor(at[0]) - 1
+    beats = math.ceil(at[-1]) - first + 2
+    white = rng.standard_normal(beats)
+    values = lfilter([math.sqrt(1 - memory**2)], [1.0, -memory], white)
+    return np.asarray(np.interp(at, first + 0.5 + np.arange(beats), values))
+
+
+def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generator) -> Array:
+    """What the transducer makes of a force [T] along an axis: resonance, drift and white noise added."""
+    b, a = _resonator(balance.resonance[axis], balance.damping, balance.rate)
+    felt = lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
+    rattle = lfilter(b, a, rng.standard_normal(len(force)))
+    rattle *= balance.rattle / max(float(rattle.std()), 1e-300)
+    slow = math.exp(-1 / (balance.rate * balance.drift_time))
+    start = [slow * rng.standard_normal()]  # stationary from the beginning
+    drift, _ = lfilter([math.sqrt(1 - slow**2)], [1.0, -slow], rng.standard_normal(len(force)), zi=start)
+    white = balance.sensor * rng.standard_normal(len(force))
+    return np.asarray(force + balance.participation * (felt - force) + rattle + balance.drift * drift + white)
+
+
+def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Array]:
+    """Digital filter from the force on a damped oscillator to the force that its spring passes on."""
+    omega = 2 * math.pi * frequency
+    b, a = bilinear([omega**2], [1.0, 2 * damping * omega, omega**2], fs=rate)
+    return np.asarray(b), np.asarray(a)
+
+
+def _thinned(forces: Array, every: int) -> Array:
+    """Anti-aliasing filter without phase for keeping every so many samples; ``forces`` [T, C]."""
+    if every == 1:
+        return forces
+    return np.asarray(sosfiltfilt(butter(6, 0.8 / every, output="sos"), forces, axis=0))

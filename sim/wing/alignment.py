@@ -1,0 +1,97 @@
+"""The start of the beat: where the reference markers cross the horizontal on the upstroke (thesis IV-A), interpolated.
+
+Tracks are compared at equal phase of the beat, so the crossing must be known far better than one frame: at the tip a
+phase error of 0.01 rad is millimetres. Heights are reduced to a few harmonics of the beat, averaged over the reference
+markers, and the crossing is found in that series; recording and simulation go through the same reduction.
+"""
+
+from __future__ import annotations
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Recording, Wing
+from wingfit.records.blas_threads import one_blas_thread
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+REFERENCE_HARMONICS = 4
+_NEWTON_STEPS = 30
+_CROSSINGS = WeakKeyDictionary[Recording, dict[tuple[tuple[str, ...], float], float]]()
+"""Of recordings, by what of a wing they depend on: every evaluation asks."""
+
+
+def reference_columns(wing: Wing, recording: Recording) -> list[int]:
+    """Columns (markers of the recording) of the reference markers with enough samples to place the beat.
+
+    Of a recording without any data, all.
+    """
+    needed = 2 * (2 * REFERENCE_HARMONICS + 1) if recording.valid.any() else 0
+    found = [
+        recording.markers.index(name)
+        for name in wing.reference_markers
+        if name in recording.markers
+        and np.isfinite(recording.positions[:, recording.markers.index(name), 2]).sum() >= needed
+    ]
+    if not found:
+        raise ValueError(
+            f"recording {recording.name!r}: none of the reference markers ({', '.join(wing.reference_markers)}) has at "
+            f"least {needed} tracked frames, so the start of the beat cannot be placed; name other reference_markers"
+        )
+    return found
+
+
+@one_blas_thread
+def recorded_crossing(wing: Wing, recording: Recording) -> float:
+    """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke.
+
+    A recording without any data, made to see what it would show, begins there.
+    """
+    known, key = _CROSSINGS.setdefault(recording, {}), (wing.reference_markers, wing.hinge.z)
+    if key not in known:
+        known[key] = _crossing(wing, recording) if recording.valid.any() else 0.0
+    return known[key]
+
+
+def _crossing(wing: Wing, recording: Recording) -> float:
+    psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
+    k = np.arange(1, REFERENCE_HARMONICS + 1)
+    basis = np.hstack([np.ones((len(psi), 1)), np.cos(psi[:, None] * k), -np.sin(psi[:, None] * k)])
+    total = np.zeros(2 * REFERENCE_HARMONICS + 1)
+    columns = reference_columns(wing, recording)
+    for column in columns:
+        z = recording.positions[:, column, 2]
+        seen = np.isfinite(z)
+        total += np.linalg.lstsq(basis[seen], z[seen], rcond=None)[0]
+    total /= len(columns)
+    series = np.concatenate([[total[0]], total[1 : 1 + len(k)] + 1j * total[1 + len(k) :]])
+    crossing = upstroke_crossing(series[None], wing.hinge.z)[0]
+    if not np.isfinite(crossing):
+        raise ValueError(
+            f"recording {recording.name!r}: the reference markers never cross the hinge height "
+            f"({wing.hinge.z:g} m) on an upstroke; check the hinge position, the flap frequency and the time unit"
+        )
+    return float(crossing)
+
+
+def upstroke_crossing(series: Complex, level: float) -> Array:
+    """Phase (rad) at which Re sum_k series[:, k] exp(i k psi) rises through ``level``; NaN where it does not.
+
+    ``series`` has shape [B, K + 1]. Newton's method from the crossing of the first harmonic alone.
+    """
+    k = np.arange(series.shape[1])
+    first = np.abs(series[:, 1])
+    ratio = (level - series[:, 0].real) / np.where(first > 0, first, np.nan)
+    with np.errstate(invalid="ignore"):
+        psi = -np.arccos(ratio) - np.angle(series[:, 1])
+        for _ in range(_NEWTON_STEPS):
+            wave = series * np.exp(1j * k * psi[:, None])
+            value, slope = wave.sum(axis=1).real - level, (1j * k * wave).sum(axis=1).real
+            psi = psi - np.clip(value / slope, -0.3, 0.3)
+        wave = series * np.exp(1j * k * psi[:, None])
+        off = np.abs(wave.sum(axis=1).real - level) > 1e-9 * first
+        falling = (1j * k * wave).sum(axis=1).real <= 0
+    return np.where(off | falling, np.nan, psi)

@@ -1,0 +1,120 @@
+"""Flap angle of the driving rods over the beat, with its first three derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Drive, FourBarDrive, FourierDrive
+
+Array = npt.NDArray[np.float64]
+
+_SAMPLES = 512
+_HARMONICS = 40
+
+
+@dataclass
+class RodDrive:
+    """Flap angles of the front and the rear rod for W individuals, as series of the drive phase.
+
+    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi); the rear rod's lag is in it.
+    """
+
+    series: npt.NDArray[np.complex128]
+
+    @classmethod
+    def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
+        """The drive of a wing, its rear rod ``lag`` (rad) late, the same for all ``lanes``."""
+        own = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
+        k = max(len(own.cosine), len(own.sine))
+        series = np.array([own.mean, *(_padded(own.cosine, k) - 1j * _padded(own.sine, k))], np.complex128)
+        both = np.stack([series, series * np.exp(-1j * lag * np.arange(k + 1))], axis=1)
+        return cls(np.repeat(both[:, :, None], lanes, axis=2))
+
+    def lengthened(self, harmonics: int) -> None:
+        """Make room for ``harmonics`` of the flap frequency."""
+        lacking = max(harmonics + 1 - len(self.series), 0)
+        self.series = np.concatenate([self.series, np.zeros((lacking, *self.series.shape[1:]))])
+
+    def angles(self, psi: Array) -> Array:
+        """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad).
+
+        One individual at a time, and those that are driven alike once: nobody's numbers depend on his neighbours.
+        """
+        phases = np.asarray(psi, float).tobytes()
+        lanes = [self.series[:, :, w].tobytes() for w in range(self.series.shape[2])]
+        found = {series: _angles(phases, series).reshape(*psi.shape, 2, 5) for series in dict.fromkeys(lanes)}
+        return np.stack([found[series] for series in lanes], axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _angles(phases: bytes, both: bytes) -> Array:
+    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Remembered: a batch asks for few, many times."""
+    series = np.frombuffer(both, np.complex128).reshape(-1, 2)
+    turn = _turns(phases, len(series))
+    order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
+    derived = (series[:, :, None] * order.T[:, None]).reshape(len(series), -1)
+    # sums and not matrix products, whose threads would cost more than they do
+    found = np.einsum("tk,kc->tc", turn.real, derived.real) - np.einsum("tk,kc->tc", turn.imag, derived.imag)
+    angles = np.asarray(found.reshape(len(turn), 2, 5))
+    angles.setflags(write=False)
+    return angles
+
+
+@lru_cache(maxsize=4)
+def _turns(phases: bytes, terms: int) -> npt.NDArray[np.complex128]:
+    """exp(i k psi) [T, terms]."""
+    return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
+
+
+def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
+    """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
+    phase = np.asarray(psi, float)
+    series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
+    k = np.arange(1, max(len(series.cosine), len(series.sine)) + 1)
+    a, b = _padded(series.cosine, len(k)), _padded(series.sine, len(k))
+    c, s = np.cos(phase[..., None] * k), np.sin(phase[..., None] * k)
+    angle = series.mean + c @ a + s @ b
+    first = c @ (k * b) - s @ (k * a)
+    second = -(c @ (k**2 * a) + s @ (k**2 * b))
+    third = s @ (k**3 * a) - c @ (k**3 * b)
+    return np.stack([angle, first, second, third], axis=-1)
+
+
+def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:
+    """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
+
+    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is where the circles of the coupler
+    about the crank pin and of the rocker about its pivot meet, on the side that the open linkage keeps.
+    """
+    phase = np.asarray(psi, float)
+    px, py = linkage.crank * np.cos(phase), linkage.crank * np.sin(phase)
+    dx, dy = px - linkage.ground, py
+    diagonal2 = dx**2 + dy**2
+    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # the crank stays on the far side of the rocker's pivot
+    cosine = (linkage.rocker**2 + diagonal2 - linkage.coupler**2) / (2 * linkage.rocker * np.sqrt(diagonal2))
+    if np.any(np.abs(cosine) > 1):
+        raise ValueError(
+            f"four-bar linkage with ground {linkage.ground:g}, crank {linkage.crank:g}, coupler {linkage.coupler:g}, "
+            f"rocker {linkage.rocker:g} m cannot turn a full revolution; shorten the crank"
+        )
+    return np.asarray(along - np.arccos(cosine) + linkage.offset)
+
+
+@lru_cache(maxsize=64)
+def _four_bar_series(linkage: FourBarDrive) -> FourierDrive:
+    """The rocker angle as a Fourier series, exact to round-off for the linkages at hand (coefficients fall fast)."""
+    psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    angle = four_bar_angle(linkage, psi)
+    coefficients = np.fft.rfft(angle) / _SAMPLES
+    head = coefficients[1 : _HARMONICS + 1]
+    return FourierDrive(float(coefficients[0].real), tuple(2 * head.real), tuple(-2 * head.imag))
+
+
+def _padded(values: tuple[float, ...], length: int) -> Array:
+    out = np.zeros(length)
+    out[: len(values)] = values
+    return out

@@ -1,0 +1,335 @@
+"""The flexible wing as a model: genomes in, marker tracks out, sampled and aligned like a recording."""
+
+from __future__ import annotations
+
+import pickle
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Condition, Gene, Recording, Wing
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.ports.observation import Sampling, apply, observed
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.effects.registry import chosen
+from wingfit.sim.kernels import LANES
+from wingfit.sim.model import Observation, Solution, genome_batch
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.solver.settle import Course, Subject
+from wingfit.sim.solver.simulate import Beat, periodic_beats, settled_course
+from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.genes import FACTOR, lanes, wing_genes
+from wingfit.sim.wing.structure import Structure, build
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Places = npt.NDArray[np.intp]
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+LARGEST_SHIFT = 0.05  # rad, about 3 degrees of the beat
+_DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near")
+_MOST_SETTLED = 256
+# Individuals that others begin beside, by wing and condition: models that differ in their effects alone share them.
+_SETTLED: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
+_MOST_BEATS = 64
+# Beats of wings without effects: what cameras make of one and the same is tried over and over.
+_BEATS: OrderedDict[tuple[bytes, Condition, bytes], Beat] = OrderedDict()
+_GRID = 96  # instants of a beat that effects of the observation see
+_HARMONICS = 30  # of the periodic tracks that are kept; the rest is below the integrator's error
+
+
+@dataclass(frozen=True)
+class FlexibleWing:
+    """Multi-body wing driven by two rods (thesis III) for markers seen by cameras.
+
+    ``division`` as :meth:`wingfit.sim.wing.division.Division.parse` reads it; genes are bounded by ``bounds_factor``
+    around the wing's estimates. ``effects`` are names of :data:`wingfit.sim.effects.registry.EFFECTS` whose genes are
+    appended. ``probe`` is a known load that acts besides; its genes follow theirs. ``near``, values of the wing's own
+    genes, says where individuals will be: their search for the periodic motion begins at that of this genome.
+    """
+
+    wing: Wing
+    division: str = "11"
+    bounds_factor: float = FACTOR
+    numerics: Numerics = field(default_factory=Numerics)
+    effects: tuple[str, ...] = ()
+    probe: Probe | None = None
+    near: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        chosen(self.effects, self.wing)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Pickle the definition only; whatever was built from it is built again."""
+        return {name: self.__dict__[name] for name in _DEFINITION}
+
+    @cached_property
+    def genes(self) -> tuple[Gene, ...]:
+        """Structural genes (thesis Eq. 18), aerodynamic ones (Eq. 19), then those of the effects."""
+        own = wing_genes(self.wing.estimates, self.bounds_factor)
+        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing)))
+
+    @cached_property
+    def chosen(self) -> tuple[Effect, ...]:
+        """The effects, in the order in which they act."""
+        known = self.probe.effects() if self.probe else ()
+        return (*chosen(self.effects, self.wing), *known)
+
+    def with_effects(self, *names: str) -> FlexibleWing:
+        """The same wing with more effects; their genes are appended, switched off."""
+        return self._cut_alike(replace(self, effects=(*self.effects, *names)))
+
+    def beside(self, genome: npt.ArrayLike) -> FlexibleWing:
+        """The same wing, which begins its search for a periodic motion at that of ``genome`` [G], without effects."""
+        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
+        return self._cut_alike(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
+
+    def _cut_alike(self, other: FlexibleWing) -> FlexibleWing:
+        """``other``, of the same wing and division, with the bodies that were cut already."""
+        for name in ("structure", "_immersed"):
+            if name in self.__dict__:
+                other.__dict__[name] = self.__dict__[name]
+        return other
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """All genes."""
+        return tuple(gene.name for gene in self.genes)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Bodies and connectors."""
+        return build(self.wing, Division.parse(self.division))
+
+    @cached_property
+    def _immersed(self) -> Structure:
+        """The same, with room in the matrix for air that the bodies of a strip move together."""
+        return build(self.wing, Division.parse(self.division), whole_strips=True)
+
+    def subject(self, effects: tuple[Effect, ...], condition: Condition) -> Subject:
+        """What is simulated where some of the effects are on."""
+        moves_air = any(effect.port == "inertia" and effect.family == "aerodynamics" for effect in effects)
+        structure = self._immersed if moves_air else self.structure
+
+        def scene(genomes: Array) -> WingScene:
+            found = WingScene.of(structure, condition, lanes(structure, self.genes, genomes))
+            filled = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
+            for effect in effects:
+                if effect.wing:
+                    effect.wing(found, effect.values(self.genes, filled))
+            return found
+
+        return Subject(structure, condition, scene)
+
+    def switched_on(self, genome: Array) -> tuple[Effect, ...]:
+        """The effects on the wing itself that are on in ``genome`` [G]."""
+        return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
+
+    @one_blas_thread
+    def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
+        """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
+
+        Individuals with the same effects on are simulated together: one that is off costs nothing and changes nothing.
+        Those whose wings are the same, whatever the cameras make of them, are simulated once and share a beat.
+        """
+        beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion)
+        return tuple(beats[k] for k in wing)
+
+    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Places]:
+        """A beat of each wing that is unlike the others, and which of them [B] an individual is."""
+        first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
+        wings = batch[first]
+        alike: dict[tuple[str, ...], list[int]] = {}
+        for k, one in enumerate(wings):
+            alike.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
+        found: dict[int, Beat] = {}
+        keys = (
+            {k: self._key(wings[k], recording.condition) for k in alike.get((), ())}
+            if self.near and not with_motion
+            else {}
+        )
+        found.update({k: _BEATS[key] for k, key in keys.items() if key in _BEATS})
+        for rows in ([k for k in rows if k not in found] for rows in alike.values()):
+            if not rows:
+                continue
+            subject = self.subject(self.switched_on(wings[rows[0]]), recording.condition)
+            near = self._settled_near(recording.condition) if self.near else None
+            beats = periodic_beats(subject, wings[rows], self.numerics, with_motion=with_motion, near=near)
+            found.update(zip(rows, beats, strict=True))
+        for k, key in keys.items():
+            _remember(_BEATS, key, found[k], _MOST_BEATS)
+        return [found[k] for k in range(len(wings))], wing
+
+    def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
+        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
+        return self._bare_key, condition, genome[:own].tobytes()
+
+    def _settled_near(self, condition: Condition) -> Course | None:
+        """The individual ``near`` under ``condition``, settled; None where it fails."""
+        bare, key = self._bare, (self._bare_key, condition)
+        if key not in _SETTLED:
+            found = settled_course(bare.subject((), condition), np.array(self.near), self.numerics)
+            _remember(_SETTLED, key, found, _MOST_SETTLED)
+        return _SETTLED[key]
+
+    @cached_property
+    def _bare(self) -> FlexibleWing:
+        return self._cut_alike(replace(self, effects=(), probe=None))
+
+    @cached_property
+    def _bare_key(self) -> bytes:
+        return pickle.dumps(self._bare, 5)
+
+    def _acting(self, batch: Array, effects: Sequence[Effect]) -> Array:
+        """``batch`` [B, G] with zeros for genes that change nothing: of other effects, and of those that are off."""
+        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
+        plain = np.zeros_like(batch)
+        plain[:, :own] = batch[:, :own]
+        place = {gene.name: k for k, gene in enumerate(self.genes)}
+        for effect in effects:
+            on = ~effect.off(effect.values(self.genes, batch))
+            for parameter in effect.parameters:
+                column = place[f"{effect.name}.{parameter.name}"]
+                plain[on, column] = batch[on, column]
+        return plain
+
+    def beat(self, genome: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
+        """The same for a single genome [G]."""
+        (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
+        return found
+
+    @one_blas_thread
+    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+        """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
+
+        Beats are aligned by the upstroke crossing; what tracking noise leaves of a phase error is then fitted, the
+        trigger of the cameras being unknown (docs/decisions/0001).
+        """
+        whole = genome_batch(self.genes, genomes)
+        first, same = _distinct(self._acting(whole, self.chosen))
+        batch = whole[first]
+        beats, wing = self._beats(batch, recording, with_motion=False)
+        series, times, added = self._seen(batch, recording, beats, wing)
+        height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
+        own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
+        shift = (times - recording.times).mean(axis=1, keepdims=True)  # of the clock: alignment takes it, however large
+        angles = 2 * np.pi * recording.condition.flap_frequency * (times - shift)
+        since = angles - recorded_crossing(self.wing, recording)
+        reasons = [
+            beats[k].reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
+            for k, phase in zip(wing, own, strict=True)
+        ]
+        channels = _laid_over(series, since, own, recording.values)
+        channels += added
+        solutions = [Solution(len(beats[k].tracks), beats[k].beats, beats[k].error) for k in wing]
+        return Observation(channels[same], tuple(reasons[k] for k in same), tuple(solutions[k] for k in same))
+
+    def _seen(
+        self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Places
+    ) -> tuple[Complex, Array, Array]:
+        """What the cameras make of the beats: series [B, K + 1, C], instants [B, T] (s), what is added [B, T, C].
+
+        ``wing`` [B] says which of the ``beats`` an individual has.
+        """
+        names = [marker.name for marker in self.wing.markers]
+        columns = [names.index(name) for name in recording.markers]
+        series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])[wing]
+        times, added = np.tile(recording.times, (len(batch), 1)), np.zeros((len(batch), *recording.values.shape))
+        effects = observed(self.chosen, self.genes, batch, "tracks")
+        if effects:
+            on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
+            changed = np.flatnonzero(np.any(on, axis=0))
+            grids = {k: _on_grid(beats[k].tracks) for k in dict.fromkeys(wing[changed].tolist())}
+            for start in range(0, len(changed), LANES):  # blocks that stay in the cache
+                block = changed[start : start + LANES]
+                beat = np.stack([grids[k] for k in wing[block].tolist()])
+                sampling = Sampling(self.wing, recording, beat, times[block], added[block])
+                apply(effects, self.genes, batch[block], sampling)
+                shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
+                series[block] = [_series(one) for one in shown]
+                times[block], added[block] = sampling.times, sampling.added
+        return series, times, added
+
+
+def _distinct(rows: Array) -> tuple[Places, Places]:
+    """Numbers of the first of each kind of row, and for every row which kind it is; alike is equal bit for bit."""
+    first = dict[bytes, int]()
+    kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]
+    return np.unique(kinds, return_index=True)[1], np.array(kinds, np.intp)
+
+
+def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int) -> None:
+    """Keep ``value``, and forget what was kept longest ago beyond ``most``."""
+    known[key] = value
+    while len(known) > most:
+        known.popitem(last=False)
+
+
+def _on_grid(tracks: Array) -> Array:
+    """Periodic tracks [n, M, 3] at _GRID equal steps, by the harmonics that are kept."""
+    series = _series(tracks.reshape(len(tracks), -1))
+    series[1:] *= 0.5
+    return np.asarray(np.fft.irfft(series * _GRID, _GRID, axis=0)).reshape(_GRID, *tracks.shape[1:])
+
+
+def _laid_over(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
+    """Values [B, T, C] of ``series`` [B, K + 1, C] at phases ``since`` [B, T] plus ``own`` [B].
+
+    Each individual's phases are moved together to where they fit ``recorded`` [T, C] best: least squares in the common
+    phase by Gauss-Newton; one step is exact to second order in a shift that noise makes about a thousandth of a radian.
+    A shift beyond LARGEST_SHIFT is a misfit and not noise, and is left to be seen.
+
+    A common phase turns the series, and the frames' own sines and cosines stay: most individuals share them.
+    """
+    weight = np.isfinite(recorded).astype(float)
+    target = np.where(np.isfinite(recorded), recorded, 0.0)
+    first, which = _distinct(since)
+    angles = since[first, :, None] * np.arange(series.shape[1])
+    waves = np.concatenate([np.cos(angles), np.sin(angles)], axis=2)
+    found = np.empty((len(series), *recorded.shape))
+    for values, one, place, k in zip(found, series, own, which, strict=True):
+        values[:] = _fitted(waves[k], _turned(one, place), target, weight)
+    return found
+
+
+def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Array:
+    """Values [T, C] of one ``series`` [K + 1, C], moved to where it fits ``target`` [T, C] under a ``weight`` [T, C].
+
+    ``waves`` [T, 2 (K + 1)]: cosines, then sines, of the frames' phases.
+    """
+    order = 1j * np.arange(len(series))[:, None]
+    for _ in range(2):
+        slope = weight * (waves @ _parts(order * series))
+        power = float((slope * slope).sum())
+        shift = -float((slope * (waves @ _parts(series) - target)).sum()) / power if power > 0 else 0.0
+        series = _turned(series, np.clip(shift, -LARGEST_SHIFT, LARGEST_SHIFT))
+    return waves @ _parts(series)
+
+
+def _turned(series: Complex, phase: float) -> Complex:
+    """The series [K + 1, C] of what is ``phase`` (rad) ahead."""
+    return np.asarray(series * np.exp(1j * np.arange(len(series)) * phase)[:, None])
+
+
+def _parts(series: Complex) -> Array:
+    """What cosines, then sines, are multiplied by [2 (K + 1), C]: Re s exp(i x) = Re s cos x - Im s sin x."""
+    return np.concatenate([series.real, -series.imag])
+
+
+def _series(samples: Array) -> Complex:
+    """Fourier series [_HARMONICS + 1, C] of periodic samples [n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
+    n = len(samples)
+    kept = min(_HARMONICS, (n - 1) // 2) + 1
+    series = np.zeros((_HARMONICS + 1, samples.shape[1]), np.complex128)
+    series[:kept] = np.fft.rfft(samples, axis=0)[:kept] / n
+    series[1:] *= 2
+    return series

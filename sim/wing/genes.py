@@ -1,0 +1,130 @@
+"""The genes of the flexible wing (thesis Eqs. 18 and 19) and what they set in the lanes of the kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import EstimateError, Gene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import Lanes, Laws
+from wingfit.sim.kernels.lanes.memory import aligned
+from wingfit.sim.wing.structure import QUARTERS, Structure, spring_constants
+
+Array = npt.NDArray[np.float64]
+Group = Literal["structure", "aerodynamics"]
+
+UNIT_SLIP = 1e4  # an estimate further than this from the typical value is taken for a wrong unit
+FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
+
+# name, unit, default estimate, description
+_STRUCTURE = (
+    ("E_f", "Pa", 6.0e6, "Young's modulus of the foam with its skin"),
+    ("E_r", "Pa", 1.2e11, "Young's modulus of the carbon rods with their glue"),
+    ("G_f", "Pa", 2.2e6, "shear modulus of the foam with its skin"),
+    ("G_r", "Pa", 3.0e9, "shear modulus of the carbon rods with their glue"),
+    ("D_E", "Pa s", 6.0e4, "damping that goes with Young's modulus of the foam"),
+    ("D_G", "Pa s", 2.5e4, "damping that goes with the shear modulus of the foam"),
+)
+_AERODYNAMICS = (
+    ("L_a", "1/rad", 4.0, "slope of the lift coefficient with angle of attack"),
+    ("L_b", "1", 0.3, "lift coefficient at zero angle of attack"),
+    ("ID_a", "1/rad", 0.8, "slope of the induced-drag coefficient with the magnitude of the angle of attack"),
+    ("ID_b", "1", 0.08, "induced-drag coefficient at zero angle of attack"),
+)
+_SHARES = (0.4, 0.3, 0.2, 0.1)
+
+_NO_LAW = np.zeros((0, 6), np.int64)
+NO_LAWS = Laws(
+    _NO_LAW, _NO_LAW, np.zeros(0, np.int64), np.zeros((0, LANES)), np.zeros(0), np.zeros((0, LANES))
+)  # fmt: skip
+
+STRUCTURAL = tuple(row[0] for row in _STRUCTURE)
+AERODYNAMIC = (
+    *(row[0] for row in _AERODYNAMICS),
+    *(f"L_{k}" for k in range(1, QUARTERS + 1)),
+    *(f"ID_{k}" for k in range(1, QUARTERS + 1)),
+)
+
+
+def group(name: str) -> Group:
+    """Whether a gene belongs to the structure or to the aerodynamics."""
+    return "structure" if name in STRUCTURAL else "aerodynamics"
+
+
+def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[Gene, ...]:
+    """All genes, bounded by ``factor`` around the estimates; EstimateError for an unknown or implausible estimate."""
+    rows = [*_STRUCTURE, *_AERODYNAMICS]
+    for prefix, what in (("L", "lift"), ("ID", "induced drag")):
+        for k, share in enumerate(_SHARES, 1):
+            rows.append((f"{prefix}_{k}", "1", share, f"weight of the strip's {what} on quarter {k} of the chord"))
+    known = [row[0] for row in rows]
+    for name, value in estimates.items():
+        if name not in known:
+            raise EstimateError(f"estimate for unknown gene {name!r}; the flexible wing has {', '.join(known)}")
+        unit, typical = next((row[1], row[2]) for row in rows if row[0] == name)
+        if not (np.isfinite(value) and typical / UNIT_SLIP <= value <= typical * UNIT_SLIP):
+            raise EstimateError(
+                f"estimate of gene {name!r} is {value:g} {unit}; it must lie in "
+                f"[{typical / UNIT_SLIP:g}, {typical * UNIT_SLIP:g}] {unit}: check its unit"
+            )
+    return tuple(_gene(name, unit, estimates.get(name, default), text, factor) for name, unit, default, text in rows)
+
+
+def _gene(name: str, unit: str, nominal: float, text: str, factor: float) -> Gene:
+    share = {"L_1": "L", "L_2": "L", "L_3": "L", "L_4": "L"}.get(name)
+    if name.startswith("ID_") and name[3:].isdigit():
+        share = "ID"
+    return Gene(name, unit, nominal, nominal / factor, nominal * factor, "log", text, share)
+
+
+def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lanes:
+    """Stiffness, damping and air coefficients of up to LANES genomes [B, G]; spare lanes repeat the last one."""
+    column = {gene.name: k for k, gene in enumerate(genes)}
+    padded = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
+
+    def value(name: str) -> Array:
+        return padded[:, column[name]]
+
+    # rods: E_r I_r in bending (rotations), G_r A_r across (translations), thesis Eqs. 15-16
+    foam, rod, lost = (
+        np.array([value(along), value(across)]) for along, across in (("E_f", "G_f"), ("E_r", "G_r"), ("D_E", "D_G"))
+    )
+    stiffness = spring_constants(structure.connectors, foam, rod)
+    damping = np.array([c.foam[:, None] * lost[list(c.modulus)] for c in structure.connectors])
+    shares, places, hinge = {}, {}, structure.wing.hinge
+    for prefix in ("L", "ID"):
+        weights = np.array([value(f"{prefix}_{k}") for k in range(1, QUARTERS + 1)])
+        shares[prefix], places[prefix] = _distribute(structure, weights / weights.sum(axis=0))
+    return Lanes(
+        stiffness=aligned(stiffness),
+        damping=aligned(damping),
+        coefficients=aligned([value(name) for name in ("L_a", "L_b", "ID_a", "ID_b")]),
+        lift_share=aligned(shares["L"]),
+        lift_x=aligned(places["L"]),
+        drag_share=aligned(shares["ID"]),
+        drag_x=aligned(places["ID"]),
+        hinge=aligned(np.repeat([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, hinge.y, hinge.z], LANES).reshape(9, LANES)),
+        coupling=np.zeros((0, 9, LANES)),
+        pairs=np.zeros((0, 3), np.int64),
+        masses=np.zeros((0, 36, LANES)),
+        weighing=0,
+        laws=NO_LAWS,
+    )
+
+
+def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
+    """Share [N, W] of the strip's force on each body, and where along the chord [N, W] it acts in the body's frame.
+
+    The shares belong to the quarters of the chord, whatever the division: a body takes what its stretch of chord
+    covers, at the centroid of what it takes.
+    """
+    share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
+    for body, quarter, width, x in structure.stretches:
+        part = quarters[quarter] * width * QUARTERS
+        share[body] += part
+        moment[body] += part * x
+    return share, moment / share

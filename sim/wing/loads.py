@@ -1,0 +1,85 @@
+"""Loads of a wing under a condition, solved well enough for loads (``wingfit.sim.wing.outputs`` says what they are)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Recording
+from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.model import Solution
+from wingfit.sim.solver.numerics import LADDER
+from wingfit.sim.solver.simulate import Beat
+from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.outputs import Outputs, from_motion
+
+Array = npt.NDArray[np.float64]
+
+LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
+CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro
+
+
+@one_blas_thread
+def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
+    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails.
+
+    The steps are raised until the balance of the beat closes to CLOSING, unless somebody has chosen them.
+    """
+    beat = _fine(model).beat(genome, recording, with_motion=True)
+    if beat.reason is not None:  # what cannot be had that well can perhaps be had as well as tracks
+        beat = model.beat(genome, recording, with_motion=True)
+    if beat.reason is not None:
+        raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
+    found = _outputs(model, genome, recording, beat)
+    for steps in (n for n in LADDER if n > len(beat.tracks) and model.numerics.steps is None):
+        if abs(found.balance.relative_closing) <= CLOSING:
+            break
+        finer = replace(model, numerics=replace(model.numerics, steps=steps, periodic=0.25 * LOAD_ACCURACY))
+        closer = finer.beat(genome, recording, with_motion=True)
+        if closer.reason is not None:
+            break
+        found = _outputs(model, genome, recording, replace(closer, error=beat.error))
+    return found
+
+
+def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording, beat: Beat) -> Outputs:
+    if beat.motion is None:
+        raise AssertionError("a beat without its motion")
+    genomes = np.asarray(genome, float)[None]
+    scene = model.subject(model.switched_on(genomes[0]), recording.condition).scene(genomes)
+    found = from_motion(scene, beat.motion, crossing(model, recording, beat.tracks))
+    return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
+
+
+def _fine(model: FlexibleWing) -> FlexibleWing:
+    """The model solved to LOAD_ACCURACY or better, unless somebody has chosen the steps.
+
+    Loads are differences of stiff springs' ends, and losses are small beside what swings to and fro: they need more
+    than tracks that are a tenth of a millimetre right.
+    """
+    if model.numerics.steps is not None:
+        return model
+    accuracy = min(LOAD_ACCURACY, model.numerics.accuracy)
+    return replace(model, numerics=replace(model.numerics, accuracy=accuracy))
+
+
+def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
+    """Drive phase (beats) of the upstroke crossing of ``tracks`` [n, M, 3]; 0 where there is none.
+
+    By the markers that place the recording, so that both phases agree; by all reference markers where nothing was
+    recorded.
+    """
+    names = [marker.name for marker in model.wing.markers]
+    try:
+        references: Sequence[str] = [recording.markers[c] for c in reference_columns(model.wing, recording)]
+    except ValueError:
+        references = model.wing.reference_markers
+    height = tracks[:, [names.index(name) for name in references], 2].mean(axis=1)
+    spectrum = np.fft.rfft(height)[: REFERENCE_HARMONICS + 1] / len(height)
+    spectrum[1:] *= 2
+    found = upstroke_crossing(spectrum[None], model.wing.hinge.z)[0] / (2 * np.pi)
+    return float(found % 1.0) if np.isfinite(found) else 0.0

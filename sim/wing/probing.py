@@ -1,0 +1,233 @@
+"""What a flexible wing answers to known loads, and how it moves where they act: what a missing load is found by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Recording
+from wingfit.sim.atmosphere import density
+from wingfit.sim.effects.probe import Probe, strip_middles
+from wingfit.sim.kernels.arrays import State
+from wingfit.sim.model import Observation, genome_batch
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.loads import crossing
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+MOVES = 2e-3  # of the span: how far a load should move the marker that it moves most
+FAR = 4.0  # times that, or a part of it as small, which is still taken
+CLOSE = 2e-3  # of that: how near to the periodic motion
+_MOST_BEATS = 60
+_PART_OF_WEIGHT = 0.5  # of the wing: a load to begin with
+_GRAVITY = 9.81
+
+
+@dataclass(frozen=True)
+class StationMotion:
+    """How the wing moves at J stations of the span over N instants of a beat, from its start on.
+
+    Attributes:
+        stations: [J] parts of the span.
+        phase: [N] beats from the start of the beat, as recordings are placed.
+        velocity: [J, N] of the wing through the air along its normal (upward), m/s.
+        forward: [J, N] of the wing through the air along its chord, from trailing to leading edge, m/s.
+        acceleration: [J, N] along the normal, m/s^2.
+        deflection: [J, N] along the normal, from where the rods would carry a rigid wing, m.
+        pitch_rate: [J, N] nose up, rad/s.
+        chord: [J] m.
+        mass: [J] of the wing per metre of span, kg/m.
+        density: of the air, kg/m^3.
+        airspeed: m/s.
+        flap_frequency: Hz.
+    """
+
+    stations: Array
+    phase: Array
+    velocity: Array
+    forward: Array
+    acceleration: Array
+    deflection: Array
+    pitch_rate: Array
+    chord: Array
+    mass: Array
+    density: float
+    airspeed: float
+    flap_frequency: float
+
+
+@dataclass(frozen=True)
+class Probed:
+    """``responses`` [T, C, P] of a recording to the P unit loads of a probe, m per N/m or N; NaN where one fails.
+
+    ``crossing``: drive phase (beats) at which the recorded beat starts; ``motion`` at the stations of the probe.
+    """
+
+    responses: Array
+    crossing: float
+    motion: StationMotion
+
+
+def probed(
+    model: FlexibleWing, genome: npt.ArrayLike, recording: Recording, probe: Probe, instants: int = 72
+) -> Probed:
+    """Responses and motion about ``genome`` [G]; ValueError with the reason where that cannot be simulated.
+
+    One-sided differences, all with the steps of the wing without loads, so that the integrator's errors cancel. A load
+    that moves the wing far more or less than MOVES is tried once more in proportion.
+    """
+    base = genome_batch(model.genes, genome)
+    near = model.beside(base[0])
+    beat = near.beat(base[0], recording, with_motion=True)
+    if beat.reason is not None or beat.motion is None:
+        raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
+    aim = MOVES * _span(model)
+    numerics = replace(model.numerics, steps=len(beat.tracks), periodic=CLOSE * aim, max_beats=_MOST_BEATS)
+    probing = replace(near, numerics=numerics, probe=probe)
+    sizes = np.repeat(_sizes(model, probe), 1 + 2 * probe.harmonics)
+    found = np.full((probe.size, *recording.values.shape), np.nan)
+    tried = np.arange(probe.size)
+    for _ in range(2):
+        change, reasons = _changes(probing, base[0], recording, tried, sizes[tried])
+        good = np.array([reason is None for reason in reasons])
+        found[tried[good]] = change[good] / sizes[tried[good], None, None]
+        moved = np.where(good, np.abs(change).max(axis=(1, 2)), FAR**2 * aim)
+        off = (moved > FAR * aim) | (moved < aim / FAR)
+        sizes[tried] *= aim / np.maximum(moved, aim / FAR**4)
+        tried = tried[off]
+        if not len(tried):
+            break
+    start = crossing(model, recording, beat.tracks)
+    motion = station_motion(model, recording, beat.motion, start, np.array(probe.stations), instants)
+    return Probed(np.moveaxis(found, 0, -1), start, motion)
+
+
+def _span(model: FlexibleWing) -> float:
+    return model.wing.stations[-1].y - model.wing.stations[0].y
+
+
+def _sizes(model: FlexibleWing, probe: Probe) -> Array:
+    """Loads [stations], or twice as many, to begin with, N/m and N: a part of the wing's weight. Turns of rods, deg.
+
+    More where forces have little lever; moments as of forces at a quarter of the chord.
+    """
+    weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
+    forces = _PART_OF_WEIGHT * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1)
+    edges = model.structure.planform.strips(model.structure.division)
+    chord = float(np.mean(model.structure.planform.chord(edges)))
+    turning = np.full(len(forces), forces.min() * chord)
+    turns = np.full(2, np.degrees(MOVES))
+    return np.concatenate([forces, turning][: 1 + probe.turning] + [turns] * probe.driving)
+
+
+def _changes(
+    model: FlexibleWing, genome: Array, recording: Recording, which: npt.NDArray[np.int64], sizes: Array
+) -> tuple[Array, tuple[str | None, ...]]:
+    """What loads of ``sizes`` [B] change in the channels [B, T, C], and why one failed."""
+    batch = np.zeros((len(which) + 1, len(model.genes)))
+    batch[:, : len(genome)] = genome
+    batch[np.arange(1, len(batch)), len(genome) + which] = sizes
+    seen: Observation = model.observe(batch, recording)
+    if seen.reasons[0] is not None:
+        raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {seen.reasons[0]}")
+    return np.asarray(seen.channels[1:] - seen.channels[0]), seen.reasons[1:]
+
+
+def station_motion(
+    model: FlexibleWing, recording: Recording, motion: State, start: float, stations: Array, instants: int
+) -> StationMotion:
+    """The motion of a beat at ``stations`` and at equal steps from drive phase ``start`` (beats) on.
+
+    A station moves as the strips on both sides of it do, in proportion; beyond the last middle of a strip likewise.
+    """
+    structure, condition = model.structure, recording.condition
+    a, frequency = condition.angle_of_attack, condition.flap_frequency
+    wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
+    place, normal, chordwise, turning, rigid = _strips(structure, motion)
+    rate = _derivative(place, frequency)
+    through = rate - wind
+    across = (through * normal).sum(axis=-1)
+    series = np.stack(
+        [
+            across,
+            -(through * chordwise).sum(axis=-1),
+            (_derivative(rate, frequency) * normal).sum(axis=-1),
+            ((place - rigid) * normal).sum(axis=-1),
+            turning,
+        ]
+    )  # [5, n, S]
+    weights = _between(strip_middles(structure), stations)
+    velocity, forward, acceleration, deflection, pitch_rate = _resampled(
+        np.einsum("qns,js->qjn", series, weights), start, instants
+    )
+    edges = structure.planform.strips(structure.division)
+    mass = np.add.reduceat(structure.wiring.mass, structure.wiring.strip_start[:-1]) / np.diff(edges)
+    return StationMotion(
+        stations,
+        np.arange(instants) / instants,
+        velocity,
+        forward,
+        acceleration,
+        deflection,
+        pitch_rate,
+        chord=structure.planform.chord(edges[0] + stations * (edges[-1] - edges[0])),
+        mass=np.interp(stations, strip_middles(structure), mass),
+        density=density(condition.pressure, condition.temperature),
+        airspeed=condition.airspeed,
+        flap_frequency=frequency,
+    )
+
+
+def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, Array, Array]:
+    """Place, normal, chord direction [n, S, 3] and pitch rate [n, S] of each strip, and where rigid rods carry it."""
+    w, count = structure.wiring, len(structure.bodies)
+    starts = w.strip_start[:-1]
+    R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
+    local = np.concatenate([w.centroid, np.zeros((count, 1))], axis=1)
+    place = motion.p[:, :count] + np.einsum("tnij,nj->tni", R[:, :count], local)
+
+    def mean(values: Array) -> Array:
+        return np.asarray(np.add.reduceat(w.weight[:, None] * values, starts, axis=-2))
+
+    chordwise = mean(R[:, :count, :, 0])
+    chordwise /= np.linalg.norm(chordwise, axis=-1, keepdims=True)
+    normal = mean(R[:, :count, :, 2])
+    normal -= (normal * chordwise).sum(axis=-1, keepdims=True) * chordwise
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    hinge = np.array([0.0, structure.wing.hinge.y, structure.wing.hinge.z])
+    rest = mean(np.array([body.centre for body in structure.bodies]) + local) - hinge
+    rigid = motion.p[:, count, None] + np.einsum("trij,sj->trsi", R[:, count:], rest).mean(axis=1)
+    turning = mean(motion.V[:, :count, 1:2])[..., 0]
+    return mean(place), normal, chordwise, turning, rigid
+
+
+def _between(middles: Array, stations: Array) -> Array:
+    """Weights [J, S] of strips whose middles are on both sides of each station."""
+    inner = np.clip(np.searchsorted(middles, stations) - 1, 0, len(middles) - 2)
+    part = (stations - middles[inner]) / (middles[inner + 1] - middles[inner])
+    weights = np.zeros((len(stations), len(middles)))
+    weights[np.arange(len(stations)), inner] = 1.0 - part
+    weights[np.arange(len(stations)), inner + 1] = part
+    return weights
+
+
+def _derivative(series: Array, frequency: float) -> Array:
+    """By time, of periodic values [n, ...] over a beat."""
+    n = len(series)
+    order = 2j * np.pi * frequency * np.arange(n // 2 + 1)
+    order[n // 2 :] *= n % 2  # the highest of an even number has no derivative
+    spectrum = np.fft.rfft(series, axis=0) * order.reshape(-1, *[1] * (series.ndim - 1))
+    return np.asarray(np.fft.irfft(spectrum, n, axis=0))
+
+
+def _resampled(values: Array, start: float, instants: int) -> Array:
+    """Periodic values [..., n] at ``instants`` equal steps from ``start`` (beats) on."""
+    n = values.shape[-1]
+    kept = min(n, instants) // 2
+    series = np.fft.rfft(values)[..., :kept] / n
+    series[..., 1:] *= 2
+    turn = np.exp(2j * np.pi * (start + np.arange(instants) / instants)[:, None] * np.arange(kept))
+    return np.asarray(np.einsum("...k,tk->...t", series, turn).real)

@@ -1,0 +1,317 @@
+"""From a wing and a division to bodies, connectors and the matrix structure: everything that no gene changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Rod, Wing
+from wingfit.sim.kernels.arrays import Wiring
+from wingfit.sim.solver.elimination import eliminate
+from wingfit.sim.wing.division import Division
+from wingfit.sim.wing.planform import Body, Panel, Planform, bodies, marker_carriers
+from wingfit.sim.wing.sections import Rectangle, round_area, round_second_moment
+
+Array = npt.NDArray[np.float64]
+
+# Rows of Connector.foam and .rods: rotation about x, y, z, then translation along x, y, z, each a rigidity per modulus.
+# Which foam modulus governs each row, for a connection along the span (y) and along the chord (x): thesis Eqs. 15-17.
+YOUNG, SHEAR = 0, 1
+SPANWISE_MODULUS = (YOUNG, SHEAR, YOUNG, SHEAR, YOUNG, SHEAR)
+CHORDWISE_MODULUS = (SHEAR, YOUNG, YOUNG, YOUNG, SHEAR, SHEAR)
+QUARTERS = 4  # of the chord, to which shares of lift and induced drag belong
+_DRIVEN_GAP = 0.02  # m between the root and the start of a driven rod, at most
+
+
+@dataclass(frozen=True)
+class Connector:
+    """Spring and damper between two bodies at ``point`` (wing frame); ``first`` is -1 or -2 for a driving rod.
+
+    ``foam`` [6] and ``rods`` [S, 6] are second moments (m^4) and areas (m^2) divided by the distance between the
+    bodies' centroids; times the modulus named by ``modulus`` they are stiffnesses (thesis Eqs. 15-16 over a length).
+    ``parts`` [S] are the parts of that distance, from its inner end, over which ``rods`` lie beside the foam.
+    """
+
+    first: int
+    second: int
+    point: Array
+    foam: Array
+    parts: Array
+    rods: Array
+    modulus: tuple[int, ...]
+
+
+def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array) -> Array:
+    """Stiffness [C, 6, W] in N m/rad and N/m, from Young's and the shear modulus [2, W] of foam and of rods (Pa).
+
+    Thesis Eqs. 15-16 over each part of the distance, and the parts one after the other: all bear the same moment, so
+    that it is their compliances that add. Adding stiffnesses by length would treat a rod ten times as stiff as the foam
+    as if it nearly closed the gap beyond its end: of first order, where this is of second (docs/beams.md).
+    """
+    beside = np.array([c.foam for c in connectors])[:, :, None] * foam[np.array([c.modulus for c in connectors])]
+    modulus = np.repeat(rod, 3, axis=0)
+    compliance = np.zeros_like(beside)
+    with np.errstate(divide="ignore"):  # where neither foam nor rod is, there is no spring
+        for k in range(len(connectors[0].parts)):
+            part = np.array([c.parts[k] for c in connectors])[:, None, None]
+            stiffness = beside + np.array([c.rods[k] for c in connectors])[:, :, None] * modulus
+            compliance += np.divide(part, stiffness, out=np.zeros_like(stiffness), where=part > 0)
+        return np.asarray(1 / compliance)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A wing cut into bodies. ``position``: number of the matrix's block for two bodies that it joins."""
+
+    wing: Wing
+    division: Division
+    planform: Planform
+    panels: tuple[Panel, ...]
+    bodies: tuple[Body, ...]
+    connectors: tuple[Connector, ...]
+    wiring: Wiring
+    position: dict[tuple[int, int], int]
+
+    @cached_property
+    def stretches(self) -> tuple[tuple[int, int, float, float], ...]:
+        """Which bodies lie under which quarters of the chord.
+
+        Each as body, quarter, part of the chord that they share, and x (m) of its middle in the body's frame.
+        """
+        edges = np.linspace(0, 1, QUARTERS + 1).tolist()
+        return tuple(
+            (n, q, s1 - s0, self.planform.x(0.5 * (s0 + s1), 0.5 * (panel.y0 + panel.y1)) - self.bodies[n].centre[0])
+            for n, panel in enumerate(self.panels)
+            for q, (low, high) in enumerate(pairwise(edges))
+            if (s1 := min(panel.s1, high)) > (s0 := max(panel.s0, low))
+        )
+
+
+def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Structure:
+    """Cut ``wing``; ValueError when a driven rod does not reach the root.
+
+    With ``whole_strips`` the matrix joins all bodies of a strip, as the air that they move together does.
+    """
+    planform = Planform(wing)
+    panels = planform.panels(division)
+    parts = bodies(planform, panels)
+    connectors = [
+        *_along_span(planform, division, parts),
+        *_along_chord(planform, division, panels, parts),
+        *_at_root(planform, division, parts),
+    ]
+    wiring, position = _wiring(planform, division, panels, parts, connectors, whole_strips)
+    return Structure(wing, division, planform, tuple(panels), tuple(parts), tuple(connectors), wiring, position)
+
+
+def _twisting(planform: Planform, y: float) -> float:
+    """Torsion constant per width (m^3) of the whole chord at ``y``: cuts make no new edges."""
+    chord = float(planform.chord(y))
+    return Rectangle(chord, float(planform.thickness(y))).torsion / chord
+
+
+def _spanwise_share(count: int) -> float:
+    """Part of the torsion constant that spanwise connectors bear where the chord is cut into ``count`` bodies.
+
+    Of any section's torque the shear along the section gives half and the shear across it the other half, so that
+    spanwise and chordwise connectors twist with half of the constant each, and only chordwise ones at (count - 1)/count
+    of the chord: the spanwise ones take the rest. One body along the chord: all.
+    """
+    return 0.5 * (1 + 1 / count)
+
+
+def _rigidities(section: Rectangle, torsion: float, along_span: bool) -> Array:
+    A = section.area
+    if along_span:
+        return np.array([section.flapwise, torsion, section.inplane, A, A, A])
+    return np.array([torsion, section.flapwise, section.inplane, A, A, A])
+
+
+def _rod_rigidities(diameter: float) -> Array:
+    """Per modulus: E_r I_r about x and z, G_r A_r along x and z; nothing along or about the span: the rod slides."""
+    second, A = round_second_moment(diameter), round_area(diameter)
+    return np.array([second, 0.0, second, A, 0.0, A])
+
+
+def _x_of(rod: Rod, y: float) -> float:
+    """x of the rod's line at ``y``, m."""
+    return rod.x_root + (y - rod.y_root) / (rod.y_tip - rod.y_root) * (rod.x_tip - rod.x_root)
+
+
+def _piece(planform: Planform, rod: Rod, y: float, count: int) -> int:
+    """Which of ``count`` pieces of the chord at ``y`` holds the rod."""
+    return min(int(planform.fraction(_x_of(rod, y), y) * count), count - 1)
+
+
+def _lying(planform: Planform, through: list[Rod], y0: float, y1: float) -> tuple[Array, Array]:
+    """``Connector.parts`` and ``.rods`` of some rods between y0 and y1; equally many parts for every connector."""
+    ends = [end for rod in planform.wing.rods for end in (rod.y_root, rod.y_tip)]
+    cuts = np.sort(np.clip([y0, *ends, y1], y0, y1))
+    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    rods = np.zeros((len(middle), 6))
+    for rod in through:
+        rods += np.outer((rod.y_root <= middle) & (middle <= rod.y_tip), _rod_rigidities(rod.diameter))
+    return np.diff(cuts) / (y1 - y0), rods / (y1 - y0)
+
+
+def _through(
+    planform: Planform, division: Division, strip: int, y0: float, y1: float
+) -> dict[tuple[int, int], list[Rod]]:
+    """Rods between the centroids y0, y1 of a strip and the next, by the bodies that hold them there.
+
+    So a rod that moves from one piece of the chord to the next is a chain from body to body, never broken. One that
+    ends or begins in between lies in pieces that face each other.
+    """
+    found: dict[tuple[int, int], list[Rod]] = {}
+    for rod in planform.wing.rods:
+        start, end = max(rod.y_root, y0), min(rod.y_tip, y1)
+        if end <= start:
+            continue
+        inner = _piece(planform, rod, start if start == y0 else end, division.bodies[strip])
+        outer = _piece(planform, rod, end if end == y1 else start, division.bodies[strip + 1])
+        pair = division.index(strip, inner), division.index(strip + 1, outer)
+        found.setdefault(pair, []).append(rod)
+    return found
+
+
+def _along_span(planform: Planform, division: Division, parts: list[Body]) -> list[Connector]:
+    found = []
+    edges = planform.strips(division)
+    for strip in range(len(division.bodies) - 1):
+        y = float(edges[strip + 1])
+        inner, outer = division.bodies[strip], division.bodies[strip + 1]
+        y0, y1 = (float(parts[division.index(s, 0)].centroid[1]) for s in (strip, strip + 1))
+        through = _through(planform, division, strip, y0, y1)
+        twisting = _twisting(planform, y) * 0.5 * (_spanwise_share(inner) + _spanwise_share(outer))
+        for i, j, s0, s1 in _facing(inner, outer):
+            pair = division.index(strip, i), division.index(strip + 1, j)
+            section = Rectangle((s1 - s0) * float(planform.chord(y)), float(planform.thickness(y)))
+            foam = _rigidities(section, twisting * section.width, True) / (y1 - y0)
+            point = np.array([planform.x(0.5 * (s0 + s1), y), y, 0.0])
+            rods = _lying(planform, through.pop(pair, []), y0, y1)
+            found.append(Connector(*pair, point, foam, *rods, SPANWISE_MODULUS))
+        for pair, rods_alone in through.items():
+            point = np.array([np.mean([_x_of(rod, y) for rod in rods_alone]), y, 0.0])
+            rods = _lying(planform, rods_alone, y0, y1)
+            found.append(Connector(*pair, point, np.zeros(6), *rods, SPANWISE_MODULUS))
+    return found
+
+
+def _facing(inner: int, outer: int) -> list[tuple[int, int, float, float]]:
+    """Pieces of two cuts of the chord that touch: their numbers, and from and to which fraction of the chord."""
+    both = [
+        (i, j, max(i / inner, j / outer), min((i + 1) / inner, (j + 1) / outer))
+        for i in range(inner)
+        for j in range(outer)
+    ]
+    return [touching for touching in both if touching[3] - touching[2] > 1e-9]
+
+
+def _along_chord(planform: Planform, division: Division, panels: list[Panel], parts: list[Body]) -> list[Connector]:
+    found = []
+    for strip, count in enumerate(division.bodies):
+        for k in range(count - 1):
+            first, second = division.index(strip, k), division.index(strip, k + 1)
+            panel = panels[first]
+            y = 0.5 * (panel.y0 + panel.y1)
+            length = parts[second].centroid[0] - parts[first].centroid[0]
+            section = Rectangle(panel.y1 - panel.y0, float(planform.thickness(y)))
+            foam = _rigidities(section, 0.5 * _twisting(planform, y) * section.width, False) / length
+            point = np.array([planform.x(panel.s1, y), y, 0.0])
+            rods = _lying(planform, [], panel.y0, panel.y1)
+            found.append(Connector(first, second, point, foam, *rods, CHORDWISE_MODULUS))
+    return found
+
+
+def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[Connector]:
+    """The driven rods hold the root: each the body that carries it, with the foam of that body shared among its rods.
+
+    A driven rod goes on into its drive: what there is between the root and its start is counted as rod.
+    """
+    wing, count = planform.wing, division.bodies[0]
+    y, y1 = wing.stations[0].y, float(parts[0].centroid[1])
+    entries = []
+    for name in wing.driven_rods:
+        rod = next(r for r in wing.rods if r.name == name)
+        if not (rod.y_root <= y + _DRIVEN_GAP and rod.y_tip >= y):
+            raise ValueError(
+                f"driven rod {name!r} lies from y = {rod.y_root:g} m to {rod.y_tip:g} m; to drive the wing it must "
+                f"start at most {_DRIVEN_GAP:g} m outboard of the root at {y:g} m and end beyond it: extend the rod"
+            )
+        entries.append((rod, _piece(planform, rod, min(y1, rod.y_tip), count)))
+    found = []
+    for number, (rod, body) in enumerate(entries):
+        sharing = sum(other == body for _, other in entries)
+        section = Rectangle(float(planform.chord(y)) / count, float(planform.thickness(y)))
+        torsion = _twisting(planform, y) * section.width * _spanwise_share(count)
+        foam = _rigidities(section, torsion, True) / (y1 - y) / sharing
+        point = np.array([_x_of(rod, max(y, rod.y_root)), y, 0.0])
+        rods = _lying(planform, [replace(rod, y_root=min(y, rod.y_root))], y, y1)
+        found.append(Connector(-1 - number, body, point, foam, *rods, SPANWISE_MODULUS))
+    return found
+
+
+def _wiring(
+    planform: Planform,
+    division: Division,
+    panels: list[Panel],
+    parts: list[Body],
+    connectors: list[Connector],
+    whole_strips: bool,
+) -> tuple[Wiring, dict[tuple[int, int], int]]:
+    n = len(parts)
+    hinge = np.array([0.0, planform.wing.hinge.y, planform.wing.hinge.z])
+    first = np.array([c.first if c.first >= 0 else n - 1 - c.first for c in connectors], np.int64)
+    second = np.array([c.second for c in connectors], np.int64)
+    base = [c.point - (parts[c.first].centre if c.first >= 0 else hinge) for c in connectors]
+    b = np.array([c.point - parts[c.second].centre for c in connectors])
+    joined = [(int(i), int(j)) for i, j in zip(first, second, strict=True) if i < n]
+    if len(set(joined)) < len(joined):
+        raise AssertionError("two connectors between the same bodies: their blocks would overwrite each other")
+    starts = np.concatenate([[0], np.cumsum(division.bodies)]).astype(np.int64)
+    beside = {
+        (i, j) for k in range(len(starts) - 1) for j in range(starts[k], starts[k + 1]) for i in range(starts[k], j)
+    }
+    work = eliminate(n, set(joined), beside if whole_strips else set())
+    outer, last = len(first) - len(joined), n + 2 * len(work.below)
+    area = np.array([part.area for part in parts])
+    strip_area = np.add.reduceat(area, starts[:-1])
+    markers = planform.wing.markers
+    carriers = marker_carriers(planform, panels, markers)
+    wiring = Wiring(
+        mass=np.array([part.mass for part in parts]),
+        inertia=np.array([part.inertia.ravel() for part in parts]),
+        first=first,
+        second=second,
+        lower=np.array([*(work.position[j, i] for i, j in joined), *range(last, last + outer)], np.int64),
+        upper=np.array([*(work.position[i, j] for i, j in joined), *[-1] * outer], np.int64),
+        driven=int(np.argmax(first >= n)),
+        a=np.array(base),
+        b=b,
+        order=work.order,
+        start=work.start,
+        below=work.below,
+        row=work.row,
+        products=work.products,
+        product_start=work.product_start,
+        fill=work.fill,
+        strip_start=starts,
+        weight=area / np.repeat(strip_area, division.bodies),
+        centroid=np.array([(part.centroid - part.centre)[:2] for part in parts]),
+        geometry=_geometry(planform, division, strip_area),
+        markers=np.array([np.array(m.position) - parts[k].centre for m, k in zip(markers, carriers, strict=True)]),
+        carrier=carriers,
+    )
+    return wiring, work.position
+
+
+def _geometry(planform: Planform, division: Division, area: Array) -> Array:
+    """[S, GEOMETRY] of the strips."""
+    edges = planform.strips(division)
+    width = np.diff(edges)
+    station = (0.5 * (edges[1:] + edges[:-1]) - edges[0]) / (edges[-1] - edges[0])
+    return np.stack([area, area / width, width, station], axis=1)

@@ -1,0 +1,78 @@
+"""The ledger of what was acknowledged sees every kind of loss."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from benchmarks.durability.ledger import KnownRun, Ledger
+from benchmarks.durability.visitors import outcome, settle
+from benchmarks.durability.works import WORKS, archive
+from wingfit.records import load_archive
+
+Json = dict[str, Any]
+
+
+def item(sequence: int, best: float, seconds: float = 0.0) -> Json:
+    return {"sequence": sequence, "best": best, "elapsed_seconds": seconds, "eta_seconds": 9 - seconds}
+
+
+@pytest.fixture
+def ledger() -> Ledger:
+    return Ledger(runs={"run": KnownRun("genetic 1")})
+
+
+def test_generations_that_stay_are_no_loss(ledger: Ledger) -> None:
+    ledger.history("run", [item(1, 0.5), item(2, 0.4)])
+    ledger.history("run", [item(1, 0.5, 7.0), item(2, 0.4), item(3, 0.3)])
+    assert (ledger.lost, ledger.acknowledged) == ([], 3)
+
+
+@pytest.mark.parametrize("later", [[item(1, 0.5)], [item(1, 0.5), item(2, 0.41)], []])
+def test_one_that_is_gone_or_another_is_a_loss(ledger: Ledger, later: list[Json]) -> None:
+    ledger.history("run", [item(1, 0.5), item(2, 0.4)])
+    ledger.history("run", later)
+    assert ledger.lost
+
+
+@pytest.mark.parametrize(
+    ("endings", "state", "lost"),
+    [
+        (("SUCCEEDED",), "SUCCEEDED", False),
+        (("SUCCEEDED",), "FAILED", True),
+        (("SUCCEEDED",), "CANCELLED", True),
+        (("CANCELLED",), "SUCCEEDED", True),  # cancelling was acknowledged
+        (("CANCELLED",), "CANCELLED", False),
+        (("SUCCEEDED", "CANCELLED"), "CANCELLED", False),  # asked, and the answer was lost
+    ],
+)
+def test_every_end_must_be_one_that_was_asked_for(
+    ledger: Ledger, endings: tuple[str, ...], state: str, *, lost: bool
+) -> None:
+    ledger.runs["run"].endings = endings
+    answers: dict[str, Json] = {"history": {"items": [item(1, 0.5)]}, "genome": {"g": 1}, "result": {"r": 2}}
+
+    def fetch(path: str) -> Json:
+        return answers[path.split("/")[-1].partition("?")[0]]
+
+    settle(ledger, "run", {"state": state, "error": None}, fetch, {"genetic 1": outcome("run", fetch)})
+    assert bool(ledger.lost) is lost
+    assert ledger.identical == ledger.results == (state == "SUCCEEDED")
+
+
+def test_another_number_in_a_result_is_seen(ledger: Ledger) -> None:
+    def fetch(_: str) -> Json:
+        return {"items": [item(1, 0.5)]}
+
+    expected = outcome("run", fetch)
+    expected["genome"] = {"items": [item(1, 0.5000000001)]}
+    settle(ledger, "run", {"state": "SUCCEEDED", "error": None}, fetch, {"genetic 1": expected})
+    assert (ledger.results, ledger.identical, ledger.different) == (1, 0, ["run"])
+
+
+def test_works_are_apart_and_their_datasets_read() -> None:
+    assert len({work.name for work in WORKS}) == len(WORKS)
+    for example in {work.example for work in WORKS}:
+        assert archive(example) == archive(example)
+        load_archive(archive(example), "x.zip")

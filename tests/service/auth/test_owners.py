@@ -1,0 +1,165 @@
+"""By the published description, so that a call that is added later is tested as well: to whom each call is closed."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service import toy
+from tests.service.conftest import As
+from wingfit.service.settings import Settings
+
+ADMINISTRATION = re.compile(r"/v1/(?:keys|backup)(?:/|$)")
+OPEN = ("/v1/health", "/v1/ready", "/v1/session")
+OF_A_THING = re.compile(r"{(dataset_id|run_id|diagnosis_id)}")
+Call = tuple[str, str, dict[str, Any]]
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> Settings:
+    return Settings(data=tmp_path / "data", require_keys=True, max_stored_mb=1)
+
+
+@pytest.fixture
+def calls(client: httpx.Client) -> list[Call]:
+    """Method, path and body of every call; bodies are the examples of their schema."""
+    specification = client.get("/openapi.json").json()
+    return list(_calls(specification))
+
+
+def _calls(specification: dict[str, Any]) -> Iterator[Call]:
+    for path, methods in specification["paths"].items():
+        for method, operation in methods.items():
+            content = operation.get("requestBody", {}).get("content", {}).get("application/json")
+            name = content["schema"]["$ref"].rpartition("/")[2] if content else ""
+            yield method.upper(), path, specification["components"]["schemas"][name]["examples"][0] if name else {}
+
+
+def test_every_call_on_a_thing_is_closed_to_other_owners(as_: As, calls: list[Call]) -> None:
+    ann, bob = as_("ann"), as_("bob")
+    dataset = ann.upload()["id"]
+    run, diagnosis = ann.submit(dataset)["id"], ann.diagnose(dataset)["id"]
+    ann.finish(run)
+    ann.diagnosed(diagnosis)
+    ids = {"dataset_id": dataset, "run_id": run, "diagnosis_id": diagnosis}
+    tried = 0
+    for method, path, body in calls:
+        if not OF_A_THING.search(path):
+            continue
+        asked = path.format(**ids)
+        answer = bob.client.request(method, asked, json=body or None)
+        assert answer.status_code == 404, (method, asked, answer.text)
+        assert answer.json()["type"] == "urn:wingfit:problem:not-found"
+        tried += 1
+    assert tried >= 22
+    assert ann.diagnosis(diagnosis)["state"] == ann.run(run)["state"] == "SUCCEEDED"
+
+
+def test_no_body_reaches_what_belongs_to_another_owner(as_: As, calls: list[Call]) -> None:
+    ann, bob = as_("ann"), as_("bob")
+    dataset = ann.upload()["id"]
+    run = ann.submit(dataset)["id"]
+    ann.finish(run)
+    tried = 0
+    for method, path, body in calls:
+        for name, one in (("dataset_id", dataset), ("run_id", run)):
+            if method != "POST" or (name not in body and path != "/v1/diagnoses"):
+                continue
+            named = {key: value for key, value in body.items() if key != "dataset_id"} | {name: one}
+            answer = bob.client.post(path, json=named)
+            assert answer.status_code == 422, (path, name, answer.text)
+            assert "there is no" in answer.json()["detail"], (path, name)
+            tried += 1
+    assert tried == 5
+    assert [bob.get(f"/v1/{kind}")["items"] for kind in ("datasets", "runs", "diagnoses")] == [[], [], []]
+
+
+def test_every_call_needs_its_scope(as_: As, calls: list[Call]) -> None:
+    reader, writer = as_("ann-reads").client, as_("ann").client
+    refused = {"reader": 0, "writer": 0}
+    for method, path, body in calls:
+        if path in OPEN:
+            continue
+        asked, sent = re.sub(r"[{}]", "", path), body or None
+        if method != "GET" or ADMINISTRATION.match(path):
+            answer = reader.request(method, asked, json=sent)
+            assert (answer.status_code, answer.json()["type"]) == (403, "urn:wingfit:problem:scope"), (method, path)
+            refused["reader"] += 1
+        if ADMINISTRATION.match(path):
+            answer = writer.request(method, asked, json=sent)
+            assert (answer.status_code, answer.json()["type"]) == (403, "urn:wingfit:problem:scope"), (method, path)
+            refused["writer"] += 1
+    assert refused["reader"] >= 15
+    assert refused["writer"] >= 4
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "//v1/keys",
+        "/v1//keys",
+        "/V1/keys",
+        "/v1/keys/",
+        "/%76%31/keys",
+        "/v1/./keys",
+        "/v1/x/../keys",
+        "/v1%2fkeys",
+        "/v1/keys;x=1",
+        "/v1/keys%00",
+        "/assets/../v1/keys",
+        "/.//v1/keys",
+    ],
+)
+def test_no_spelling_of_a_path_gets_past_the_gate(client: httpx.Client, path: str) -> None:
+    for method in ("GET", "POST", "HEAD", "PUT", "PROPFIND"):
+        request = client.build_request(method, client.base_url)
+        request.url = request.url.copy_with(raw_path=path.encode())
+        answer = client.send(request)
+        assert answer.status_code in (401, 404, 405), (method, answer.status_code)
+
+
+def test_a_caller_cannot_say_whose_things_are(as_: As) -> None:
+    ann = as_("ann")
+    dataset = ann.upload()["id"]
+    for path, body in (
+        ("runs", {"dataset_id": dataset, "owner": "bob"}),
+        ("runs", {"dataset_id": dataset, "state": "SUCCEEDED"}),
+        ("diagnoses", {"dataset_id": dataset, "id": "dx_0000000000000000"}),
+    ):
+        assert ann.client.post(f"/v1/{path}", json=body).status_code == 422, body
+    sent = {"files": {"file": ("a.zip", toy.archive())}, "data": {"owner": "bob", "id": "ds_0"}}
+    assert ann.client.post("/v1/datasets", **sent).json()["id"] != "ds_0"  # type: ignore[arg-type]
+    assert len(ann.get("/v1/datasets")["items"]) == 2
+    assert as_("bob").get("/v1/datasets")["items"] == []
+
+
+def test_no_owner_fills_the_disk(as_: As) -> None:
+    ann, half = as_("ann"), "x" * 600_000
+    first = ann.upload(pad=half)
+    refused = ann.client.post("/v1/datasets", files={"file": ("a.zip", toy.archive(pad=half))})
+    assert (refused.status_code, refused.json()["type"]) == (429, "urn:wingfit:problem:too-many")
+    assert "WINGFIT_MAX_STORED_MB" in refused.json()["detail"]
+    assert len(ann.get("/v1/datasets")["items"]) == 1
+    as_("bob").upload(pad=half)
+    assert ann.client.delete(f"/v1/datasets/{first['id']}").status_code == 204
+    ann.upload(pad=half)
+
+
+def test_a_key_is_in_no_log(
+    as_: As, client: httpx.Client, secrets: dict[str, str], caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level(logging.DEBUG), caplog.at_level(logging.DEBUG, "wingfit.access"):
+        as_("ann").get("/v1/runs")
+        client.post("/v1/session", json={"key": secrets["ann"]})
+        new = as_("admin").client.post("/v1/keys", json={"name": "x"}).json()["secret"]
+        client.get("/v1/runs", headers={"Authorization": f"Bearer {new}x"})
+    records = [record for record in caplog.records if not record.name.startswith("http")]  # this client's own
+    told = "\n".join(record.getMessage() for record in records)
+    assert "GET /v1/runs" in told
+    assert not [secret for secret in (*secrets.values(), new) if secret in told]

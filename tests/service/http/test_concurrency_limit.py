@@ -1,0 +1,109 @@
+"""Simulations take turns, and reading does not wait for them."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.service import toy
+from tests.service.conftest import Api, serving
+from wingfit.calibration.result import Comparison
+from wingfit.calibration.search import CalibrationSpec
+from wingfit.records import Dataset
+from wingfit.service.app import create_app
+from wingfit.service.http.concurrency_limit import AT_ONCE, UPLOADS_AT_ONCE, Turns
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.settings import Settings
+
+
+class HeldEngine(toy.ToyEngine):
+    """Its simulations last until they are let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entered, self.go = threading.Semaphore(0), threading.Event()
+
+    def compare(
+        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
+    ) -> Comparison:
+        self.entered.release()
+        assert self.go.wait(20)
+        return super().compare(spec, dataset, genome, recording)
+
+
+def test_reading_goes_on_while_simulations_wait(tmp_path: Path) -> None:
+    engine, crowd = HeldEngine(), 50  # more than the threads that answer
+    with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
+        api = Api(client)
+        run = api.submit(api.upload()["id"])["id"]
+        api.finish(run)
+
+        def simulate(_: int) -> int:
+            with httpx.Client(base_url=client.base_url, timeout=30) as one:
+                return one.get(f"/v1/runs/{run}/comparison").status_code
+
+        with ThreadPoolExecutor(crowd) as pool:
+            asked = [pool.submit(simulate, k) for k in range(crowd)]
+            for _ in range(AT_ONCE):
+                assert engine.entered.acquire(timeout=20)
+            for _ in range(20):
+                assert client.get("/v1/runs", timeout=5).status_code == 200
+            assert not engine.entered.acquire(timeout=0.2)  # no more at once
+            engine.go.set()
+            assert {one.result() for one in asked} == {200}
+
+
+class HeldReader(toy.ToyEngine):
+    """Its reading of an upload lasts until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entered, self.go = threading.Semaphore(0), threading.Event()
+
+    def load(self, data: bytes, filename: str) -> Dataset:
+        self.entered.release()
+        assert self.go.wait(20)
+        return super().load(data, filename)
+
+
+def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
+    engine, crowd = HeldReader(), UPLOADS_AT_ONCE + 4
+    with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
+
+        def upload(_: int) -> int:
+            with httpx.Client(base_url=client.base_url, timeout=30) as one:
+                return one.post("/v1/datasets", files={"file": ("a.zip", toy.archive())}).status_code
+
+        with ThreadPoolExecutor(crowd) as pool:
+            asked = [pool.submit(upload, k) for k in range(crowd)]
+            for _ in range(UPLOADS_AT_ONCE):
+                assert engine.entered.acquire(timeout=20)
+            assert not engine.entered.acquire(timeout=0.2)  # no more at once
+            assert client.get("/v1/datasets", timeout=5).status_code == 200
+            engine.go.set()
+            assert {one.result() for one in asked} == {201}
+
+
+def test_a_crowd_is_told_to_come_later() -> None:
+    async def scene() -> None:
+        turns = Turns("simulations", at_once=1, most_waiting=2)
+        await turns.take()
+        waiting = [asyncio.create_task(turns.take()) for _ in range(2)]
+        await asyncio.sleep(0)
+        with pytest.raises(ProblemError, match="2 simulations wait already"):
+            await turns.take()
+        waiting[0].cancel()  # who goes away gives its place
+        await asyncio.sleep(0)
+        late = asyncio.create_task(turns.take())
+        for _ in range(2):
+            turns.give_back()
+            await asyncio.sleep(0)
+        await asyncio.wait_for(asyncio.gather(waiting[1], late), 1)
+
+    asyncio.run(scene())

@@ -1,0 +1,313 @@
+"""What the service defends against; docs/security.md says which test shows what, and is kept true here."""
+
+from __future__ import annotations
+
+import ast
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from benchmarks.abuse import uploads
+from tests.service import toy
+from tests.service.conftest import Api, serving
+from wingfit.diagnosis import DiagnosisSpec
+from wingfit.records import limits
+from wingfit.records.description.schema import dataset_schema
+from wingfit.records.files import confined
+from wingfit.service import settings
+from wingfit.service.app import create_app
+from wingfit.service.diagnoses import schemas as diagnosis_schemas
+from wingfit.service.http import concurrency_limit, events, header_limits, request_limits, responses
+from wingfit.service.runs import schemas, spec_schemas
+from wingfit.service.settings import Settings
+from wingfit.sim.wing import division
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
+CODE = ("records", "tracking", "sim", "calibration", "diagnosis", "report", "workers", "service", "client", "cli")
+Schema = dict[str, Any]
+
+
+# -- answers -----------------------------------------------------------------------------------------------
+
+
+def test_a_mistake_is_answered_without_a_word_about_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    app = create_app(Settings(data=tmp_path), engine=toy.FaultyEngine(), make_evaluator=toy.NoEvaluator)
+    with serving(app) as client:
+        body = {"dataset_id": Api(client).upload()["id"], "recording": "slow"}
+        for _ in range(2):  # the connection goes on
+            answer = client.post("/v1/simulations", json=body)
+            assert (answer.status_code, answer.json()["type"]) == (500, "urn:wingfit:problem:internal")
+            assert "nobody's business" not in answer.text
+            assert "Traceback" not in answer.text
+            assert (
+                answer.headers["Content-Security-Policy"] == request_limits.SECURITY_HEADERS["Content-Security-Policy"]
+            )
+            assert answer.headers["X-Request-ID"]
+    assert "nobody's business" in caplog.text  # the log has it
+
+
+def test_no_other_origin_may_read_an_answer(client: httpx.Client) -> None:
+    origin = {"Origin": "https://evil.example"}
+    asked = origin | {"Access-Control-Request-Method": "POST", "Access-Control-Request-Headers": "authorization"}
+    for answer in (
+        client.options("/v1/runs", headers=asked),
+        client.get("/v1/runs", headers=origin),
+        client.get("/", headers=origin),
+    ):
+        assert not [name for name in answer.headers if name.startswith("access-control-")]
+        assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
+
+
+def test_no_page_needs_a_script_in_its_text(api: Api) -> None:
+    diagnosis = api.diagnose(api.upload()["id"])["id"]
+    api.diagnosed(diagnosis)
+    for path in ("/", "/docs", f"/v1/diagnoses/{diagnosis}/report"):
+        answer = api.client.get(path)
+        policy = dict(part.strip().split(" ", 1) for part in answer.headers["Content-Security-Policy"].split(";"))
+        assert policy.get("script-src", policy["default-src"]) in ("'self'", "'none'"), path
+        assert policy.get("object-src", policy["default-src"]) == "'none'", path
+        assert policy["base-uri"] == "'none'"
+        assert not re.findall(r"<script(?![^>]*\ssrc=)", answer.text), path
+        assert not re.findall(r"<[^>]+\son\w+\s*=", answer.text), path
+        assert "javascript:" not in answer.text, path
+
+
+def test_nothing_answers_that_is_not_described(client: httpx.Client) -> None:
+    described = set(client.get("/openapi.json").json()["paths"])
+    linked = set(re.findall(r'(?:href|src)="([\w./-]+)"', client.get("/").text))
+    for path in (
+        "/redoc",
+        "/swagger",
+        "/debug",
+        "/admin",
+        "/v1",
+        "/v2/runs",
+        "/metrics",
+        "/.env",
+        "/app.py",
+        "/v1/users",
+    ):
+        assert path not in described
+        assert client.get(path).status_code == 404, path
+    assert linked <= {"icon.svg", "style.css", "app.js", "docs"}
+    assert all(path.startswith("/v1/") for path in described)
+
+
+# -- what is done with what is sent ----------------------------------------------------------------------------
+
+
+def parsed() -> Iterator[tuple[str, ast.AST]]:
+    for part in CODE:
+        for path in (ROOT / part).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                yield path.relative_to(ROOT).as_posix(), node
+
+
+def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
+    risky = re.compile(
+        r"(?:pickle|dill|marshal|cloudpickle|shelve)\.(?:loads?|Unpickler|open)|eval|exec|yaml\.load|np\.load"
+    )
+    calls = {(path, ast.unparse(node.func)) for path, node in parsed() if isinstance(node, ast.Call)}
+    assert {(path, call) for path, call in calls if risky.fullmatch(call)} == {
+        ("workers/share.py", "pickle.loads"),  # from the process that owns the worker
+        ("workers/processes.py", "pickle.loads"),  # what it wrote itself
+        ("sim/kernels/lanes/vector.py", "exec"),  # a text of its own, when it is imported
+    }
+
+
+def test_the_server_has_nothing_to_fetch_addresses_with() -> None:
+    clients = (
+        "httpx",
+        "requests",
+        "aiohttp",
+        "httpcore",
+        "ftplib",
+        "wingfit.client.transport",
+        "wingfit.client.client",
+    )
+    code = f"import sys, wingfit.service.server; print([m for m in {clients} if m in sys.modules])"
+    told = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert told.stdout.strip() == "[]"
+    called = {
+        path for path, node in parsed() if isinstance(node, ast.Attribute) and node.attr in ("urlopen", "urlretrieve")
+    }
+    assert called == set()
+
+
+def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as trap:
+        trap.settimeout(0.5)
+        url = f"http://127.0.0.1:{trap.getsockname()[1]}/x"
+        with serving(create_app(Settings(data=tmp_path), make_evaluator=toy.NoEvaluator)) as client:
+            archive = uploads._files() | {"recordings/link.url": url.encode()}
+            archive["dataset.yaml"] = archive["dataset.yaml"].replace(b"name: robird-11", f"name: {url}".encode())
+            sent = {"file": (url, uploads._zipped(archive))}
+            client.post("/v1/datasets", files=sent, headers={"Referer": url, "X-Forwarded-Host": url})
+            for path in ("runs", "diagnoses", "simulations", "loads"):
+                body = {"dataset_id": url, "recording": url, "name": url, "run_id": url}
+                assert client.post(f"/v1/{path}", json=body).status_code == 422
+            client.get(f"/v1/effects/{url}")
+            client.get("/v1/runs", params={"dataset_id": url, "callback": url})
+        with pytest.raises(TimeoutError):
+            trap.accept()
+
+
+def test_an_upload_writes_no_file_of_a_name_of_its_own(tmp_path: Path) -> None:
+    with serving(create_app(Settings(data=tmp_path / "data"), make_evaluator=toy.NoEvaluator)) as client:
+        for filename in ("../../evil.zip", "/etc/evil.zip", "evil.zip", "..\\evil.zip"):
+            data = uploads._with(uploads._files(), "evil/evil.csv")
+            answer = client.post("/v1/datasets", files={"file": (filename, data)})
+            assert answer.status_code == 201, answer.text
+            told = client.get(f"/v1/datasets/{answer.json()['id']}/archive").headers["Content-Disposition"]
+            assert "evil" not in told
+    assert {path.name for path in tmp_path.rglob("*")} <= {
+        "data", "wingfit.lock", "wingfit.sqlite3", "wingfit.sqlite3-wal", "wingfit.sqlite3-shm",
+    }  # fmt: skip
+
+
+# -- limits ------------------------------------------------------------------------------------------------------
+
+
+def unbounded(schema: Schema, known: Schema, where: str) -> Iterator[str]:
+    """Places in ``schema`` where a request may be as long as it likes."""
+    if "$ref" in schema:
+        schema = known[schema["$ref"].rpartition("/")[2]]
+    for one in (*schema.get("anyOf", ()), *schema.get("oneOf", ()), *schema.get("allOf", ())):
+        yield from unbounded(one, known, where)
+    kind, more = schema.get("type"), schema.get("additionalProperties", True)
+    if kind == "string" and not {"enum", "const", "maxLength"} & set(schema):
+        yield where
+    if kind == "array":
+        yield from [] if "maxItems" in schema else [where]
+        yield from unbounded(schema["items"], known, f"{where}[]")
+    if kind == "object":
+        yield from [] if more is False or "maxProperties" in schema else [where]
+        for name, one in schema.get("properties", {}).items():
+            yield from unbounded(one, known, f"{where}.{name}")
+
+
+def test_every_body_and_query_is_bounded_in_every_part(client: httpx.Client) -> None:
+    specification = client.get("/openapi.json").json()
+    known = specification["components"]["schemas"]
+    found, bodies = list[str](), 0
+    for path, methods in specification["paths"].items():
+        for method, operation in methods.items():
+            for parameter in operation.get("parameters", ()):
+                if parameter["in"] == "query":
+                    found += unbounded(parameter["schema"], known, f"{method} {path} {parameter['name']}")
+            body = operation.get("requestBody", {}).get("content", {}).get("application/json")
+            bodies += body is not None
+            found += unbounded(body["schema"], known, f"{method} {path}") if body else []
+    assert found == []
+    assert bodies >= 7
+
+
+def test_every_list_of_a_dataset_is_bounded() -> None:
+    schema = dataset_schema()
+    lists = [one for one in _all(schema) if one.get("type") == "array"]
+    assert len(lists) > 8
+    assert not [one for one in lists if "maxItems" not in one]
+
+
+def _all(schema: Any) -> Iterator[Schema]:
+    if isinstance(schema, dict):
+        yield schema
+    for one in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+        yield from _all(one)
+
+
+def listed(model: Any, name: str) -> int:
+    return int(next(one.max_length for one in model.model_fields[name].metadata if hasattr(one, "max_length")))
+
+
+def highest(model: Any, name: str) -> int:
+    return int(next(one.le for one in model.model_fields[name].metadata if hasattr(one, "le")))
+
+
+def test_the_limits_that_are_documented_are_those_in_force() -> None:
+    rows = dict(re.findall(r"^\| ([^|]+?) \| ([\d,]+)[^|]*\|", PAGE.partition("## Limits")[2], re.MULTILINE))
+    run, diagnosis = spec_schemas.RunIn, diagnosis_schemas.DiagnosisIn
+    in_force = {
+        "head of a request": header_limits.HEAD_LIMIT // 2**10,
+        "body of an upload": request_limits.UPLOAD_LIMIT // 2**20,
+        "any other body": request_limits.BODY_LIMIT // 2**20,
+        "an archive unpacked": limits.MAX_EXPANDED_BYTES // 2**20,
+        "unpacked over packed": limits.MAX_COMPRESSION_RATIO,
+        "entries of an archive": limits.MAX_ENTRIES,
+        "`dataset.yaml`": limits.MAX_DESCRIPTION_BYTES // 2**20,
+        "levels of `dataset.yaml`": limits.MAX_DEPTH,
+        "keys, items and values of `dataset.yaml`": limits.MAX_ITEMS,
+        "recordings": limits.MAX_RECORDINGS,
+        "rows of a recording": limits.MAX_ROWS,
+        "markers": limits.MAX_MARKERS,
+        "numbers of a dataset": limits.MAX_VALUES,
+        "numbers of a NetCDF upload": limits.MAX_UPLOADED_NETCDF_VALUES,
+        "memory to read a NetCDF upload": confined.limits_of_upload(0).memory_mib,
+        "processor time to read a small NetCDF upload": confined.limits_of_upload(0).processor_s,
+        "time to read a NetCDF upload": confined.limits_of_upload(request_limits.UPLOAD_LIMIT).wall_s,
+        "bodies of a division": division.MAX_BODIES,
+        "genes named by a request": listed(run, "genes"),
+        "recordings named by a request": listed(run, "recordings"),
+        "effects named by a request": listed(run, "effects"),
+        "suspects of a diagnosis": listed(diagnosis, "suspects"),
+        "effects that a diagnosis refits": highest(diagnosis, "refits"),
+        "population": highest(run, "population"),
+        "generations of a stage": highest(run, "max_generations"),
+        "items on a page": responses.LARGEST_PAGE,
+        "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
+        "coordinates in an answer": schemas.MOST_COORDINATES,
+        "simulations at once": concurrency_limit.AT_ONCE,
+        "uploads read at once": concurrency_limit.UPLOADS_AT_ONCE,
+        "exports as NetCDF at once": concurrency_limit.EXPORTS_AT_ONCE,
+        "archives, exports, findings, reports, histories sent at once": concurrency_limit.DOWNLOADS_AT_ONCE,
+        "answers that were simulated sent at once": concurrency_limit.ANSWERS_AT_ONCE,
+        "requests that wait for each of these": concurrency_limit.MOST_WAITING,
+        "backups at once": concurrency_limit.BACKUPS_AT_ONCE,
+        "requests that wait for a backup": concurrency_limit.BACKUPS_WAITING,
+        "slowest client that is waited for": header_limits.SLOWEST_BYTES_PER_SECOND // 2**10,
+        "event streams": events.MOST_STREAMS,
+        "jobs of an owner that have not ended": settings.Settings.max_active,
+        "jobs computed at once": settings.Settings.max_runs,
+        "MB of archives of an owner": settings.Settings.max_stored_mb,
+    }
+    assert {name: int(value.replace(",", "")) for name, value in rows.items()} == in_force
+    assert f"KiB/s, over {header_limits.SLOW_SECONDS:g} s" in PAGE
+    assert DiagnosisSpec().refits <= in_force["effects that a diagnosis refits"]
+
+
+# -- the page ----------------------------------------------------------------------------------------------------
+
+
+def test_every_test_that_the_page_names_exists() -> None:
+    named = re.findall(r"`(tests/[\w/]+\.py)::(\w+)`", PAGE)
+    assert len(named) > 40
+    for path, function in set(named):
+        assert re.search(rf"^def {function}\(", (ROOT / path).read_text(encoding="utf-8"), re.MULTILINE), (
+            path,
+            function,
+        )
+
+
+def test_the_page_answers_all_ten_and_shows_each_by_a_test() -> None:
+    rows = re.findall(r"^\| API(\d+) [^|]*\|([^|]*)\|([^|]*)\|$", PAGE, re.MULTILINE)
+    assert [int(number) for number, _, _ in rows] == list(range(1, 11))
+    for number, answer, shown in rows:
+        assert len(answer) > 100, number
+        assert "::" in shown, number
+
+
+def test_a_setting_that_limits_is_documented() -> None:
+    page = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8")
+    known = set(re.findall(r"WINGFIT_[A-Z_]+", (ROOT / "service" / "settings.py").read_text(encoding="utf-8")))
+    assert {name for name in known if f"| `{name}` |" not in page} == set()
