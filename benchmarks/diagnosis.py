@@ -24,7 +24,7 @@ from benchmarks.concealed.bench import WingBench
 from benchmarks.concealed.plant.observe_law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from wingfit.calibration.spec import CalibrationSpec
-from wingfit.cli.output import progress
+from wingfit.cli.base.output import progress
 from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose
 from wingfit.records import Dataset, load_dataset, save_dataset
 from wingfit.workers import make_evaluator

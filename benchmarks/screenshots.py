@@ -20,7 +20,7 @@ from benchmarks.common.ray_nodes import REPOSITORY
 from benchmarks.common.server_process import Server
 from benchmarks.proof import robird
 from benchmarks.proof.told import saved
-from wingfit.cli.output import progress
+from wingfit.cli.base.output import progress
 from wingfit.client.client import Client
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wingfit.cli.base.output import Url, moment, note, progress, say, table
 from wingfit.cli.datasets import size
-from wingfit.cli.output import Url, moment, note, progress, say, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.output import progress, say
+from wingfit.cli.base.output import progress, say
 from wingfit.client.client import WingfitError
 
 

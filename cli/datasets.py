@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.output import AsJson, Url, moment, number, print_json, progress, say, table
+from wingfit.cli.base.output import AsJson, Url, moment, number, print_json, progress, say, table
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 

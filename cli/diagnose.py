@@ -7,16 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
+from wingfit.cli.base.files import check_file, write_text
+from wingfit.cli.base.output import AsJson, Url, duration, moment, note, print_json, progress, say, table
 from wingfit.cli.datasets import size
 from wingfit.cli.effects import With, names
 from wingfit.cli.exports import DiagnosisId, export_diagnosis
 from wingfit.cli.findings import print_finding
-from wingfit.cli.loads import check_file
-from wingfit.cli.output import AsJson, Url, duration, moment, note, print_json, progress, say, table
 from wingfit.cli.simulate import read_genome
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.diagnosis_answers import Diagnosis
-from wingfit.service.settings import MOST_WORKERS
+from wingfit.service.limits import MOST_WORKERS
 
 app = typer.Typer(no_args_is_help=True, help="List, watch, export, cancel and delete diagnoses.")
 app.command("export")(export_diagnosis)
@@ -260,8 +260,5 @@ def _names(words: list[str] | None, option: str) -> list[str] | None:
 
 
 def _save(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
+    write_text(path, text)
     note(f"report written to {path}; open it in a browser")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.output import AsJson, Url, number, print_json, say, table
+from wingfit.cli.base.output import AsJson, Url, number, print_json, say, table
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.client.effect_answers import Effect, EffectParameter
 

@@ -11,10 +11,10 @@ from typing import Annotated
 
 import typer
 
+from wingfit.cli.base.files import check_file
+from wingfit.cli.base.output import Url, note
 from wingfit.cli.datasets import size
 from wingfit.cli.forces.runs import RunId
-from wingfit.cli.loads import check_file
-from wingfit.cli.output import Url, note
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.client.transport import ENDINGS, Format
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from wingfit.cli.output import note, number, say, table
-from wingfit.cli.rounding import force_unit, kept
+from wingfit.cli.base.output import note, number, say, table
+from wingfit.cli.base.rounding import force_unit, kept
 from wingfit.service.units import MM
 
 Json = dict[str, Any]

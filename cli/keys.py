@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.output import AsJson, Url, moment, note, print_json, say, table
+from wingfit.cli.base.output import AsJson, Url, moment, note, print_json, say, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.key_client import Key, NewKey
 

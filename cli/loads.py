@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import typer
-
-from wingfit.cli.output import number
+from wingfit.cli.base.files import write_csv, write_text
+from wingfit.cli.base.output import number
 from wingfit.client import answers as a
-from wingfit.client.client import WingfitError
 
 AXES = "xyz"
 VECTORS = {
@@ -29,24 +25,14 @@ Column = tuple[str, list[float]]
 Panel = tuple[str, list[Column]]
 
 
-def check_file(path: Path | None, option: str, known: tuple[str, ...] = ()) -> None:
-    """Refuse, before anything is simulated, a file of no ``known`` ending or that cannot be written."""
-    if path is None:
-        return
-    if known and path.suffix.lower() not in known:
-        raise typer.BadParameter(f"{path}: the name must end in {' or '.join(known)}", param_hint=option)
-    if path.is_dir():
-        raise typer.BadParameter(f"{path} is a folder; name a file in it", param_hint=option)
-    place = path if path.exists() else path.parent
-    if not place.exists():
-        raise typer.BadParameter(f"there is no folder {place}; make it first", param_hint=option)
-    if not os.access(place, os.W_OK):
-        raise typer.BadParameter(f"{place} cannot be written; choose another place", param_hint=option)
-
-
 def write_loads(outputs: a.Outputs, path: Path) -> None:
     """Write JSON as the server answers it, or CSV: a row per instant, a column per series."""
-    _write(path, _as_json if path.suffix.lower() == ".json" else _as_csv, outputs)
+    if path.suffix.lower() == ".json":
+        write_text(path, json.dumps(outputs) + "\n")
+        return
+    # The motors' power is among theirs and among the ports', under one name: one column.
+    table = dict(columns(outputs))
+    write_csv(path, table, zip(*table.values(), strict=True))
 
 
 def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
@@ -71,7 +57,7 @@ def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
         figure.update_layout({f"legend{row if row > 1 else ''}": {"y": top, "yanchor": "top", "x": 1.01}})
     figure.update_xaxes(title_text="phase of the beat", row=len(shown), col=1)
     figure.update_layout(title=title, height=290 * len(shown), template="plotly_white", hovermode="x unified")
-    _write(path, lambda stream, _: stream.write(figure.to_html(include_plotlyjs=True)), outputs)
+    write_text(path, figure.to_html(include_plotlyjs=True))
 
 
 def panels(outputs: a.Outputs) -> list[Panel]:
@@ -135,24 +121,3 @@ def _of_part(key: str, part: dict[str, Any]) -> Iterator[Column]:
 def _bending(section: a.SectionLoad) -> Column:
     name = "root" if section["name"] == "root" else f"at {section['span_mm']:.0f} mm"
     return name, [moment[0] for moment in section["moment_n_m"]]
-
-
-def _as_json(stream: Any, outputs: a.Outputs) -> None:
-    json.dump(outputs, stream)
-    stream.write("\n")
-
-
-def _as_csv(stream: Any, outputs: a.Outputs) -> None:
-    # The motors' power is among theirs and among the ports', under one name: one column.
-    table = dict(columns(outputs))
-    writer = csv.writer(stream)
-    writer.writerow(table)
-    writer.writerows(zip(*table.values(), strict=True))
-
-
-def _write(path: Path, content: Callable[[Any, a.Outputs], object], outputs: a.Outputs) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            content(stream, outputs)
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error

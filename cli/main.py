@@ -11,9 +11,9 @@ import sys
 import typer
 
 from wingfit.cli import backup, campaigns, datasets, diagnose, effects, keys, runs, serve, simulate
+from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
-from wingfit.cli.output import note
 from wingfit.client.client import WingfitError
 
 ERROR = 1

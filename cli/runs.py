@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
+from wingfit.cli.base.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
+from wingfit.cli.base.rounding import with_unit
 from wingfit.cli.effects import With, names
 from wingfit.cli.exports import export_run
 from wingfit.cli.forces.runs import RunId, force_result, forces, predict
-from wingfit.cli.output import AsJson, Url, duration, mm, moment, note, number, print_json, progress, say, table
-from wingfit.cli.rounding import with_unit
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY

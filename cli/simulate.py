@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Mapping
@@ -11,12 +10,13 @@ from typing import Annotated, Any, cast
 
 import typer
 
+from wingfit.cli.base.files import check_file, write_csv
+from wingfit.cli.base.output import AsJson, Url, mm, note, number, print_json, progress, say, table
 from wingfit.cli.effects import With, names
 from wingfit.cli.forces.runs import given_forces, write_files
-from wingfit.cli.loads import check_file, summary, write_loads, write_plot
-from wingfit.cli.output import AsJson, Url, mm, note, number, print_json, progress, say, table
+from wingfit.cli.loads import summary, write_loads, write_plot
 from wingfit.client import answers as a
-from wingfit.client.client import DEFAULT_URL, Client, WingfitError
+from wingfit.client.client import DEFAULT_URL, Client
 
 Track = list[float | None]
 
@@ -225,15 +225,15 @@ def write_tracks(tracks: a.Comparison, path: Path) -> None:
     """Write one row per frame and marker: phase, marker, recorded x, y, z and simulated x, y, z in mm."""
     header = ["phase", "marker"] + [f"{kind}_{axis}_mm" for kind in ("recorded", "simulated") for axis in "xyz"]
     frames = zip(tracks["phase"], tracks["recorded_mm"], tracks["simulated_mm"], strict=True)
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(header)
-            for phase, recorded, simulated in frames:
-                for name, seen, drawn in zip(tracks["markers"], recorded, simulated, strict=True):
-                    writer.writerow([phase, name, *_cells(seen), *_cells(drawn)])
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
+    write_csv(
+        path,
+        header,
+        (
+            [phase, name, *_cells(seen), *_cells(drawn)]
+            for phase, recorded, simulated in frames
+            for name, seen, drawn in zip(tracks["markers"], recorded, simulated, strict=True)
+        ),
+    )
 
 
 def _cells(track: Track) -> list[float | str]:

@@ -18,7 +18,7 @@ from urllib.parse import quote
 import httpx
 
 from wingfit.client import answers as a
-from wingfit.records.files.permissions import open_new
+from wingfit.client.private_files import open_new
 
 DEFAULT_URL = "http://127.0.0.1:8321"
 KEY_VARIABLE = "WINGFIT_API_KEY"

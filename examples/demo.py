@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any, NoReturn, cast
 
-from wingfit.cli.output import mm, note, number, progress, say, table
+from wingfit.cli.base.output import mm, note, number, progress, say, table
 from wingfit.cli.runs import misfits, told
 from wingfit.client import answers as a
 from wingfit.client.client import Client, ServerAwayError, WingfitError

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from wingfit.service import environment
+from wingfit.service.limits import MOST_WORKERS
 
 LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
-MOST_WORKERS = 256  # each takes some hundred megabytes
 YES = ("1", "true", "yes", "y", "on")
 # In ASCII: int() also takes the digits of other scripts, underscores, and texts of any length.
 WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,18}")

@@ -1,1 +1,88 @@
-"""wingfit."""
+"""wingfit calibrates simulations of flapping wings on recordings, and reports which physics the simulations lack.
+
+The names below are public and documented; everything else in the package may change without notice.
+
+- :class:`Client` speaks to a wingfit server (``wingfit serve``); :class:`WingfitError` is what it raises.
+- :func:`load_dataset` reads recordings: a folder, a zip of it, or NetCDF. DatasetError lists what is wrong with them.
+- :func:`calibrate` estimates the genes of a model here, without a server; :func:`diagnose` finds what the model lacks.
+
+``import wingfit`` is light: what a name needs is imported when the name is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from wingfit._local import calibrate, diagnose
+    from wingfit.calibration.forces.result import ForceResult
+    from wingfit.calibration.result import GeneResult, RecordingResult, Result
+    from wingfit.calibration.spec import CalibrationSpec
+    from wingfit.client.client import Client
+    from wingfit.client.transport import ServerAwayError, WingfitError
+    from wingfit.diagnosis.finding import Finding
+    from wingfit.diagnosis.spec import DiagnosisSpec
+    from wingfit.records import Condition, Dataset, DatasetError, Gene, Genome, Recording, load_dataset, save_dataset
+    from wingfit.report import finding_json, html
+
+__all__ = [
+    "CalibrationSpec",
+    "Client",
+    "Condition",
+    "Dataset",
+    "DatasetError",
+    "DiagnosisSpec",
+    "Finding",
+    "ForceResult",
+    "Gene",
+    "GeneResult",
+    "Genome",
+    "Recording",
+    "RecordingResult",
+    "Result",
+    "ServerAwayError",
+    "WingfitError",
+    "calibrate",
+    "diagnose",
+    "finding_json",
+    "html",
+    "load_dataset",
+    "save_dataset",
+]
+
+_MODULES = {
+    "wingfit._local": ("calibrate", "diagnose"),
+    "wingfit.calibration.forces.result": ("ForceResult",),
+    "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
+    "wingfit.calibration.spec": ("CalibrationSpec",),
+    "wingfit.client.client": ("Client",),
+    "wingfit.client.transport": ("ServerAwayError", "WingfitError"),
+    "wingfit.diagnosis.finding": ("Finding",),
+    "wingfit.diagnosis.spec": ("DiagnosisSpec",),
+    "wingfit.records": (
+        "Condition",
+        "Dataset",
+        "DatasetError",
+        "Gene",
+        "Genome",
+        "Recording",
+        "load_dataset",
+        "save_dataset",
+    ),
+    "wingfit.report": ("finding_json", "html"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'wingfit' has no attribute {name!r}; it has {', '.join(__all__)}")
+    found: object = getattr(import_module(_MODULE_OF[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -34,7 +34,7 @@ from wingfit.calibration.problem import base_genome
 from wingfit.calibration.result import Result, judge
 from wingfit.calibration.search import calibrate
 from wingfit.calibration.spec import CalibrationSpec, wing_model
-from wingfit.cli.output import progress
+from wingfit.cli.base.output import progress
 from wingfit.diagnosis.finding import Finding
 from wingfit.records import Condition, Dataset
 from wingfit.workers import make_evaluator

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from wingfit.cli.output import progress
+from wingfit.cli.base.output import progress
 from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis
 from wingfit.records import Dataset, save_dataset
 from wingfit.report import html

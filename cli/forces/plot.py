@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from wingfit.cli.base.files import write_text
+from wingfit.cli.base.output import note
 from wingfit.cli.loads import COLOURS
-from wingfit.cli.output import note
 from wingfit.client import force_answers as f
-from wingfit.client.client import WingfitError
 
 QUANTITIES = {"lift": "lift", "drag": "drag", "x": "X (forward)", "z": "Z (down)"}
 DECADES = 8  # of a spectrum that are drawn: below, there is only rounding
@@ -41,10 +41,7 @@ def write_plot(answer: f.Forces, path: Path) -> None:
     figure.update_xaxes(title_text="Hz", row=len(names), col=2)
     title = f"Forces of {answer['recording']}, coefficients: {answer['source']}"
     figure.update_layout(title=title, height=330 * len(names), template="plotly_white")
-    try:
-        path.write_text(figure.to_html(include_plotlyjs=True), encoding="utf-8")
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
+    write_text(path, figure.to_html(include_plotlyjs=True))
     note(f"plots written to {path}; open it in a browser")
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, cast, get_args
 
 import typer
 
+from wingfit.cli.base.files import check_file, write_csv
+from wingfit.cli.base.output import AsJson, Url, note, number, print_json, say, table
+from wingfit.cli.base.rounding import ForceUnit, correlation, force_unit, kept
 from wingfit.cli.forces.plot import QUANTITIES, write_plot
-from wingfit.cli.loads import check_file
-from wingfit.cli.output import AsJson, Url, note, number, print_json, say, table
-from wingfit.cli.rounding import ForceUnit, correlation, force_unit, kept
 from wingfit.client import force_answers as f
-from wingfit.client.client import DEFAULT_URL, Client, WingfitError
+from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.service.units import MN
 
 SOURCES = get_args(f.Source)
@@ -82,7 +81,7 @@ def predict(
         )
     if output:
         names = ("phase", "x_n", "z_n", "lift_n", "drag_n")
-        _write_csv(output, names, [answer[name] for name in names])  # type: ignore[literal-required]
+        _write_forces(output, names, [answer[name] for name in names])  # type: ignore[literal-required]
     for warning in answer["warnings"]:
         note(f"warning: {warning}")
     if as_json:
@@ -165,7 +164,7 @@ def write_files(answer: f.Forces, output: Path | None, plot: Path | None) -> Non
         columns = {"phase": answer["phase"]}
         for kind in ("recorded_n", "spread_n", "modelled_n"):
             columns |= {f"{kind[:-2]}_{name}_n": series for name, series in answer[kind].items()}
-        _write_csv(output, list(columns), list(columns.values()))
+        _write_forces(output, list(columns), list(columns.values()))
     if plot:
         write_plot(answer, plot)
 
@@ -253,14 +252,8 @@ def _beats(answer: f.Forces) -> None:
     table(["mean beat", *heads], [[name, *map(unit.show, values)] for name, values in found.items()])
 
 
-def _write_csv(path: Path, names: Sequence[str], columns: Sequence[Sequence[float]]) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(names)
-            writer.writerows(zip(*columns, strict=True))
-    except OSError as error:
-        raise WingfitError(f"cannot write {path}", error.strerror or str(error)) from error
+def _write_forces(path: Path, names: Sequence[str], columns: Sequence[Sequence[float]]) -> None:
+    write_csv(path, names, zip(*columns, strict=True))
     note(f"forces written to {path}")
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import mkstemp
 from urllib.parse import quote
 
-from wingfit.records.files.permissions import FILE, open_new
+from wingfit.client.private_files import FILE, open_new
 from wingfit.service.storage.backup_contents import Contents, ContentsError, contents, revoke_keys
 from wingfit.service.storage.backup_rows import RowError, check_rows
 from wingfit.service.storage.backup_schema import SchemaError, check_schema

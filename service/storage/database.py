@@ -27,8 +27,8 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import QueuePool, StaticPool
 
+from wingfit.client import private_files
 from wingfit.service.auth.access import OwnSession
-from wingfit.records.files import permissions
 from wingfit.service.storage import fail_points
 from wingfit.service.storage.disk_space import FULL
 
@@ -70,7 +70,7 @@ class FolderLock:
         if self.path in self._held:
             raise DataFolderError(f"this process already serves the data folder {folder}")
         try:
-            permissions.make_file(self.path)
+            private_files.make_file(self.path)
             self._file: IO[str] = self.path.open("a+", encoding="ascii")
         except OSError as error:
             raise DataFolderError(
@@ -204,15 +204,15 @@ class Database:
 
 def make_folder(folder: Path) -> None:
     """Create a data folder, or close one to other users."""
-    permissions.make_folder(folder, FILE_NAME, LOCK_NAME)
+    private_files.make_folder(folder, FILE_NAME, LOCK_NAME)
 
 
 def _close_to_others(path: Path) -> None:
     """Let only the owner read the database at ``path`` (created if missing) and its log."""
-    permissions.make_file(path)
+    private_files.make_file(path)
     for name in (f"{path}-wal", f"{path}-shm"):  # new ones get the rights of the database
         with suppress(FileNotFoundError):
-            permissions.tighten(Path(name))
+            private_files.tighten(Path(name))
 
 
 def revisions() -> list[str]:

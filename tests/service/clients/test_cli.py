@@ -21,8 +21,9 @@ import typer
 from tests.service import toy
 from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
 from wingfit.cli import main as cli
-from wingfit.cli import output, runs
-from wingfit.cli.output import duration, mm, number
+from wingfit.cli import runs
+from wingfit.cli.base import output
+from wingfit.cli.base.output import duration, mm, number
 from wingfit.cli.simulate import marker_distances
 from wingfit.records import Dataset, save_dataset
 from wingfit.sim.effects.registry import EFFECTS

@@ -14,8 +14,8 @@ from plotly.graph_objects import Figure
 from tests.service.clients.test_cli import wingfit
 from tests.service.processes import ServerProcess
 from tests.service.runs import force_data
+from wingfit.cli.base.rounding import correlation, force_unit, kept, with_unit
 from wingfit.cli.forces.plot import write_plot
-from wingfit.cli.rounding import correlation, force_unit, kept, with_unit
 from wingfit.client.client import Client, WingfitError
 from wingfit.records import load_dataset
 from wingfit.sim.virtual_rigs.balance import TRIALS, read_truth

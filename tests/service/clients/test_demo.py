@@ -14,9 +14,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from examples import demo
 from tests.service import toy
 from tests.service.processes import ROOT, heed_interrupts
-from examples import demo
 
 INTERRUPTIBLE = """
 import sys

@@ -13,7 +13,7 @@ from tests.records.samples import falcon_dataset
 from tests.service.conftest import Api, serving
 from tests.service.pages.browsing import DRAWN, Seen
 from tests.service.runs import force_data
-from wingfit.cli.rounding import correlation, kept, with_unit
+from wingfit.cli.base.rounding import correlation, kept, with_unit
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 from wingfit.workers import make_evaluator

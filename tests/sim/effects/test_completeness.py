@@ -22,7 +22,9 @@ def test_has_a_page_with_its_figure(name: str) -> None:
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_has_tests_of_its_own(name: str) -> None:
-    assert "def test_" in next((ROOT / "tests" / "sim" / "effects").glob(f"*/test_{name}.py")).read_text(encoding="utf-8")
+    assert "def test_" in next((ROOT / "tests" / "sim" / "effects").glob(f"*/test_{name}.py")).read_text(
+        encoding="utf-8"
+    )
 
 
 def test_every_file_that_declares_an_effect_is_registered() -> None:

@@ -1,0 +1,4 @@
+"""Limits that the command line and the server share; imports nothing, so that the command line starts at once."""
+
+MOST_WORKERS = 256
+"""Worker processes of an evaluator; each takes some hundred megabytes."""
