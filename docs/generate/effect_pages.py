@@ -14,7 +14,8 @@ from pathlib import Path
 from wingfit.sim.effects.contract import Effect, Measure, Parameter
 from wingfit.sim.effects.registry import EFFECTS
 
-FOLDER = Path(__file__).parents[2] / "docs" / "effects"
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "docs" / "effects"
 INDEX = FOLDER.parent / "effects.md"
 _MEASURES: dict[Measure, str] = {"span": "spans", "chord": "mean chords", "mass": "wing masses"}
 _POWERS = {
@@ -77,7 +78,8 @@ def power(effect: Effect) -> str:
 
 def source(effect: Effect) -> str:
     """Where the law is from, and where it is tested."""
-    return f"{effect.source}.\n\nTests: `tests/sim/effects/test_{effect.name}.py`."
+    (tests,) = (ROOT / "tests" / "sim" / "effects").glob(f"*/test_{effect.name}.py")
+    return f"{effect.source}.\n\nTests: `{tests.relative_to(ROOT)}`."
 
 
 def index() -> str:
