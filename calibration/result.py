@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,6 @@ from wingfit.calibration.estimates.uncertainty import Standing, standing
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.plan import Stage, plan
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.calibration.search import found
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.records import Dataset, Gene, Genome
 from wingfit.records.blas_threads import one_blas_thread
@@ -24,7 +23,7 @@ from wingfit.sim.wing.alignment import recorded_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 if TYPE_CHECKING:
-    from wingfit.calibration.forces.result import ForceResult
+    pass
 
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
@@ -96,19 +95,6 @@ class Comparison:
     simulated: npt.NDArray[np.float64]
     accuracy: float
     solution: Solution
-
-
-@one_blas_thread
-def summarise(
-    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
-) -> Result | ForceResult:
-    """Judge what a calibration found, by its last ``checkpoint``, on every recording of the dataset."""
-    if dataset.kind == "forces":
-        from wingfit.calibration.forces.estimation import summarise_forces  # its results are made of these
-
-        return summarise_forces(spec, dataset, evaluator, checkpoint)
-    (*_, genome) = found(spec, dataset, checkpoint).values()
-    return judge(spec, dataset, evaluator, genome)
 
 
 @one_blas_thread

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from wingfit.calibration.forces.result import ForceResult
-from wingfit.calibration.result import Result, summarise
+from wingfit.calibration.result import Result
 from wingfit.calibration.search import calibrate as generations_of
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.calibration.summary import summarise
 from wingfit.diagnosis import DiagnosisSpec, Finding
 from wingfit.diagnosis import diagnose as steps_of
 from wingfit.records import Dataset

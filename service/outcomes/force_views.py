@@ -22,6 +22,7 @@ from wingfit.calibration.forces.result import (
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Condition, Dataset, Recording
 from wingfit.service.outcomes import force_schemas as schemas
+from wingfit.service.outcomes.series import rounded
 from wingfit.service.runs.schemas import ResultOut
 from wingfit.service.runs.views import gene
 from wingfit.service.units import PASCAL_PER_MBAR, ZERO_CELSIUS, finite, mn
@@ -33,7 +34,6 @@ Matrix = tuple[tuple[float, ...], ...]
 
 NORMAL_90 = 1.6448536269514722  # 90 of 100 draws of a normal distribution lie within so many standard deviations
 MN2 = 1e6
-DIGITS = 7  # of a series: beyond, there is only noise
 
 
 def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> schemas.ForceResultOut:
@@ -125,7 +125,7 @@ def condition(asked: schemas.PredictionIn) -> Condition:
 
 def prediction(found: Prediction) -> Json:
     """Predicted forces as plain JSON (`force_schemas.PredictionOut`)."""
-    series = {f"{name}_n": _series(values) for name, values in found.forces.items()}
+    series = {f"{name}_n": rounded(values) for name, values in found.forces.items()}
     means = {name: float(found.forces[name].mean()) for name in ("lift", "drag")}
     return {
         "coefficients": dict(found.values),
@@ -220,11 +220,5 @@ def _part(percent: float | None, nothing: Any) -> Any:
 
 def _named(series: Mapping[Quantity, Array], *, exact: bool = False) -> Json:
     """Series by quantity, those that do not exist left out; ``exact`` keeps all digits."""
-    plain = (lambda values: values.tolist()) if exact else _series
+    plain = (lambda values: values.tolist()) if exact else rounded
     return {name: plain(values) for name, values in series.items() if np.isfinite(values).all()}
-
-
-def _series(values: Array) -> list[float]:
-    largest = float(np.abs(values).max())
-    places = DIGITS - math.ceil(math.log10(largest)) if largest > 0 else 0
-    return list((np.round(values, places) + 0.0).tolist())

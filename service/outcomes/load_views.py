@@ -13,6 +13,7 @@ import numpy.typing as npt
 from wingfit.records import Condition
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.service.outcomes.load_schemas import OUTPUT_NAMES, ConditionIn, OutputName
+from wingfit.service.outcomes.series import rounded
 from wingfit.service.units import MM, PASCAL_PER_MBAR, ZERO_CELSIUS, mm
 from wingfit.sim.wing.outputs import ConnectorLoad, Outputs, Section, Strip
 
@@ -21,7 +22,6 @@ Json = dict[str, Any]
 
 SIDE = np.array([0.0, 1.0, 0.0])
 # Digits below the largest value of a series that go out: beyond, there is only the integrator's error.
-DIGITS = 7
 
 
 def wanted(asked: bool | Iterable[OutputName]) -> tuple[OutputName, ...]:
@@ -60,7 +60,7 @@ def outputs(found: Outputs, names: Iterable[OutputName]) -> Json:
         steps, beats, error = found.solution
         answer["solved"] = {"steps_per_beat": steps, "beats": beats, "estimated_error_mm": mm(error)}
     for name in names:
-        answer |= _VIEWS[name](found, lambda series: _plain(series[order]))
+        answer |= _VIEWS[name](found, lambda series: rounded(series[order]))
     return answer
 
 
@@ -167,10 +167,3 @@ _VIEWS: Mapping[OutputName, Callable[[Outputs, Put], Json]] = {
     "energy": _energy,
     "averages": _averages,
 }
-
-
-def _plain(series: Array) -> list[Any]:
-    """Numbers rounded to DIGITS below the largest: a wing of many bodies has megabytes of them."""
-    largest = float(np.abs(series).max())
-    places = DIGITS - math.ceil(math.log10(largest)) if largest > 0 else 0
-    return list((np.round(series, places) + 0.0).tolist())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Protocol
 
-from wingfit.calibration import result, search
+from wingfit.calibration import result, search, summary
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces import estimation
 from wingfit.calibration.forces.agreement import agreements
@@ -144,7 +144,7 @@ class ModelEngine:
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
     ) -> Result | ForceResult:
         """Judge what the search found on every recording."""
-        return result.summarise(spec, dataset, evaluator, checkpoint)
+        return summary.summarise(spec, dataset, evaluator, checkpoint)
 
     def compare(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str

@@ -19,8 +19,9 @@ import numpy.typing as npt
 from wingfit.records import EstimateError, Gene, Recording, Vehicle
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects import registry
+from wingfit.sim.effects.apply import apply, observed
 from wingfit.sim.effects.contract import Effect
-from wingfit.sim.effects.ports.observation import Sampling, apply, observed
+from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.vehicle import ROTATION_POINT, Setting, VehicleScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.model import Observation, genome_batch

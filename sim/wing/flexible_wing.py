@@ -14,8 +14,9 @@ import numpy.typing as npt
 
 from wingfit.records import Condition, Gene, Recording, Wing
 from wingfit.records.blas_threads import one_blas_thread
+from wingfit.sim.effects.apply import apply, observed
 from wingfit.sim.effects.contract import Effect
-from wingfit.sim.effects.ports.observation import Sampling, apply, observed
+from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.effects.registry import chosen

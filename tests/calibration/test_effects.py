@@ -18,8 +18,8 @@ from wingfit.calibration.estimates.uncertainty import uncertainty
 from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.initial_effect_position import placed
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.calibration.result import summarise
 from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.calibration.summary import summarise
 from wingfit.records import Dataset, Gene, Genome, Recording
 from wingfit.sim.effects.contract import Effect, Parameter, Values
 from wingfit.sim.effects.ports.observation import Sampling

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import pytest
 
 from wingfit import diagnosis
-from wingfit.calibration import evaluator, result, search
+from wingfit.calibration import evaluator, result, search, summary
 from wingfit.calibration.estimates import likelihood, noise, uncertainty
 from wingfit.calibration.forces import agreement, estimation, global_model
 from wingfit.records import blas_threads
@@ -34,7 +34,7 @@ GUARDED: tuple[Callable[..., object], ...] = (
     estimation.summarise_forces, estimation.compare_forces, estimation.predict,
     agreement.agreements, agreement.comparison, agreement.located, agreement.lacking,
     evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
-    noise.noise_distance, result.summarise, result.judge, result.compare, search.calibrate,
+    noise.noise_distance, summary.summarise, result.judge, result.compare, search.calibrate,
     uncertainty.standing, uncertainty.uncertainty,
     diagnosis.check, diagnosis.diagnose, diagnosis.diagnose_subject,
     free_flight.free_flight, free_flight.recording, rigid_body.poses,

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import Genome, Recording, Vehicle, Wing
+from wingfit.sim.effects.apply import apply
 from wingfit.sim.effects.contract import Effect
-from wingfit.sim.effects.ports.observation import Sampling, apply
+from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing

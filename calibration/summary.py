@@ -1,0 +1,25 @@
+"""The outcome of a calibration of either kind, from its last checkpoint."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wingfit.calibration.evaluator import Evaluator
+from wingfit.calibration.forces.estimation import summarise_forces
+from wingfit.calibration.forces.result import ForceResult
+from wingfit.calibration.result import Result, judge
+from wingfit.calibration.search import found
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.records import Dataset
+from wingfit.records.blas_threads import one_blas_thread
+
+
+@one_blas_thread
+def summarise(
+    spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
+) -> Result | ForceResult:
+    """Judge the genome of a calibration's last ``checkpoint`` on every recording of the dataset, held-out ones too."""
+    if dataset.kind == "forces":
+        return summarise_forces(spec, dataset, evaluator, checkpoint)
+    (*_, genome) = found(spec, dataset, checkpoint).values()
+    return judge(spec, dataset, evaluator, genome)
