@@ -1,17 +1,17 @@
 // The page: lists at the side, the state of the server, and what the address after # names.
 
-import { askForKey, isRefused, setUpAccess } from "./access.js";
-import { get } from "./api.js";
-import { redrawComparison, setUpCompare, showComparison } from "./compare.js";
-import { redrawDataset, selectDataset, setUpDataset } from "./dataset.js";
-import { diagnose, selectDiagnosis, setUpDiagnosis } from "./diagnosis.js";
-import { showEffects } from "./effects.js";
-import { redrawFinding } from "./finding.js";
-import { $, plural, toast } from "./format.js";
-import { refreshListing, setUpListing, showListing } from "./listing.js";
-import { drawDatasets, drawDiagnoses, drawRuns } from "./lists.js";
-import { redraw, selectRun, setUpRun } from "./run.js";
-import { openSubmit, remove, setUpSubmit } from "./submit.js";
+import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
+import { get } from "./base/api.js";
+import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
+import { redrawDataset, selectDataset, setUpDataset } from "./pages/dataset.js";
+import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
+import { showEffects } from "./pages/effects.js";
+import { redrawFinding } from "./parts/finding.js";
+import { $, plural, toast } from "./base/format.js";
+import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
+import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
+import { redraw, selectRun, setUpRun } from "./pages/run.js";
+import { openSubmit, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
 const SHOWN = 50;

@@ -1,8 +1,8 @@
 // Forces over the beat, recorded and modelled, and their power spectra.
 
-import { $, forceUnit, significant } from "./format.js";
-import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "./plots.js";
-import { QUANTITIES, SOURCES } from "./words.js";
+import { $, forceUnit, significant } from "../base/format.js";
+import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "../base/plots.js";
+import { QUANTITIES, SOURCES } from "../base/labels.js";
 
 const HARMONICS = 8;
 const DECADES = 6;

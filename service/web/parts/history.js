@@ -1,8 +1,8 @@
 // Fitness by generation: best and mean on a log axis, with the boundaries of the stages.
 
-import { mm, plain, significant, withForceUnit } from "./format.js";
-import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
-import { newtons } from "./words.js";
+import { mm, plain, significant, withForceUnit } from "../base/format.js";
+import { axis, CONFIG, layout, plotly, theme } from "../base/plots.js";
+import { newtons } from "../base/labels.js";
 
 const GAP = { sequence: null, best: null, mean: null };
 const SIDE_BY_SIDE = 3; // stages whose names fit over the figure; of more, they stand upright

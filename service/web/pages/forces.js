@@ -1,13 +1,13 @@
 // The part of the page that shows a run on forces: coefficients, forces over the beat, agreement, prediction.
 
-import { get, part } from "./api.js";
-import { drawAgreement, fillQuantities } from "./agreement.js";
-import { drawBeats } from "./beats.js";
-import { drawCorrelation, drawEstimates, fillEstimates } from "./estimates.js";
-import { $, el } from "./format.js";
-import { clearPrediction, redrawPrediction, setUpPrediction, showPrediction } from "./predict.js";
-import { showRemarks } from "./said.js";
-import { SOURCES } from "./words.js";
+import { get, part } from "../base/api.js";
+import { drawAgreement, fillQuantities } from "../parts/agreement.js";
+import { drawBeats } from "../parts/beats.js";
+import { drawCorrelation, drawEstimates, fillEstimates } from "../parts/estimates.js";
+import { $, el } from "../base/format.js";
+import { clearPrediction, redrawPrediction, setUpPrediction, showPrediction } from "../parts/predict.js";
+import { showRemarks } from "../base/form_errors.js";
+import { SOURCES } from "../base/labels.js";
 
 let run = null;
 let dataset = null;

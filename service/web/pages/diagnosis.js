@@ -1,11 +1,11 @@
 // The selected diagnosis: progress, verdict, and what was found.
 
-import { call, follow, get, isFinal, part, postJson } from "./api.js";
-import { $, plural, toast, when } from "./format.js";
-import { setUpFinding, showFinding } from "./finding.js";
-import { badge, setBar, timeLeft } from "./lists.js";
+import { call, follow, get, isFinal, part, postJson } from "../base/api.js";
+import { $, plural, toast, when } from "../base/format.js";
+import { setUpFinding, showFinding } from "../parts/finding.js";
+import { badge, setBar, timeLeft } from "../parts/sidebar.js";
 import { randomKey, remove } from "./submit.js";
-import { forceSetup, isForces, modelOf, withEffects } from "./words.js";
+import { forceSetup, isForces, modelOf, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};

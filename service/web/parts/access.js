@@ -1,9 +1,9 @@
 // Who is calling: where the server asks for a key, it is given here once and kept in a cookie that no script can read.
 
-import { call, get, postJson } from "./api.js";
-import { askKeyInCurl } from "./copying.js";
-import { $ } from "./format.js";
-import { showErrors } from "./said.js";
+import { call, get, postJson } from "../base/api.js";
+import { askKeyInCurl } from "../base/copying.js";
+import { $ } from "../base/format.js";
+import { showErrors } from "../base/form_errors.js";
 
 export const isRefused = (error) => error.status === 401;
 

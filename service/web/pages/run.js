@@ -1,16 +1,16 @@
 // The selected run: progress, figures, tables, actions.
 
-import { call, follow, get, history, isFinal, part } from "./api.js";
-import { copy, curl, python } from "./copying.js";
-import { $, plural, toast, when } from "./format.js";
+import { call, follow, get, history, isFinal, part } from "../base/api.js";
+import { copy, curl, python } from "../base/copying.js";
+import { $, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
-import { aboutHistory, drawHistory } from "./history.js";
-import { badge, runName, setBar, timeLeft } from "./lists.js";
-import { redrawLoads } from "./loads.js";
+import { aboutHistory, drawHistory } from "../parts/history.js";
+import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
+import { redrawLoads } from "../parts/loads.js";
 import { remove } from "./submit.js";
-import { drawGenes, drawMisfit, drawNumbers } from "./tables.js";
-import { hideWing, redrawWing, setUpViewer, showWing } from "./viewer.js";
-import { isForces, request, setup } from "./words.js";
+import { drawGenes, drawMisfit, drawNumbers } from "../parts/tables.js";
+import { hideWing, redrawWing, setUpViewer, showWing } from "../parts/viewer.js";
+import { isForces, request, setup } from "../base/labels.js";
 
 const ALLOWED = {
   pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],

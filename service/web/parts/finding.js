@@ -1,9 +1,9 @@
 // What a diagnosis found, as figures: evidence, where on the wing and in the beat, before and after.
 
-import { $, DASH, el, fixed, significant } from "./format.js";
-import { lines } from "./plots.js";
+import { $, DASH, el, fixed, significant } from "../base/format.js";
+import { lines } from "../base/plots.js";
 import { drawMarkers, drawMissing, drawPhases } from "./residuals.js";
-import { capital, spoken } from "./words.js";
+import { capital, spoken } from "../base/labels.js";
 
 const RANKED = 6;
 const ALMOST = 0.999;

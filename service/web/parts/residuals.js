@@ -1,7 +1,7 @@
 // Maps of a finding: misfit on the wing, misfit over span and phase, the load that is missing.
 
-import { plain } from "./format.js";
-import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "./plots.js";
+import { plain } from "../base/format.js";
+import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "../base/plots.js";
 
 const MARGIN = { l: 10, r: 8, t: 8, b: 10 };
 const bar = (look, title) => ({ thickness: 10, len: 0.9, outlinewidth: 0, title: { text: title, side: "right", font: { color: look.quiet } }, tickfont: { color: look.quiet } });

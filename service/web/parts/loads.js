@@ -1,8 +1,8 @@
 // What acts inside the wing and on it, over one beat: torques, powers, forces, bending moments, energies.
 
-import { get, part } from "./api.js";
-import { $, el, kept, significant } from "./format.js";
-import { lines } from "./plots.js";
+import { get, part } from "../base/api.js";
+import { $, el, kept, significant } from "../base/format.js";
+import { lines } from "../base/plots.js";
 
 const ASKED = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
 

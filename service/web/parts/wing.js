@@ -1,7 +1,7 @@
 // Recorded over simulated markers: in 3-D at one phase, and their height over the beat.
 
-import { plain, significant } from "./format.js";
-import { axis, CONFIG, layout, plotly, theme } from "./plots.js";
+import { plain, significant } from "../base/format.js";
+import { axis, CONFIG, layout, plotly, theme } from "../base/plots.js";
 
 const SHOWN = 4;
 const AXES = ["x aft, mm", "y span, mm", "z up, mm"];

@@ -1,9 +1,9 @@
 // Pages of everything that there is: #runs, #diagnoses, #datasets; newest first, as many as one asks for.
 
-import { get, part } from "./api.js";
-import { $, DASH, el, plural, size, toast, when } from "./format.js";
-import { badge, runName, stateWord, timeLeft } from "./lists.js";
-import { isForces, METHODS, misfit, modelOf, withEffects } from "./words.js";
+import { get, part } from "../base/api.js";
+import { $, DASH, el, plural, size, toast, when } from "../base/format.js";
+import { badge, runName, stateWord, timeLeft } from "../parts/sidebar.js";
+import { isForces, METHODS, misfit, modelOf, withEffects } from "../base/labels.js";
 
 const SHOWN = 100;
 export const MOST_COMPARED = 6;

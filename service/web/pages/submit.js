@@ -1,10 +1,10 @@
 // Starting a run and uploading a dataset; the server checks, and its words are shown where they belong.
 
-import { ApiError, call, get, part, postJson } from "./api.js";
-import { copy, curl, python } from "./copying.js";
-import { $, el, size, toast } from "./format.js";
-import { showErrors } from "./said.js";
-import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "./words.js";
+import { ApiError, call, get, part, postJson } from "../base/api.js";
+import { copy, curl, python } from "../base/copying.js";
+import { $, el, size, toast } from "../base/format.js";
+import { showErrors } from "../base/form_errors.js";
+import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
 
 const TYPED_MS = 350;
 // A field that holds no number says that it is empty, which would mean the default.

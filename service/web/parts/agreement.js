@@ -1,7 +1,7 @@
 // How well each model agrees with each recording: differences, correlation, averages over the beat.
 
-import { $, correlation, el, forceUnit, kept } from "./format.js";
-import { QUANTITIES, SOURCES } from "./words.js";
+import { $, correlation, el, forceUnit, kept } from "../base/format.js";
+import { QUANTITIES, SOURCES } from "../base/labels.js";
 
 const columns = ({ unit, show }) => [
   [unit, (a) => show(a.rmse_n)], ["%", (a) => kept(a.rmse_percent)], ["r", (a) => correlation(a.correlation)],

@@ -1,11 +1,11 @@
 // The selected dataset: what was recorded, under which conditions, and what was made of it.
 
-import { get, part } from "./api.js";
-import { $, el, plain, plural, significant, size, toast, when } from "./format.js";
-import { badge, runName } from "./lists.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
+import { get, part } from "../base/api.js";
+import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
+import { badge, runName } from "../parts/sidebar.js";
+import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
 import { remove } from "./submit.js";
-import { isForces, misfit } from "./words.js";
+import { isForces, misfit } from "../base/labels.js";
 
 const LISTED = 10;
 const WAYS = [

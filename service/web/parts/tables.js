@@ -1,7 +1,7 @@
 // Tables of a run: numbers at the top, misfit by recording, genes.
 
-import { $, el, forceUnit, kept, mm, plural, significant } from "./format.js";
-import { isForces, misfit, newtons } from "./words.js";
+import { $, el, forceUnit, kept, mm, plural, significant } from "../base/format.js";
+import { isForces, misfit, newtons } from "../base/labels.js";
 
 export function drawNumbers(run, result) {
   const cell = (label, value, unit = "", main = false) =>

@@ -1,8 +1,8 @@
 // The lists of runs, diagnoses and datasets at the side.
 
-import { isFinal } from "./api.js";
-import { $, DASH, duration, el, plural, size, when } from "./format.js";
-import { isForces, misfit, modelOf } from "./words.js";
+import { isFinal } from "../base/api.js";
+import { $, DASH, duration, el, plural, size, when } from "../base/format.js";
+import { isForces, misfit, modelOf } from "../base/labels.js";
 
 const WORDS = {
   QUEUED: "waiting", RUNNING: "running", PAUSED: "paused", SUCCEEDED: "done", FAILED: "failed", CANCELLED: "cancelled",

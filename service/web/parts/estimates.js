@@ -1,7 +1,7 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
-import { $, correlation, el, fixed, kept, plain, plural, significant } from "./format.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
+import { $, correlation, el, fixed, kept, plain, plural, significant } from "../base/format.js";
+import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
 
 const STRONG = 0.9;
 

@@ -1,11 +1,11 @@
 // Runs beside each other (#compare=ID,ID): how they were set, how they went, what they found.
 
-import { get, history, part } from "./api.js";
-import { $, DASH, duration, el, kept, plain, significant, toast } from "./format.js";
-import { badge, runName } from "./lists.js";
-import { MOST_COMPARED } from "./listing.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "./plots.js";
-import { isForces, request, spoken } from "./words.js";
+import { get, history, part } from "../base/api.js";
+import { $, DASH, duration, el, kept, plain, significant, toast } from "../base/format.js";
+import { badge, runName } from "../parts/sidebar.js";
+import { MOST_COMPARED } from "./table_page.js";
+import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { isForces, request, spoken } from "../base/labels.js";
 
 let shown = [];
 let asked = "";

@@ -1,8 +1,8 @@
 // What a model can contain beyond its nominal physics (#effects, #effects=NAME): laws, genes, sources.
 
-import { get } from "./api.js";
-import { $, el, significant, toast } from "./format.js";
-import { capital, spoken } from "./words.js";
+import { get } from "../base/api.js";
+import { $, el, significant, toast } from "../base/format.js";
+import { capital, spoken } from "../base/labels.js";
 
 const PARTS = { span: "spans", chord: "mean chords", mass: "masses of the wing" };
 

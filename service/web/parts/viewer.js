@@ -1,7 +1,7 @@
 // The part of the page that shows the wing: recording, genome, phase, play.
 
-import { get, part } from "./api.js";
-import { $, mm, significant } from "./format.js";
+import { get, part } from "../base/api.js";
+import { $, mm, significant } from "../base/format.js";
 import { clearLoads, setUpLoads, showLoads } from "./loads.js";
 import { byPhase, drawBeat, drawWing, meanDistance } from "./wing.js";
 

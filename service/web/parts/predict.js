@@ -1,10 +1,10 @@
 // Forces that the global model of a run predicts for a condition that somebody asks for.
 
-import { part, postJson } from "./api.js";
-import { $, el, forceUnit, significant } from "./format.js";
-import { lines } from "./plots.js";
-import { showErrors, showRemarks } from "./said.js";
-import { NO_NUMBER } from "./submit.js";
+import { part, postJson } from "../base/api.js";
+import { $, el, forceUnit, significant } from "../base/format.js";
+import { lines } from "../base/plots.js";
+import { showErrors, showRemarks } from "../base/form_errors.js";
+import { NO_NUMBER } from "../pages/submit.js";
 
 let run = null;
 let prediction = null;
