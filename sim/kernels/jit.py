@@ -89,7 +89,7 @@ def _cache_folder(source: Path) -> Path:
         Path(numba.config.CACHE_DIR) if numba.config.CACHE_DIR else beside,
         Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wingfit",
     )
-    inner = Path(source.stem if alone else "", f"kernels-{digest.hexdigest()[:16]}")
+    inner = Path(source.stem, f"kernels-{digest.hexdigest()[:16]}")
     for base in places:
         folder = base / inner
         with suppress(OSError):

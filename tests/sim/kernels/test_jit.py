@@ -56,10 +56,10 @@ def test_a_read_only_installation_brings_its_kernels_along(tmp_path: Path) -> No
     (package / "helper.py").write_text(HELPER.format(how="inlined", factor=2))
     assert run(tmp_path) == ["6.0", "0"]
     assert run(tmp_path, NUMBA_CACHE_DIR=str(cache)) == ["6.0", "1"]
-    (folder,) = cache.iterdir()
+    (folder,) = (cache / package.name).iterdir()
     (package / "helper.py").write_text(HELPER.format(how="inlined", factor=3))
     assert run(tmp_path, NUMBA_CACHE_DIR=str(cache)) == ["9.0", "0"], "what was compiled from other code is left behind"
-    assert len(list(cache.iterdir())) == 2
+    assert len(list((cache / package.name).iterdir())) == 2
     assert folder.is_dir()
 
 
@@ -92,7 +92,7 @@ def test_where_no_cache_can_be_written(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "file").touch()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert jit._cache_folder.__wrapped__(tmp_path).parent == tmp_path / "wingfit"
+    assert jit._cache_folder.__wrapped__(tmp_path).parent == tmp_path / "wingfit" / tmp_path.stem
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(OSError, match="NUMBA_CACHE_DIR"):
         jit._cache_folder.__wrapped__(tmp_path)
