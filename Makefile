@@ -18,12 +18,11 @@ serve: $(INSTALLED)  ## start the service and stay
 test: $(INSTALLED)  ## every check and every test, three at a time: servers and browsers wait more than they compute
 	@$(MAKE) --no-print-directory -k -j3 test-rest test-service test-pages check
 
-PAGES := $(wildcard tests/service/test_page*.py tests/service/test_*_page.py)
 test-service:
-	$(BIN)/python -m pytest tests/service $(PAGES:%=--ignore %)
+	$(BIN)/python -m pytest tests/service --ignore tests/service/pages
 
 test-pages:
-	$(BIN)/python -m pytest $(PAGES)
+	$(BIN)/python -m pytest tests/service/pages
 
 test-rest:
 	$(BIN)/python -m pytest --ignore tests/service

@@ -19,8 +19,8 @@ from scipy.linalg import eigh
 
 from benchmarks.common.machine import commit, cpu
 from benchmarks.physics.beam_theory import Beam, Family, elastica, reference, torsion_constant
+from benchmarks.physics.plates import displacement, stiffness_matrix
 from benchmarks.physics.spring_chain import cut_beam, genome, spring_chain
-from tests.sim.wing.plates import displacement, stiffness_matrix
 from wingfit.records import Wing
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.solver.numerics import Numerics

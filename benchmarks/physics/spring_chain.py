@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from benchmarks.physics.beam_theory import Beam
-from tests.sim.wing.plates import loaded, plate, spring_wrenches
+from benchmarks.physics.plates import loaded, plate, spring_wrenches
 from wingfit.records import Materials, Rod, Station
 from wingfit.sim.kernels import LANES
 from wingfit.sim.solver.scene import at_rest

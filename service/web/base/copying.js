@@ -25,7 +25,7 @@ function literal(value) {
 export function python({ dataset_id: dataset, ...spec }) {
   const server = new URL(".", document.baseURI).href.replace(/\/$/, "");
   return [
-    "from wingfit.client.client import Client", "",
+    "from wingfit import Client", "",
     `with Client(${literal(server)}) as client:`,
     "    run = client.submit_run(",
     `        ${literal(dataset)},`,

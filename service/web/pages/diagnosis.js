@@ -74,7 +74,7 @@ function update() {
   const done = diagnosis.state === "SUCCEEDED";
   document.title = `${diagnosis.name} · wingfit`;
   $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
-  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(wingfit.diagnosis.spec), ...(isForces(diagnosis) ? forceSetup(wingfit.diagnosis.spec) : []),
+  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";
@@ -84,7 +84,7 @@ function update() {
     diagnosis.state === "RUNNING" ? diagnosis.stage : null,
     plural(diagnosis.evaluations, "evaluation")].filter(Boolean).join(" · ");
   $("verdict-part").hidden = !done;
-  $("verdict").textContent = wingfit.diagnosis.verdict.verdict ?? "";
+  $("verdict").textContent = diagnosis.verdict ?? "";
   $("diagnosis-summary").textContent = diagnosis.summary ?? "";
   for (const id of ["report-link", "finding-exports"]) $(id).hidden = !done;
   $("report-link").href = `${path}/report`;

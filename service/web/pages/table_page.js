@@ -158,7 +158,7 @@ function runRow(run) {
 
 function diagnosisRow(diagnosis) {
   return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id), diagnosis.id)),
-    cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(wingfit.diagnosis.verdict.verdict ?? DASH),
+    cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(diagnosis.verdict ?? DASH),
     cell(modelOf(diagnosis)), cell(when(diagnosis.created_at)));
 }
 

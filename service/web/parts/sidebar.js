@@ -66,7 +66,7 @@ export function drawDiagnoses(diagnoses, currentId) {
     const card = el("a", { className: "card", href: `#diagnosis=${encodeURIComponent(diagnosis.id)}` },
       el("span", { className: "line" }, el("strong", {}, diagnosis.name), badge(diagnosis)), bar,
       el("span", { className: "line" }, el("span", {}, timeLeft(diagnosis) || when(diagnosis.created_at)),
-        el("span", {}, wingfit.diagnosis.verdict.verdict ?? "")));
+        el("span", {}, diagnosis.verdict ?? "")));
     if (diagnosis.id === currentId) card.setAttribute("aria-current", "true");
     return el("li", { className: diagnosis.id === currentId ? "current" : "" }, keyed(card, diagnosis.id));
   });

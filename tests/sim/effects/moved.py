@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from benchmarks.physics.plates import loaded
 from tests.sim.kernels.marching import plank
-from tests.sim.wing.plates import loaded
 from wingfit.records import Condition, Wing
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.sim.wing.plates import cut, loaded, plate, straight_rod
+from benchmarks.physics.plates import cut, loaded, plate, straight_rod
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.air import strip_flow, strip_forces
 from wingfit.sim.kernels.arrays import AREA, FLOW, GEOMETRY, LOADS

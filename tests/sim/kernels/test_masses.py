@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
+from benchmarks.physics.plates import loaded
 from tests.sim.kernels.marching import ORDER, driven, march, order, plank, vacuum_here, with_connectors
-from tests.sim.wing.plates import loaded
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES

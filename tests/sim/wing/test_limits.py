@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 from scipy.interpolate import CubicSpline
 
+from benchmarks.physics.plates import loaded
 from tests.sim.kernels.marching import CHORD, DENSITY, LENGTH, ORDER, THICKNESS, driven, march, plank, vacuum_here
-from tests.sim.wing.plates import loaded
 from wingfit.records import Condition, FourBarDrive, Genome
 from wingfit.sim.kernels.arrays import Setting
 from wingfit.sim.solver.scene import at_rest, setting

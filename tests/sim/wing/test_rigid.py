@@ -10,6 +10,7 @@ from scipy.linalg import eig, eigh
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
+from benchmarks.physics.plates import loaded
 from tests.sim.kernels.marching import (
     ORDER,
     STIFF_ORDER,
@@ -21,7 +22,6 @@ from tests.sim.kernels.marching import (
     vacuum_here,
     with_connectors,
 )
-from tests.sim.wing.plates import loaded
 from wingfit.records import FourierDrive, Hinge
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes, State

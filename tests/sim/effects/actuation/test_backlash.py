@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.physics.plates import loaded
 from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of, told
 from tests.sim.effects.driving import robird
 from tests.sim.kernels.marching import CHORD, DENSITY, LENGTH, THICKNESS, march, plank, vacuum_here
-from tests.sim.wing.plates import loaded
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES

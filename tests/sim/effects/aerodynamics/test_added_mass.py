@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from benchmarks.physics.plates import loaded
 from tests.sim.kernels.marching import CHORD, LENGTH, THICKNESS, march, plank, with_connectors
-from tests.sim.wing.plates import loaded
 from wingfit.records import Condition, Materials, Wing
 from wingfit.sim.atmosphere import density
 from wingfit.sim.effects.library.aerodynamics import added_mass

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from benchmarks.physics.plates import loaded
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.effects.rigs import bare, force_recording
 from tests.sim.kernels.marching import CHORD, LENGTH, plank
-from tests.sim.wing.plates import loaded
 from wingfit.records import Condition, FourierDrive, Hinge
 from wingfit.sim.effects.library.aerodynamics.clap_and_peel import EFFECT, fling_near
 from wingfit.sim.effects.ports.wing import WingScene

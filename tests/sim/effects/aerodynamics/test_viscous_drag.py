@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from benchmarks.physics.plates import loaded
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import CHORD, LENGTH, plank
-from tests.sim.wing.plates import loaded
 from wingfit.records import Condition
 from wingfit.sim.effects.library.aerodynamics.viscous_drag import EFFECT, viscosity
 from wingfit.sim.effects.ports.wing import WingScene
