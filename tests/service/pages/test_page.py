@@ -246,7 +246,7 @@ def test_every_file_of_the_page_is_small_and_has_no_inline_code() -> None:
     assert "style=" not in html
     assert " on" not in "".join(part.split(">")[0] for part in html.split("<")[1:] if " on" in part and "=" in part)
     assert html.count("<script") == 1
-    for path in web.iterdir():
+    for path in web.rglob("*.*"):
         text = path.read_text(encoding="utf-8")
         assert len(text.splitlines()) < 400, path.name
         addresses = [word for word in text.split() if "http" in word and os.sep * 2 in word]
