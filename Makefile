@@ -2,17 +2,19 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# What running needs, and with it the tools of development.
+RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
 
 .PHONY: demo proof test test-service test-pages test-rest check check-wheel serve format lock install pin-image check-image clean
 
-demo: $(INSTALLED)  ## start the service, calibrate the example campaign, print what came out
+demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
 
-proof: $(INSTALLED)  ## play both stories on concealed data, each ending with a report; under 15 minutes
+proof: $(RUNS)  ## play both stories on concealed data, each ending with a report; under 15 minutes
 	@$(BIN)/python -m benchmarks.proof --json
 
-serve: $(INSTALLED)  ## start the service and stay
+serve: $(RUNS)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
 test: $(INSTALLED)  ## every check and every test, three at a time: servers and browsers wait more than they compute
@@ -47,14 +49,19 @@ format: $(INSTALLED)  ## rewrite the code in the house format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-install: $(INSTALLED)  ## only install
+install: $(INSTALLED)  ## only install, with the tools of development
 
-# The stamp is written last, so an installation that was interrupted is done again. The package itself needs no
-# index: its build tool is in the lock file.
-$(INSTALLED): pyproject.toml requirements.lock | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements.lock
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+# Stamps are written last, so an installation that was interrupted is done again. The package itself needs no index: its
+# build tool is in the lock file, which as a list of constraints also gives the versions of what running needs.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+$(RUNS): pyproject.toml requirements.lock | $(BIN)/python
+	$(PIP) --constraint requirements.lock setuptools
+	$(PIP) --constraint requirements.lock --no-build-isolation -e .
 	@if [ -f sim/warm.py ]; then echo "compiling the simulator once ..." && $(BIN)/python -m wingfit.sim.warm; fi
+	@touch $@
+
+$(INSTALLED): $(RUNS)
+	$(PIP) -r requirements.lock
 	@touch $@
 
 $(BIN)/python:
