@@ -30,7 +30,7 @@ SOURCES = (".py", ".js", ".css", ".html")
 BEFORE = 36_543
 MOST_LINES = 400
 HELP_RUNS = 5
-# Words of shared/vocabulary.md with one meaning each that no reader would use so; words of many meanings (found, had,
+# Words of the private idiom with one meaning each that no reader would use so; words of many meanings (found, had,
 # kept) cannot be counted by a pattern.
 IDIOMS = (
     r"the data (?:can )?tell",
@@ -142,7 +142,8 @@ def idioms() -> Counter[str]:
 def _prose(path: Path) -> str:
     """Strings and comments of a Python file."""
     tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
-    return "\n".join(token.string for token in tokens if token.type in (tokenize.STRING, tokenize.COMMENT))
+    kinds = (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # from 3.12 on
+    return "\n".join(token.string for token in tokens if token.type in kinds)
 
 
 def help_seconds() -> float:

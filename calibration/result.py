@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +20,6 @@ from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-
-if TYPE_CHECKING:
-    pass
 
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 

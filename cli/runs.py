@@ -25,7 +25,7 @@ app.command()(forces)
 app.command()(predict)
 app.command("export")(export_run)
 INTERRUPTED = 130
-CLEAR = 2.0  # standard errors from which a value differs from zero; the page says it alike (web/tables.js)
+CLEAR = 2.0  # standard errors from which a value differs from zero; as the page says it (service/web/parts/tables.js)
 
 
 @app.command("list")

@@ -46,7 +46,7 @@ MAX_VALUES = 64_000_000
 """Numbers in one dataset, 8 bytes each in memory."""
 
 MAX_UPLOADED_NETCDF_VALUES = 8_000_000
-"""Numbers in a NetCDF file from a stranger, which is read within limits of memory (:mod:`records.files.confined`)."""
+"""Numbers in a NetCDF file from a stranger, which is read within limits of memory (`records/files/confined.py`)."""
 
 MAX_NAME_BYTES = 1024
 """Length of a text of fixed length in NetCDF: each one takes it in memory, however short the text is."""

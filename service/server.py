@@ -150,21 +150,26 @@ def main() -> None:
 
 def _listen(settings: Settings) -> socket.socket:
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    # Naming the protocol lets asyncio switch off Nagle's algorithm, which would delay every answer by 40 ms.
-    listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    try:
+        # Naming the protocol lets asyncio switch off Nagle's algorithm, which would delay every answer by 40 ms.
+        listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
+    except OSError as error:  # a system without IPv6
+        raise _cannot_listen(settings, error) from None
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((settings.host, settings.port))
         listening.listen(128)
-    except OSError as error:
+    except (OSError, TypeError, UnicodeError) as error:  # the latter: a name that no host can have
         listening.close()
-        remedy = (
-            "WINGFIT_PORT to a free port" if error.errno in PORT_TAKEN else "WINGFIT_HOST to an address of this machine"
-        )
-        raise ServeError(
-            f"cannot listen on {settings.host}, port {settings.port}: {error.strerror}; set {remedy}"
-        ) from None
+        raise _cannot_listen(settings, error) from None
     return listening
+
+
+def _cannot_listen(settings: Settings, error: Exception) -> ServeError:
+    taken = isinstance(error, OSError) and error.errno in PORT_TAKEN
+    remedy = "WINGFIT_PORT to a free port" if taken else "WINGFIT_HOST to an address of this machine"
+    reason = getattr(error, "strerror", None) or error
+    return ServeError(f"cannot listen on {settings.host}, port {settings.port}: {reason}; set {remedy}")
 
 
 if __name__ == "__main__":

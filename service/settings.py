@@ -19,7 +19,7 @@ LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 YES = ("1", "true", "yes", "y", "on")
 # In ASCII: int() also takes the digits of other scripts, underscores, and texts of any length.
 WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,18}")
-HOST_NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?")
+HOST_NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?\.?")
 NO = ("0", "false", "no", "n", "off")
 
 

@@ -1,4 +1,4 @@
-"""Forces, per cent and correlations as people read them; the page rounds alike (web/format.js)."""
+"""Forces, per cent and correlations as people read them; the page rounds alike (service/web/base/format.js)."""
 
 from __future__ import annotations
 

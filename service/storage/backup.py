@@ -9,7 +9,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from tempfile import mkstemp
+from tempfile import TemporaryDirectory, mkstemp
 from urllib.parse import quote
 
 from wingfit.client.private_files import FILE, open_new
@@ -19,6 +19,7 @@ from wingfit.service.storage.backup_schema import SchemaError, check_schema
 from wingfit.service.storage.database import FILE_NAME, Database, DataFolderError, FolderLock, make_folder
 
 SUFFIX = ".backup"
+STAGING = "restore-"
 
 
 class BackupError(RuntimeError):
@@ -93,12 +94,6 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
         brought = _put(backup, target, keep_keys)
     finally:
         lock.release()
-    try:
-        _check_opens(folder)
-    except (DataFolderError, RowError) as error:
-        for left in folder.glob(f"{FILE_NAME}*"):
-            left.unlink()
-        raise BackupError(f"{backup} is not put back: {error}") from None
     return brought
 
 
@@ -112,17 +107,25 @@ def _check_opens(folder: Path) -> None:
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
-    """Copy ``backup`` to ``target`` if the copy passes the checks; others may change the original."""
-    part = target.with_suffix(".part")
-    try:
-        _copied(backup, part)
-        brought = _examined(part, backup)
+    """Copy ``backup`` to ``target`` if the copy passes all checks; others may change the original.
+
+    It is checked in a folder of its own: whatever ends this process, no copy that was not checked lies where a server
+    would open it.
+    """
+    for left in target.parent.glob(f"{STAGING}*"):  # by a process that was killed
+        shutil.rmtree(left, ignore_errors=True)
+    with TemporaryDirectory(prefix=STAGING, dir=target.parent) as name:
+        staged = Path(name) / target.name
+        _copied(backup, staged)
+        brought = _examined(staged, backup)
         if not keep_keys:
-            with _opened(part, backup, "rw") as copy, copy:
+            with _opened(staged, backup, "rw") as copy, copy:
                 revoke_keys(copy)
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
+        try:
+            _check_opens(staged.parent)
+        except (DataFolderError, RowError) as error:
+            raise BackupError(f"{backup} is not put back: {error}") from None
+        staged.replace(target)
     return brought
 
 

@@ -12,7 +12,7 @@ from wingfit.service.diagnoses import views as diagnosis_views
 from wingfit.service.runs import views
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
-from wingfit.service.storage.tables import DatasetRow, DiagnosisRow, RunRow
+from wingfit.service.storage.tables import ClockRow, DatasetRow, DiagnosisRow, RunRow
 
 Table = type[DatasetRow] | type[RunRow] | type[DiagnosisRow]
 LONGEST_CAUSE = 200
@@ -29,6 +29,9 @@ def check_rows(database: Database) -> None:
             for number in session.scalars(select(table.number).order_by(table.number)).all():
                 _check(session, table, number, read)
                 session.expunge_all()
+        for clock in session.scalars(select(ClockRow)):
+            if not isinstance(clock.service_seconds, int | float):
+                raise RowError(f"the clock in it stands at {clock.service_seconds!a}, which is no number of seconds")
 
 
 def _check(session: Session, table: Table, number: int, read: Callable[[Any], object]) -> None:

@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid, not_found
+from wingfit.service.storage.database import is_full
 from wingfit.service.storage.tables import (
     AnswerRow,
     ArchiveRow,
@@ -259,7 +260,9 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
     try:
         row = session.get_one(table, number)
         job(row)
-    except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a state
+    except Exception as error:  # whatever it is that stands there
+        if is_full(error):  # the disk fails, and not the row
+            raise
         LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
         return None
     return row
@@ -272,8 +275,16 @@ def _delete_ended(session: Session, row: JobRow, what: str) -> None:
 
 
 def job(row: JobRow) -> Job:
-    """The row's job."""
-    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error, row.starts or 0)
+    """The row's job; ValueError or TypeError for values that no server stored."""
+    starts = row.starts or 0
+    numbers: tuple[object, ...] = (row.generations, starts, row.progress)
+    times: tuple[object, ...] = (row.created_at, row.started_at, row.finished_at)
+    readable = all(isinstance(one, int | float) for one in numbers) and all(
+        isinstance(one, str | None) for one in times
+    )
+    if not readable:
+        raise TypeError(f"its numbers are {numbers}, its times {times}")
+    return Job(State(row.state), Wish(row.wish), row.generations, row.progress, row.error, starts)
 
 
 def put_job(row: JobRow, after: Job) -> None:

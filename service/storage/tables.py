@@ -76,7 +76,7 @@ class ArchiveRow(Table):
 
 
 class ParsedRow(Table):
-    """A dataset in the project's own form (:mod:`records.files.parsed`), where its archive must not be opened again."""
+    """A dataset in the project's own form (`records/files/parsed.py`), where its archive must not be opened again."""
 
     __tablename__ = "parsed"
 
@@ -95,7 +95,7 @@ class ClockRow(Table):
 
 
 class JobRow(OwnedRow):
-    """What every job has; state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
+    """What every job has; state, wish, generations, progress, error and starts are those of `wingfit.workers.jobs.Job`.
 
     ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
     """

@@ -9,7 +9,7 @@ export const fixed = (value, decimals) => {
   return Number(text) === 0 ? text.replace("-", "") : text;
 };
 
-// Significant digits, noughts among them: 0.0500, 12.0, 385. Rounds as the command line does (commands/rounding.py).
+// Significant digits, noughts among them: 0.0500, 12.0, 385. Rounds as the command line does (cli/base/rounding.py).
 export function kept(value, digits = 3) {
   if (value === null || value === undefined) return DASH;
   if (value === 0) return "0";

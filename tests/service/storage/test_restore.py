@@ -275,6 +275,9 @@ BAD_ROWS = {
     "run wish": ("run", "update run set wish = 'fame'"),
     "run times": ("run", "update run set created_at = x'ff'"),
     "run genome": ("run", "update run set genome = '['"),
+    "run starts": ("run", "update run set starts = 'abc'"),
+    "run generations": ("run", "update run set generations = x'01'"),
+    "run name that is no text": ("run", "update run set name = cast(x'ff' as text)"),
     "dataset recordings": ("dataset", "update dataset set recordings = '[7]'"),
     "dataset kind": ("dataset", "update dataset set kind = 'poems'"),
 }
@@ -288,7 +291,34 @@ def test_rows_that_the_server_cannot_read_are_refused(copy: Path, tmp_path: Path
     restore(copy, tmp_path / "new")  # what was refused does not stand in the way
 
 
-def test_a_server_starts_though_a_waiting_job_cannot_be_read(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_clock_that_stands_at_no_number_is_refused(copy: Path, tmp_path: Path) -> None:
+    edit(copy, "delete from clock", "insert into clock values (1, 'abc', '2026-01-01T00:00:00Z')")
+    assert "the clock in it stands at 'abc'" in refuse(copy, tmp_path / "new")
+
+
+def test_a_restore_that_is_killed_leaves_no_database_that_was_not_checked(
+    copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def dies(_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(backups, "check_rows", dies)
+        with pytest.raises(KeyboardInterrupt):
+            restore(copy, tmp_path / "new")
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["wingfit.lock"]
+    (tmp_path / "new" / "restore-left").mkdir()  # by kill -9
+    restore(copy, tmp_path / "new")
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["wingfit.lock", "wingfit.sqlite3"]
+
+
+BROKEN = ["spec = 'x'", "starts = 'abc'", "created_at = x'41'", "name = cast(x'ff' as text)", "wish = 'fame'"]
+
+
+@pytest.mark.parametrize("broken", BROKEN)
+def test_a_server_starts_though_a_waiting_job_cannot_be_read(
+    broken: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     with toy_service(tmp_path / "data") as (_, api):
         first, second = (api.submit(api.upload()["id"])["id"] for _ in range(2))
         for run in (first, second):
@@ -296,7 +326,7 @@ def test_a_server_starts_though_a_waiting_job_cannot_be_read(tmp_path: Path, cap
     edit(
         tmp_path / "data" / "wingfit.sqlite3",
         "update run set state = 'QUEUED'",
-        "update run set spec = 'x' where number = 1",
+        f"update run set {broken} where number = 1",  # noqa: S608
     )
     with toy_service(tmp_path / "data") as (_, api):
         assert api.finish(second)["state"] == "SUCCEEDED"
