@@ -142,7 +142,7 @@ def idioms() -> Counter[str]:
 def _prose(path: Path) -> str:
     """Strings and comments of a Python file."""
     tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
-    kinds = (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # from 3.12 on
+    kinds = (tokenize.STRING, tokenize.COMMENT, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # 3.12 and later
     return "\n".join(token.string for token in tokens if token.type in kinds)
 
 

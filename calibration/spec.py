@@ -31,18 +31,19 @@ class CalibrationSpec:
         max_generations: per stage; of Gauss-Newton, iterations.
         seed: the same seed gives the same numbers, bit for bit.
         bounds_factor: the box is [estimate / factor, estimate * factor]; for wings only.
-        accuracy: largest error (m) of any simulated marker at any instant
-        (:class:`wingfit.sim.solver.numerics.Numerics`). recordings: names to fit; empty means all that are not held
-        out. genes: names to search; empty means those that the model searches by itself. fixed: values of genes that
-        keep them instead of their estimates. method: how a stage is searched. None: genetic for a wing, Gauss-Newton
-        for a vehicle. finish: whether Gauss-Newton follows each stage's search. preset: blade-element model
-        (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only. without: names of its terms that are left out.
-        axes: force axes that are fitted. low_pass: cut-off in Hz through which forces go before they are fitted. None:
-        3.2 times the flap frequency, the
+        accuracy: largest error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
+        recordings: names to fit; empty means all that are not held out.
+        genes: names to search; empty means those that the model searches by itself.
+        fixed: values of genes that keep them instead of their estimates.
+        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle.
+        finish: whether Gauss-Newton follows each stage's search.
+        preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
+        without: names of its terms that are left out.
+        axes: force axes that are fitted.
+        low_pass: cut-off in Hz through which forces go before they are fitted. None: 3.2 times the flap frequency, the
             seed's 40 Hz at 12.5 Hz; 0: none. Recordings that say that they have been filtered stay as they are.
         peel_width: beats over which the end of the peel is smoothed.
-        effects: names of effects (:data:`wingfit.sim.effects.registry.EFFECTS`) that the model contains; their genes
-        start
+        effects: names of effects (`sim/effects/registry.py`) that the model contains; their genes start
             switched off and are searched, within bounds of their own, by default.
     """
 

@@ -56,10 +56,11 @@ class Fit:
         coefficients: [D] of the residuals there.
         jacobian: [D, F] of the coefficients, per part of the box.
         residuals: per recording [T, C].
-        cost: surprise at what is left (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.surprise`), and at
-        the genes by their prior. near: [F] whose motion individuals about this fit begin beside: its own, or that of
-        one shortly before. damping: last good one. fresh: whether the Jacobian was measured there. converged: whether
-        it ended because nothing was to be gained.
+        cost: surprise at what is left (`Stack.surprise` in `whitened_recordings.py`), and at the genes by their prior.
+        near: [F] whose motion individuals about this fit begin beside: its own, or that of one shortly before.
+        damping: last good one.
+        fresh: whether the Jacobian was measured there.
+        converged: whether it ended because nothing was to be gained.
     """
 
     problem: Problem
