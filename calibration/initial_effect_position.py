@@ -12,20 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import qmc
 
 from wingfit.calibration.effects import effect_of, sizes
-from wingfit.calibration.estimates.covariance import Noise, whitened_sensitivity
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, residuals_of, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.inference.noise.white import Noise, whitened_sensitivity
+from wingfit.inference.score_test import INVISIBLE, Nuisance, amounts, remaining, spread
 from wingfit.sim.effects.contract import Effect
 
 Array = npt.NDArray[np.float64]
 
 PLACES = 15  # tried of an effect, besides where it stands; a batch of two groups of lanes with a single size
 SMALL = 0.02  # of a size's box
-INDEPENDENT = 1e-10  # of the largest direction of what the other genes can do; the rest is round-off
 
 
 def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, int]:
@@ -43,54 +42,41 @@ def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, 
         batch = _small(size, unit, tried)
         evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), batch), residuals=True)
         evaluated += len(batch)
-        one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
-        gains = weighed.gains(evaluation, len(size), one_sided=one_sided)
+        gains = weighed.gains(evaluation, _limits(size, unit))
         start[own] = tried[int(np.argmax(gains))][own]
     return start, evaluated
 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Whitened residuals at the start [N], and an orthonormal basis [N, O] of what the other genes can do to them."""
+    """Whitened residuals at the start [N], and what the other genes can do to them."""
 
     noise: list[Noise]
     white: Array
-    others: Array
+    others: Nuisance
 
     @classmethod
     def of(cls, problem: Problem, linear: Linearised, which: list[bool]) -> _Weighed:
-        noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
+        noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
         white = np.concatenate([n.whitened(v).ravel() for n, v in zip(noise, linear.residuals, strict=True)])
         slopes = [
             whitened_sensitivity(n, s[:, :, which]).reshape(-1, sum(which))
             for n, s in zip(noise, linear.sensitivities, strict=True)
         ]
-        basis, power, _ = np.linalg.svd(np.concatenate(slopes), full_matrices=False)
-        return cls(noise, white, basis[:, power > INDEPENDENT * power.max(initial=0.0)])
+        return cls(noise, white, Nuisance.of(np.concatenate(slopes)))
 
-    def gains(self, evaluation: Evaluation, size: int, *, one_sided: bool) -> list[float]:
-        """What each place, a block of ``size`` individuals, takes from the sum of squares beyond the other genes."""
+    def gains(self, evaluation: Evaluation, limits: tuple[Array, Array]) -> list[float]:
+        """Decrease of the sum of squares by each place, a block of S individuals with multiples within ``limits``."""
         parts = zip(self.noise, residuals_of(evaluation), strict=True)
         after = np.concatenate([n.whitened(v).reshape(len(v), -1) for n, v in parts], axis=1)
-        blocks = (after - self.white).reshape(-1, size, len(self.white))
-        failed = np.array([reason is not None for reason in evaluation.reasons]).reshape(-1, size)
-        return [
-            0.0 if bad.any() else self._gain(block, one_sided=one_sided)
-            for bad, block in zip(failed, blocks, strict=True)
-        ]
+        blocks = (after - self.white).reshape(-1, len(limits[0]), len(self.white))
+        failed = np.array([reason is not None for reason in evaluation.reasons]).reshape(-1, len(limits[0]))
+        return [0.0 if bad.any() else self._gain(block, limits) for bad, block in zip(failed, blocks, strict=True)]
 
-    def _gain(self, changes: Array, *, one_sided: bool) -> float:
-        """Of one place; a size that can only grow takes nothing where it would have to shrink."""
-        left, own = self._rest(self.white), self._rest(changes.T)
-        own = own / np.maximum(np.linalg.norm(changes, axis=1), 1e-300)
-        best, *_ = np.linalg.lstsq(own, -left, rcond=INDEPENDENT)
-        if one_sided and best[0] < 0.0:
-            return 0.0
-        return float(left @ left - np.sum((left + own @ best) ** 2))
-
-    def _rest(self, vectors: Array) -> Array:
-        """What the other genes cannot do."""
-        return np.asarray(vectors - self.others @ (self.others.T @ vectors))
+    def _gain(self, changes: Array, limits: tuple[Array, Array]) -> float:
+        left, own = self.others.rest(self.white), self.others.rest(changes)
+        multiples = amounts(own, left, limits, INVISIBLE * float(np.linalg.norm(changes)))
+        return float(left @ left) - remaining(own, left, multiples)
 
 
 def _movable(problem: Problem, unit: Array) -> list[Effect]:
@@ -110,8 +96,14 @@ def _movable(problem: Problem, unit: Array) -> list[Effect]:
 def _tried(unit: Array, shape: list[int]) -> Array:
     """The start [1 + PLACES, F], first as it is, then with its columns ``shape`` spread evenly over their boxes."""
     tried = np.tile(unit, (1 + PLACES, 1))
-    tried[1:, shape] = qmc.Halton(len(shape), scramble=False).random(PLACES + 1)[1:]  # the first of all is a corner
+    tried[1:, shape] = spread(PLACES, len(shape))
     return tried
+
+
+def _limits(size: list[int], unit: Array) -> tuple[Array, Array]:
+    """Least and largest multiples [S] of a small size: a single size that can only grow cannot be negative."""
+    one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
+    return np.full(len(size), 0.0 if one_sided else -np.inf), np.full(len(size), np.inf)
 
 
 def _small(size: list[int], unit: Array, tried: Array) -> Array:

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.calibration.effects import absent
-from wingfit.calibration.estimates.noise import noise_distance
 from wingfit.calibration.estimates.uncertainty import Standing, standing
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.plan import Stage, plan
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
+from wingfit.inference.noise.harmonic import noise_distance
 from wingfit.records import Dataset, Gene, Genome
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution

@@ -13,15 +13,23 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
 
 from wingfit.calibration.effects import is_size
-from wingfit.calibration.estimates.covariance import Noise, whitened_sensitivity
-from wingfit.calibration.estimates.linearised import free_genes, linearise, residuals_of, stopped, unit_at, values_at
+from wingfit.calibration.estimates.linearised import (
+    Linearised,
+    free_genes,
+    linearise,
+    residuals_of,
+    stopped,
+    unit_at,
+    values_at,
+)
 from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.initial_effect_position import placed
 from wingfit.calibration.problem import Problem
+from wingfit.inference.gauss_newton import Quadratic, Trials
+from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene
 from wingfit.records.blas_threads import one_blas_thread
 
@@ -186,9 +194,9 @@ def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]
 def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state: _State) -> tuple[Step, _State]:
     unit = np.array(state.unit)
     linear = linearise(problem, evaluator, unit)
-    noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
-    curvature, slope, power = _normal_equations(noise, linear.residuals, linear.sensitivities)
-    move = _better(problem, evaluator, genes, unit, noise, (curvature, slope, power), state.damping)
+    noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
+    quadratic, power = _quadratic(noise, linear)
+    move = _better(problem, evaluator, unit, noise, (quadratic, power), state.damping)
     stays = move.gain == 0.0
     flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
     converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
@@ -209,53 +217,35 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
     return step, after
 
 
-def _normal_equations(
-    noise: list[Noise], residuals: tuple[Array, ...], sensitivities: tuple[Array, ...]
-) -> tuple[Array, Array, float]:
-    """Curvature [F, F] and slope [F] of the cost, and sum of v^T R^-1 v."""
-    size = sensitivities[0].shape[-1]
-    curvature, slope, power = np.zeros((size, size)), np.zeros(size), 0.0
-    for n, v, s in zip(noise, residuals, sensitivities, strict=True):
-        white = n.whitened(v).ravel()
-        steep = whitened_sensitivity(n, s).reshape(-1, size)
-        curvature += steep.T @ steep
-        slope += steep.T @ white
-        power += float(white @ white)
-    return curvature, slope, power
-
-
 def _better(
     problem: Problem,
     evaluator: Evaluator,
-    genes: list[Gene],
     unit: Array,
     noise: list[Noise],
-    normal: tuple[Array, Array, float],
+    cost: tuple[Quadratic, float],
     damping: float,
 ) -> _Move:
     """The best genome that any damping leads to; the present one when none is better."""
-    curvature, slope, power = normal
-    evaluations, reasons = 0, []
+    genes, (quadratic, power) = free_genes(problem), cost
+    evaluations, reasons = 0, list[str]()
     while True:
-        dampings = damping * DAMPINGS
-        steps = np.array([_bounded_step(curvature, slope, unit, d) for d in dampings])
-        evaluation = evaluator.evaluate(problem, values_at(genes, unit + steps), residuals=True)
-        evaluations += len(steps)
-        reasons += [reason for reason in evaluation.reasons if reason]
+        dampings, scale = damping * DAMPINGS, np.diag(quadratic.curvature) + LEAST_CURVATURE
+        steps = np.array([quadratic.step(unit, one * scale) for one in dampings])
+        units = np.clip(unit + steps, 0.0, 1.0)
+        evaluation = evaluator.evaluate(problem, values_at(genes, units), residuals=True)
         after = np.zeros(len(steps))
         for n, part in zip(noise, residuals_of(evaluation), strict=True):
-            after += (n.whitened(part) ** 2).sum(axis=(1, 2))
-        after[[reason is not None for reason in evaluation.reasons]] = np.inf
-        promised = -(steps @ slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, curvature, steps)
-        decrease = 0.5 * (power - after)
-        good = (promised > 0.0) & (decrease > LEAST_GAIN * promised)  # at a bound a step may be round-off alone
-        if good.any():
-            k = int(np.argmax(np.where(good, decrease, -np.inf)))
+            after += 0.5 * (n.whitened(part) ** 2).sum(axis=(1, 2))
+        trials = Trials.of(units, quadratic.decrease(steps), 0.5 * power, after, evaluation.reasons)
+        evaluations += len(steps)
+        reasons += [reason for reason in evaluation.reasons if reason]
+        k = trials.best(LEAST_GAIN)
+        if k is not None:
             return _Move(
-                np.clip(unit + steps[k], 0.0, 1.0),
+                trials.units[k],
                 float(np.abs(steps[k]).max()),
-                float(decrease[k] / promised[k]),
-                float(decrease[k]),
+                trials.gain(k),
+                float(trials.decrease[k]),
                 float(max(dampings[k], LEAST_DAMPING)),
                 float(evaluation.fitness[k]),
                 float(evaluation.distance[k]),
@@ -267,8 +257,10 @@ def _better(
         damping = float(dampings[-1] / DAMPINGS[0])
 
 
-def _bounded_step(curvature: Array, slope: Array, unit: Array, damping: float) -> Array:
-    """Step [F] that minimises the damped quadratic inside the unit box."""
-    factor = np.linalg.cholesky(curvature + damping * np.diag(np.diag(curvature) + LEAST_CURVATURE))
-    aim = -np.linalg.solve(factor, slope)
-    return np.asarray(lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
+def _quadratic(noise: list[Noise], linear: Linearised) -> tuple[Quadratic, float]:
+    """The cost near the point, and the sum of v^T R^-1 v there."""
+    white = [n.whitened(v).ravel() for n, v in zip(noise, linear.residuals, strict=True)]
+    steep = [
+        whitened_sensitivity(n, s).reshape(-1, s.shape[-1]) for n, s in zip(noise, linear.sensitivities, strict=True)
+    ]
+    return Quadratic.of(list(zip(white, steep, strict=True))), float(sum(v @ v for v in white))

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.calibration.estimates.coloured import Block, score_covariances
-from wingfit.calibration.estimates.covariance import Noise, whitened_sensitivity
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, stopped, unit_at
 from wingfit.calibration.estimates.remarks import remarks
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.forces.beats import (
+from wingfit.calibration.problem import Problem
+from wingfit.inference.noise.between_beats import (
     ENOUGH,
     FEWEST,
     beat_score_covariance,
@@ -20,7 +19,8 @@ from wingfit.calibration.forces.beats import (
     widening,
     without_mean_beat,
 )
-from wingfit.calibration.problem import Problem
+from wingfit.inference.noise.coloured import Block, score_covariances
+from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene, Genome, Recording
 from wingfit.records.blas_threads import one_blas_thread
 
@@ -110,8 +110,8 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     values = np.array([problem.base[gene.name] for gene in genes])
     linear = linearise(problem, evaluator, unit_at(genes, values))
     free = ~stopped(genes, values)
-    linear = replace(linear, told=linear.told & free)
-    noise = [Noise.of(problem, r, v) for r, v in enumerate(linear.residuals)]
+    linear = replace(linear, known=linear.known & free)
+    noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
     unit, doubts = unit_covariance(problem, linear, noise)
     per_value, per_cent = _slopes(genes, values)
     to_shares = _share_map(genes, problem.base) * per_cent
@@ -121,10 +121,10 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
         values=values,
         covariance=unit * per_value * per_value[:, None],
         relative=relative,
-        told=linear.told,
+        told=linear.known,
         noise=tuple(n.covariance for n in noise),
         cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
-        remarks=(*doubts, *_remarks(genes, relative, linear.told, free)),
+        remarks=(*doubts, *_remarks(genes, relative, linear.known, free)),
     )
 
 
@@ -134,7 +134,7 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
     The box is a weak prior, without which nothing would bound a gene that the data ignore; one that is not ``told`` has
     nothing but this, and the others are judged as if it were known.
     """
-    told = np.flatnonzero(linear.told)
+    told = np.flatnonzero(linear.known)
     covariance = np.eye(len(problem.free)) * PRIOR**2
     if not len(told):
         return covariance, ()

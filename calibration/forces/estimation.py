@@ -15,7 +15,6 @@ from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
-from wingfit.calibration.forces.beats import FEWEST_MEAN, without_mean_beat
 from wingfit.calibration.forces.global_model import at, average, fit_global
 from wingfit.calibration.forces.result import (
     Agreement,
@@ -32,6 +31,7 @@ from wingfit.calibration.problem import Problem, base_genome, compared
 from wingfit.calibration.result import ADEQUATE, GeneResult
 from wingfit.calibration.search import found as found_by_stage
 from wingfit.calibration.spec import CalibrationSpec, resolved, vehicle_model
+from wingfit.inference.noise.between_beats import FEWEST_MEAN, without_mean_beat
 from wingfit.records import Condition, Dataset, Genome, Recording
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing

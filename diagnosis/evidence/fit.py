@@ -12,24 +12,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
 
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.subject import Subject
+from wingfit.inference.differences import Outputs, differences
+from wingfit.inference.gauss_newton import Quadratic, Trials
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-STEP = 0.003  # of the box, of finite differences
 PRIOR = 0.5  # standard deviation of a gene in parts of its box
 # Steps tried at once: a group of lanes. Damping by parts of each gene's own curvature (Marquardt 1963), about
 # the last good part, suits genes that are told one by one; damping by parts of the box (Levenberg 1944) leads along
 # the bent valleys of stiffnesses that make up for each other.
 TRIED = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
+SINGULAR = 1e-12  # of the largest curvature, added to every damping so that no curvature is singular
 GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
 SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
 SMALLEST = 0.3  # decrease of the cost that is worth another step
@@ -160,13 +161,6 @@ def gained_little(stack: Stack, before: Fit, after: Fit, times: float = 1.0) -> 
     return before.cost - after.cost <= times * max(SMALLEST, SETTLED * whole)
 
 
-def bounded(curvature: Array, slope: Array, unit: Array, damping: Array) -> Array:
-    """Step [F] that minimises slope . d + d . curvature d / 2 inside the box, ``damping`` [F] added to curvatures."""
-    factor = np.linalg.cholesky(curvature + np.diag(damping + 1e-12 * np.diag(curvature).max()))
-    aim = -np.linalg.solve(factor, slope)
-    return np.asarray(lsq_linear(factor.T, aim, (-unit - 1e-12, 1.0 - unit + 1e-12), method="bvls").x)
-
-
 def _cost(stack: Stack, coefficients: Array, unit: Array) -> Array:
     return np.asarray(stack.surprise(coefficients) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
 
@@ -208,18 +202,14 @@ def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
-    moves = STEP * np.eye(len(fit.unit))[columns]
-    moves[fit.unit[columns] > 1.0 - STEP] *= -1.0
-    around = np.clip(np.vstack([fit.unit + moves, *([fit.unit - moves] if sides == 2 else [])]), 0.0, 1.0)
-    found, reasons, _ = look.at(around, fit.near)
-    bad = np.array([reason is not None for reason in reasons])
-    found[bad] = fit.coefficients
-    around[bad] = fit.unit
-    up, down = np.arange(len(columns)), np.arange(len(columns)) + len(columns)
-    behind = (around[down], found[down]) if sides == 2 else (fit.unit[None], fit.coefficients[None])
-    width = (around[up] - behind[0])[np.arange(len(columns)), columns]
+
+    def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+        found, reasons, _ = look.at(units, fit.near)
+        return [found], reasons
+
+    found = differences(simulate, fit.unit, columns, at=[fit.coefficients], sides=sides)
     jacobian = fit.jacobian.copy()
-    jacobian[:, columns] = ((found[up] - behind[1]) / np.where(width != 0, width, 1.0)[:, None]).T
+    jacobian[:, columns] = found.slopes[0]
     return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
 
 
@@ -241,12 +231,13 @@ def _step(look: _Look, fit: Fit, *, bent: bool = False) -> tuple[Fit | None, flo
         return None, 0.0
     found, reasons, residuals = look.at(units, fit.near)
     bad = np.array([reason is not None for reason in reasons])
-    cost = np.where(bad, np.inf, _cost(look.stack, np.where(bad[:, None], FAILED, found), units))
-    k = int(np.argmin(cost))
-    if not cost[k] < fit.cost:
+    after = _cost(look.stack, np.where(bad[:, None], FAILED, found), units)
+    trials = Trials.of(units, promised, fit.cost, after, reasons)
+    k = trials.best()
+    if k is None:
         return None, 0.0
     jacobian = fit.jacobian
-    for j in np.argsort(-cost):  # the best last: what it shows holds exactly
+    for j in np.argsort(trials.decrease):  # the best last: what it shows holds exactly
         if not bad[j]:
             jacobian = _broyden(jacobian, units[j] - fit.unit, found[j] - fit.coefficients)
     better = Fit(
@@ -255,11 +246,11 @@ def _step(look: _Look, fit: Fit, *, bent: bool = False) -> tuple[Fit | None, flo
         found[k],
         jacobian,
         tuple(r[k] for r in residuals),
-        float(cost[k]),
+        float(fit.cost - trials.decrease[k]),
         fit.near if np.abs(units[k] - fit.near).max() <= BESIDE else units[k],
         float(damped.own[k]) if k < len(damped.own) else fit.damping,
     )
-    return better, float((fit.cost - cost[k]) / max(promised[k], 1e-300))
+    return better, trials.gain(k)
 
 
 class _Damped:
@@ -268,16 +259,16 @@ class _Damped:
     def __init__(self, stack: Stack, fit: Fit) -> None:
         white, self.slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
         self.trust, self.unit, self.scale = stack.trust(fit.coefficients), fit.unit, stack.scale
-        self.curvature = self.trust * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR**2
-        self.slope = self.trust * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR**2
+        curvature = self.trust * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR**2
+        self.quadratic = Quadratic(curvature, self.trust * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR**2)
         self.own = np.clip(fit.damping * TRIED[0], LEAST_DAMPING, LARGEST_DAMPING)
         by_box = np.outer(TRIED[1] / PRIOR**2, np.ones(len(fit.unit)))
-        self.dampings = np.concatenate([np.outer(self.own, np.diag(self.curvature)), by_box])
+        self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
     def move(self, damping: Array, bend: Array | float = 0.0) -> Array:
         """The step [F] with a ``damping`` [F], where coefficients change by ``bend`` [D] beside its slopes."""
         bent = self.trust * self.slopes.T @ np.broadcast_to(bend / self.scale, len(self.scale))
-        return bounded(self.curvature, self.slope + bent, self.unit, damping)
+        return self.quadratic.step(self.unit, damping, self.quadratic.slope + bent)
 
 
 def _bends(look: _Look, fit: Fit, moves: Array) -> Array:

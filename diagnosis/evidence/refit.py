@@ -13,9 +13,10 @@ from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.fit import PRIOR, UNFIT, Fit, fitted, measured, thoroughly
-from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns, taken
+from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.subject import Subject
+from wingfit.inference.score_test import explained
 
 Array = npt.NDArray[np.float64]
 
@@ -245,7 +246,7 @@ def _takers(
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
-            gains = [taken(nuisance.rest(trial.fields), misfit) for trial in trials]
+            gains = [explained(nuisance.rest(trial.fields), misfit) for trial in trials]
             k = int(np.argmax(gains))
             best.append((gains[k], trials[k]))
     return sorted(best, key=lambda pair: -pair[0])
@@ -259,7 +260,9 @@ def pairs(
     left = nuisance.left
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
     own = [nuisance.rest(trial.fields) for trial in best]
-    scored = [(taken(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)]
+    scored = [
+        (explained(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)
+    ]
     scored.sort(key=lambda triple: -triple[0])
     for gain, one, other in scored[:most]:
         if float(left @ left) - gain < beyond:

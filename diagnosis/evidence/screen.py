@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import qmc
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
 from wingfit.calibration.evaluator import Evaluator
@@ -20,6 +19,8 @@ from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.fit import PRIOR, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.subject import Subject, Suspect
+from wingfit.inference import score_test
+from wingfit.inference.score_test import amounts, remaining, spread
 
 Array = npt.NDArray[np.float64]
 
@@ -61,32 +62,23 @@ class Trial:
 
 
 class Nuisance:
-    """What the nominal genes can do about a fit: projections of whitened vectors [..., D] on what they cannot.
+    """What the nominal genes can do about a fit; their prior counts as F further samples.
 
-    Their prior counts as F further samples, as much as it does beside the misfit
-    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`).
+    The prior counts as much as it does beside the misfit
+    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`). ``left`` [D + F] is the whitened residual that
+    they cannot make up for.
     """
 
     def __init__(self, stack: Stack, fit: Fit) -> None:
         weight = 1.0 / (PRIOR * np.sqrt(stack.trust(fit.coefficients)))
         slopes = fit.jacobian / stack.scale[:, None]
-        self.basis: Array = np.linalg.qr(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))[0]
         self.scale = stack.scale
-        self.left: Array = np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)])
-        self.left = self.left - self.basis @ (self.basis.T @ self.left)
+        self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
+        self.left = self.genes.rest(np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)]))
 
     def rest(self, changes: Array) -> Array:
-        """Whitened changes [..., D + F] of coefficients, without what the genes can do."""
-        white = changes / self.scale
-        inside = (white @ self.basis[: white.shape[-1]]) @ self.basis.T
-        inside[..., : white.shape[-1]] -= white
-        return np.asarray(-inside)
-
-
-def taken(fields: Array, misfit: Array) -> float:
-    """By how much whitened ``fields`` [S, D] of free sizes lower the sum of squares of a ``misfit`` [D]."""
-    inner, score = fields @ fields.T, fields @ misfit
-    return float(score @ np.linalg.solve(inner + 1e-9 * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
+        """Whitened changes [..., D + F] of coefficients [..., D], without what the genes can make up for."""
+        return self.genes.rest(changes / self.scale)
 
 
 def off_units(suspect: Suspect) -> Array:
@@ -145,32 +137,9 @@ def _tried(
 
 def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
     own, left = nuisance.rest(fields), nuisance.left
-    amounts = _amounts(own, left, _limits(suspect, block), seen=SEEN * np.sqrt(len(left)))
-    leaves = float(np.sum((left + amounts @ own) ** 2))
-    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), amounts, len(suspect.genes), leaves)
-
-
-def _amounts(own: Array, left: Array, limits: tuple[Array, Array], *, seen: float) -> Array:
-    """Multiples [S] of the fields ``own`` [S, D] that fit -left best within ``limits``."""
-    length = np.linalg.norm(own, axis=1)
-    told = length > seen
-    amounts = np.zeros(len(own))
-    if not told.any():
-        return amounts
-    part = own[told]
-    inner = part @ part.T + 1e-9 * np.diag(length[told] ** 2)
-    best = -np.linalg.solve(inner, part @ left)
-    low, high = limits[0][told], limits[1][told]
-    if ((best < low) | (best > high)).any() and len(best) == 1:
-        best = np.clip(best, low, high)
-    elif ((best < low) | (best > high)).any():
-        best = best * min(
-            1.0,
-            float(np.min(np.where(best > 0, high / np.maximum(best, 1e-300), 1.0))),
-            float(np.min(np.where(best < 0, low / np.minimum(best, -1e-300), 1.0))),
-        )
-    amounts[told] = best
-    return amounts
+    found = amounts(own, left, _limits(suspect, block), SEEN * np.sqrt(len(left)))
+    leaves = remaining(own, left, found)
+    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), found, len(suspect.genes), leaves)
 
 
 def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
@@ -190,7 +159,7 @@ def _spots(suspect: Suspect, typical: Array) -> list[Array]:
         genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
         return [unit_at(genes, np.array(spot)) for spot in suspect.spots]
     count = PLACES if suspect.places else SHAPES
-    return [typical, *qmc.Halton(len(typical), scramble=False).random(count + 1)[1:]]
+    return [typical, *spread(count, len(typical))]
 
 
 def _blocks(suspect: Suspect) -> Iterator[Array]:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
-from wingfit.diagnosis.evidence.harmonic_noise import Beatwise, beatwise
+from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +36,7 @@ class Stack:
     """
 
     recordings: tuple[Recording, ...]
-    views: tuple[Beatwise, ...]
+    views: tuple[HarmonicFit, ...]
     axes: tuple[str, ...]
     tolerance: float
 
@@ -46,7 +46,7 @@ class Stack:
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
         views = tuple(
-            beatwise(one, compared(one, axes) if one.kind == "forces" else _whole_markers(one)) for one in recordings
+            harmonic_fit(one, compared(one, axes) if one.kind == "forces" else whole_markers(one)) for one in recordings
         )
         noise = np.sqrt(np.mean(np.concatenate([view.noise[view.used] ** 2 for view in views])))
         largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
@@ -166,9 +166,3 @@ class Stack:
         evaluation = evaluator.evaluate(problem, values, residuals=True)
         residuals = residuals_of(evaluation)
         return self.stacked(residuals), evaluation.reasons, residuals
-
-
-def _whole_markers(recording: Recording) -> npt.NDArray[np.bool_]:
-    """True [T, C] where all of x, y and z of a marker were recorded."""
-    whole = np.isfinite(recording.positions).all(axis=2)
-    return np.repeat(whole, 3, axis=1)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.evidence.harmonic_noise import Beatwise
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
 from wingfit.diagnosis.subject import Place, Subject
+from wingfit.inference.noise.harmonic import HarmonicFit
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class Piece:
     periodic misfit from the start of the beat on.
     """
 
-    view: Beatwise
+    view: HarmonicFit
     places: tuple[Place, ...]
     coefficients: Array
     variance: Array
@@ -45,7 +45,7 @@ def pieces(subject: Subject, stack: Stack, coefficients: Array) -> list[Piece]:
     return found
 
 
-def wave(view: Beatwise, origin: float, count: int = PHASES) -> Array:
+def wave(view: HarmonicFit, origin: float, count: int = PHASES) -> Array:
     """[count, P] of the coefficients at equal steps of the beat; slow trends are left out."""
     psi = origin + 2 * np.pi * np.arange(count) / count
     columns = []

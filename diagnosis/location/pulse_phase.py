@@ -15,10 +15,11 @@ from scipy.stats import chi2
 
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import reach
-from wingfit.diagnosis.evidence.screen import Nuisance, taken
+from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.subject import Subject
+from wingfit.inference.score_test import explained
 from wingfit.sim.filtering import gain, sampling_rate
 
 Array = npt.NDArray[np.float64]
@@ -37,10 +38,10 @@ def pulse(subject: Subject, stack: Stack, fit: Fit) -> Interval | None:
     nuisance = Nuisance(stack, fit)
     left, white = nuisance.left, fit.coefficients / stack.scale
     phase = np.arange(INSTANTS) / INSTANTS
-    gains = np.array([taken(nuisance.rest(_pulses(subject, stack, at)), left) for at in phase])
+    gains = np.array([explained(nuisance.rest(_pulses(subject, stack, at)), left) for at in phase])
     best = int(np.argmax(gains))
     there = _pulses(subject, stack, phase[best], passed=True)
-    takes, by_noise = taken(nuisance.rest(there), left), float(chi2.isf(CHANCE / INSTANTS, len(there)))
+    takes, by_noise = explained(nuisance.rest(there), left), float(chi2.isf(CHANCE / INSTANTS, len(there)))
     if takes < max(TAKES * float(left @ left), by_noise):
         return None
     beyond = max(float(white @ white) - takes - len(white), 0.0)

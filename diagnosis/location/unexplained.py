@@ -134,7 +134,7 @@ def missing_forces(subject: Subject, stack: Stack, nominal: Refit) -> tuple[Miss
         column = int(np.argmax(power))
         phase = recording.condition.flap_frequency * recording.times - subject.origin(recording) / (2 * np.pi)
         noise = max(float(view.noise[column]), stack.tolerance)
-        memory = float(np.clip(view.memory, 0.0, 0.99))
+        memory = float(np.clip(view.lag1, 0.0, 0.99))
         found.append(missing_force(recording.name, residuals[:, column], phase, noise, memory))
     return tuple(found)
 

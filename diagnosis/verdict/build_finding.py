@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.evidence.fit import measured
-from wingfit.diagnosis.evidence.harmonic_noise import still_markers
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, action, again
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
@@ -24,6 +23,7 @@ from wingfit.diagnosis.search_state import Assessment
 from wingfit.diagnosis.verdict.next_experiment import advised, separations
 from wingfit.diagnosis.verdict.proof import Predicted, predicted, proof, recording_misfits
 from wingfit.diagnosis.verdict.verdict import Decision, all_genes, decided, hypotheses, summary
+from wingfit.inference.noise.harmonic import still_markers
 from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
@@ -187,7 +187,7 @@ def _division(state: Assessment) -> float:
 
 def _floors(state: Assessment, division: float) -> Floors:
     stack, nominal = state.stack, state.known
-    memory = float(np.median([view.memory for view in stack.views]))
+    memory = float(np.median([view.lag1 for view in stack.views]))
     total = float(np.sqrt(stack.noise**2 + division**2 + stack.tolerance**2))
     left = None if nominal.division is None else division
     return Floors(stack.noise, memory, left, nominal.finer, stack.tolerance, total)
@@ -218,7 +218,7 @@ def _innocence(nominal: Nominal) -> tuple[str, ...]:
 
 
 def _doubts(stack: Stack) -> tuple[str, ...]:
-    untold = [r.name for r, v in zip(stack.recordings, stack.views, strict=True) if not v.told]
+    untold = [r.name for r, v in zip(stack.recordings, stack.views, strict=True) if not v.between_beats]
     still = {r.name: still_markers(r) for r in stack.recordings}
     doubts = [
         f"{name}: the recorded place of {', '.join(markers)} never changes; left out: check how tracks are exported"

@@ -8,15 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.estimates.linearised import free_genes, residuals_of, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem
-from wingfit.diagnosis.evidence.fit import PRIOR, STEP, Fit
+from wingfit.diagnosis.evidence.fit import PRIOR, Fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import Advice
 from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.weigh_hypotheses import SURE, Weighed, tolerated
+from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
 
 Array = npt.NDArray[np.float64]
@@ -109,24 +110,27 @@ def unlike(
         rival.problem.base,
         rival.problem.axes,
     )
-    moves = np.where(rival.unit > 1.0 - STEP, -STEP, STEP) if adapts else np.empty(0)
-    units = np.vstack([rival.unit, rival.unit + np.diag(moves)]) if adapts else rival.unit[None]
-    evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
-    residuals = evaluation.per_recording[0].residuals
-    if residuals is None or evaluation.reasons[0] is not None:
+
+    def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+        evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
+        return residuals_of(evaluation), evaluation.reasons
+
+    columns = np.arange(len(rival.unit)) if adapts else np.empty(0, np.int64)
+    try:
+        found = differences(simulate, rival.unit, columns, sides=1)
+    except ValueError:
         return None
-    failed = np.array([reason is not None for reason in evaluation.reasons])
-    residuals = np.where(failed[:, None, None], residuals[0], residuals)  # what cannot move makes up for nothing
-    white = residuals[:, np.isfinite(residuals).all(axis=0)] / stack.noise
-    whole = float(white[0] @ white[0])
+    seen = np.isfinite(found.outputs[0])
+    white, slopes = found.outputs[0][seen] / stack.noise, found.slopes[0][seen].T / stack.noise
+    whole = float(white @ white)
     if adapts:
-        whole -= _made_up_for(stack, rival, white[0], (white[1:] - white[0]) / moves[:, None])
-    return float(np.sqrt(max(whole, 0.0) / white.shape[1]))
+        whole -= _made_up_for(stack, rival, white, slopes)
+    return float(np.sqrt(max(whole, 0.0) / len(white)))
 
 
 def _made_up_for(stack: Stack, rival: Fit, difference: Array, slopes: Array) -> float:
     """Of the square of a ``difference`` [n] (in noises): what genes with ``slopes`` [F, n] take, and cost elsewhere."""
-    memory = float(np.clip(np.mean([view.memory for view in stack.views]), 0.0, 0.99))
+    memory = float(np.clip(np.mean([view.lag1 for view in stack.views]), 0.0, 0.99))
     trust = stack.trust(rival.coefficients)
     counts = trust * (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
     known = rival.jacobian / stack.scale[:, None]

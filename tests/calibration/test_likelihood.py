@@ -10,9 +10,10 @@ from scipy.optimize import minimize
 from tests.calibration.linear import TRUTH, Linear, problem, recorded
 from tests.workers import pendulum
 from wingfit.calibration.estimates.likelihood import Step, estimate, iterate
-from wingfit.calibration.estimates.linearised import SHORTER, STEP
+from wingfit.calibration.estimates.linearised import SHORTER
 from wingfit.calibration.estimates.uncertainty import uncertainty
 from wingfit.calibration.problem import Problem, base_genome, compared, misfit
+from wingfit.inference.differences import STEP
 from wingfit.records import Dataset, Genome, Recording
 from wingfit.sim.model import Array, Observation
 from wingfit.sim.wing.flexible_wing import FlexibleWing

@@ -9,11 +9,11 @@ from scipy.signal import butter, lfilter, sosfiltfilt
 
 from tests.calibration.linear import TRUTH, Linear, problem, recorded
 from tests.workers import pendulum
-from wingfit.calibration.estimates.coloured import Block, grid, last_lag, score_covariances
 from wingfit.calibration.estimates.likelihood import estimate, iterate
 from wingfit.calibration.estimates.remarks import remarks
 from wingfit.calibration.estimates.uncertainty import uncertainty
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.inference.noise.coloured import Block, grid, last_lag, score_covariances
 from wingfit.records import Gene, Recording
 from wingfit.sim.model import Array
 from wingfit.workers.in_process import InProcessEvaluator

@@ -15,8 +15,9 @@ import pytest
 
 from wingfit import diagnosis
 from wingfit.calibration import evaluator, result, search, summary
-from wingfit.calibration.estimates import likelihood, noise, uncertainty
+from wingfit.calibration.estimates import likelihood, uncertainty
 from wingfit.calibration.forces import agreement, estimation, global_model
+from wingfit.inference.noise import harmonic
 from wingfit.records import blas_threads
 from wingfit.service.outcomes import load_views
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
@@ -34,7 +35,7 @@ GUARDED: tuple[Callable[..., object], ...] = (
     estimation.summarise_forces, estimation.compare_forces, estimation.predict,
     agreement.agreements, agreement.comparison, agreement.located, agreement.lacking,
     evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
-    noise.noise_distance, summary.summarise, result.judge, result.compare, search.calibrate,
+    harmonic.noise_distance, summary.summarise, result.judge, result.compare, search.calibrate,
     uncertainty.standing, uncertainty.uncertainty,
     diagnosis.check, diagnosis.diagnose, diagnosis.diagnose_subject,
     free_flight.free_flight, free_flight.recording, rigid_body.poses,

@@ -1,4 +1,4 @@
-"""The covariance R of the measured outputs: estimated from residuals, and whitening by it (Armanini et al., Eq. 22)."""
+"""Noise that is independent from sample to sample: its covariance R, from residuals (Armanini et al. 2016, Eq. 22)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.calibration.problem import Problem
+from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -25,15 +25,14 @@ class Noise:
     """[C] logarithms that add up to ln det R, one for each channel."""
 
     @classmethod
-    def of(cls, problem: Problem, recording: int, residuals: Array) -> Noise:
-        """Estimate R from residuals [T, C].
+    def of(cls, record: Recording, residuals: Array) -> Noise:
+        """Estimate R from the residuals [T, C] of ``record``.
 
         Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
         channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
         drawn a little to their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
         Channels that are not fitted get variance 1, which leaves no trace.
         """
-        record = problem.recordings[recording]
         seen = np.isfinite(residuals)
         v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)
         if record.kind == "forces":

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from wingfit.diagnosis.evidence.harmonic_noise import HARMONICS, beatwise, still_markers
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.inference.noise.harmonic import HARMONICS, harmonic_fit, still_markers
 from wingfit.records import Condition, LowPass, Recording
 
 CONDITION = Condition(3.0, 0.0, 101_325.0, 293.15)
@@ -37,8 +37,8 @@ def test_a_periodic_signal_is_told_exactly_and_has_no_noise(beats: int) -> None:
     frames = 30 * beats
     psi = 2 * np.pi * CONDITION.flap_frequency * recording(np.zeros((frames, 3))).times
     wave = 0.1 + 0.02 * np.cos(psi) - 0.03 * np.sin(3 * psi)
-    view = beatwise(recording(np.stack([wave, wave, 2 * wave], axis=1)))
-    assert view.told
+    view = harmonic_fit(recording(np.stack([wave, wave, 2 * wave], axis=1)))
+    assert view.between_beats
     told = dict(zip(zip(view.order.tolist(), range(len(view.order)), strict=True), view.coefficients[0], strict=True))
     assert told[(0, 0)] == pytest.approx(0.1)
     assert view.coefficients[0, 1] == pytest.approx(0.02)
@@ -52,7 +52,7 @@ def test_the_noise_of_every_coefficient_is_known(memory: float, beats: int) -> N
     """Mean squares over the variances told: within a quarter up to the third harmonic, where models say most."""
     ratios, level = [], []
     for seed in range(8):
-        view = beatwise(recording(5e-4 * noise(31 * beats, memory, seed)))
+        view = harmonic_fit(recording(5e-4 * noise(31 * beats, memory, seed)))
         ratios.append((view.coefficients**2 / view.variance).mean(axis=0))
         level.append(view.noise.mean())
     ratio = np.mean(ratios, axis=0)
@@ -67,7 +67,7 @@ def test_gaps_and_lost_markers_bias_nothing() -> None:
     values = 5e-4 * noise(124, 0.6, 1)
     values[rng.uniform(size=(124, MARKERS)).repeat(3, axis=1) < 0.1] = np.nan
     values[:, :3] = np.nan
-    view = beatwise(recording(values))
+    view = harmonic_fit(recording(values))
     assert not view.used[:3].any()
     assert view.used[3:].all()
     ratio = (view.coefficients[3:] ** 2 / view.variance[3:]).mean()
@@ -76,14 +76,14 @@ def test_gaps_and_lost_markers_bias_nothing() -> None:
 
 def test_a_drift_is_seen_as_a_trend_and_not_as_a_harmonic() -> None:
     values = np.linspace(-1e-3, 1e-3, 124)[:, None] * np.ones(3) + 1e-5 * noise(124, 0.0, 2, 3)
-    view = beatwise(recording(values))
+    view = harmonic_fit(recording(values))
     assert view.coefficients[0, -3] == pytest.approx(1e-3, rel=0.02)
     assert np.abs(view.coefficients[0, :-3]).max() < 5e-5
 
 
 def test_a_single_beat_tells_its_noise_only_by_what_is_left() -> None:
-    view = beatwise(recording(5e-4 * noise(31, 0.0, 4)))
-    assert not view.told
+    view = harmonic_fit(recording(5e-4 * noise(31, 0.0, 4)))
+    assert not view.between_beats
     assert view.noise.mean() == pytest.approx(5e-4, rel=0.15)
     assert not view.trend.any()
 
@@ -92,28 +92,28 @@ def test_a_low_pass_limits_what_is_looked_at() -> None:
     times = np.arange(800) / 800.0
     values = np.sin(2 * np.pi * 12.5 * times)[:, None]
     forces = Recording("f", "wind_tunnel", replace(CONDITION, flap_frequency=12.5), times, (), values, forces=("x",))
-    assert beatwise(forces).order.max() == 10
-    assert beatwise(replace(forces, low_pass=LowPass(40.0))).order.max() == 6
+    assert harmonic_fit(forces).order.max() == 10
+    assert harmonic_fit(replace(forces, low_pass=LowPass(40.0))).order.max() == 6
 
 
 @pytest.mark.parametrize(
     ("frames", "per_beat", "message"),
-    [(1, 30, "a diagnosis needs a beat"), (40, 1, "tell no harmonic"), (6, 30, "no harmonic|no channel")],
+    [(1, 30, "a diagnosis needs a beat"), (40, 1, "determine no harmonic"), (6, 30, "no harmonic|no channel")],
 )
 def test_what_tells_no_beat_is_refused_with_a_remedy(frames: int, per_beat: int, message: str) -> None:
     one = recording(noise(frames, 0.0, 1, 3))
     if per_beat == 1:  # every frame at the same phase
         one = replace(one, times=np.arange(frames) / CONDITION.flap_frequency)
     with pytest.raises(ValueError, match=message):
-        beatwise(one)
+        harmonic_fit(one)
 
 
 def test_a_recording_in_which_nothing_moves_is_refused_and_a_stuck_marker_is_not() -> None:
     values = np.tile([1.0, 0.0, 0.2, 0.0, 0.0, 0.0], (124, 1))
     with pytest.raises(ValueError, match=r"nothing moves, .* all 124 samples; check"):
-        beatwise(recording(values))
+        harmonic_fit(recording(values))
     values[:, :3] += noise(124, 0.5, 1, 3)
-    found = beatwise(recording(values))
+    found = harmonic_fit(recording(values))
     assert np.isfinite(found.variance).all()
     assert found.used.tolist() == [True] * 3 + [False] * 3, "a marker that never moves was not tracked"
     assert still_markers(recording(values)) == ("m1",)

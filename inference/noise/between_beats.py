@@ -2,7 +2,7 @@
 
 The scatter of measured forces grows and falls with the forces themselves, since the flow separates anew in every beat.
 Such noise is not stationary within the beat. A formula that takes its correlations as those of a stationary one
-(:mod:`wingfit.calibration.estimates.coloured`) gives too small an error to a gene that acts where the scatter is large,
+(:mod:`wingfit.inference.noise.coloured`) gives too small an error to a gene that acts where the scatter is large,
 and too large a one to a gene that acts elsewhere. From beat to beat it is stationary. So the scores S^T R^-1 v are
 summed over each whole beat, and the covariance of their sum is estimated from the series of beats with a flat-topped
 taper (Politis and Romano 1995; for scores: Newey and West 1987).
@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from wingfit.inference.noise.mean_beat import fourier_basis, scatter_about
 from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
@@ -64,14 +65,9 @@ def without_mean_beat(record: Recording, white: Array, beats: int) -> Array:
     """
     if beats < FEWEST_MEAN:
         return white
-    psi = 2 * np.pi * record.condition.flap_frequency * record.times[:, None] * np.arange(1, HARMONICS + 1)
-    basis = np.hstack([np.ones((len(psi), 1)), np.cos(psi), np.sin(psi)])
-    out = np.zeros_like(white)
-    for channel, values in enumerate(white.T):
-        seen = values != 0.0
-        mean = np.linalg.lstsq(basis[seen], values[seen], rcond=None)[0]
-        out[seen, channel] = (values[seen] - basis[seen] @ mean) * np.sqrt(beats / (beats - 1.0))
-    return out
+    psi = 2 * np.pi * record.condition.flap_frequency * record.times
+    widened = np.sqrt(beats / (beats - 1.0))
+    return np.asarray(scatter_about(fourier_basis(psi, HARMONICS), white, white != 0.0) * widened)
 
 
 def _beats(record: Recording) -> npt.NDArray[np.int64]:

@@ -1,0 +1,1 @@
+"""Estimation that knows neither wings nor effects: derivatives, bounded least squares, score tests, noise models."""

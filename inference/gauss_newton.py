@@ -1,0 +1,76 @@
+"""The damped Gauss-Newton step inside the unit box, tried with several dampings at once.
+
+The cost is 1/2 |r|^2 of whitened residuals r, linearised as r + S d. A step d minimises slope . d + d . C d / 2 with
+the curvature C = S^T S plus a damping, inside the box: an active-set bounded least-squares problem. Dampings in
+proportion to each gene's curvature (Marquardt 1963) and equal ones (Levenberg 1944) are both of this form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """A cost near a point, slope . d + d . curvature d / 2, with ``curvature`` [F, F] and ``slope`` [F]."""
+
+    curvature: Array
+    slope: Array
+
+    @classmethod
+    def of(cls, whitened: Sequence[tuple[Array, Array]]) -> Quadratic:
+        """Of 1/2 the sum of squares of whitened residuals [N] with sensitivities [N, F], summed over recordings."""
+        return cls(
+            np.asarray(sum(steep.T @ steep for _, steep in whitened), float),
+            np.asarray(sum(steep.T @ white for white, steep in whitened), float),
+        )
+
+    def step(self, unit: Array, damping: Array, slope: Array | None = None) -> Array:
+        """Step [F] from ``unit`` [F] that minimises the cost inside the box, ``damping`` [F] added to the curvatures.
+
+        ``slope`` [F] replaces the quadratic's own.
+        """
+        factor = np.linalg.cholesky(self.curvature + np.diag(damping))
+        aim = -np.linalg.solve(factor, self.slope if slope is None else slope)
+        return np.asarray(lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
+
+    def decrease(self, steps: Array) -> Array:
+        """Decrease [S] of the cost that the quadratic predicts for ``steps`` [S, F]."""
+        return np.asarray(-(steps @ self.slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, self.curvature, steps))
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Points [S, F] that one damping each leads to, with the decrease of the cost that was predicted and that came.
+
+    ``decrease`` is -inf for a point that cannot be simulated.
+    """
+
+    units: Array
+    predicted: Array
+    decrease: Array
+
+    @classmethod
+    def of(cls, units: Array, predicted: Array, before: float, after: Array, reasons: Sequence[str | None]) -> Trials:
+        """From the costs ``before`` the step and ``after`` it [S], and why individuals failed."""
+        failed = np.array([reason is not None for reason in reasons], bool)
+        return cls(units, predicted, before - np.where(failed, np.inf, after))
+
+    def best(self, least_gain: float = 0.0) -> int | None:
+        """The point with the largest decrease among those with more than ``least_gain`` of what was predicted.
+
+        At a bound a step may be round-off alone: one whose predicted decrease is not positive does not count.
+        """
+        good = (self.predicted > 0.0) & (self.decrease > least_gain * self.predicted)
+        return int(np.argmax(np.where(good, self.decrease, -np.inf))) if good.any() else None
+
+    def gain(self, k: int) -> float:
+        """Decrease that came over the decrease that was predicted."""
+        return float(self.decrease[k] / self.predicted[k])

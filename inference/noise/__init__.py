@@ -1,0 +1,1 @@
+"""Models of measurement noise: independent samples, correlated samples, and differences between beats."""

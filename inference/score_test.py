@@ -1,0 +1,77 @@
+"""Score tests: how much of a residual an addition to a model would explain, all nuisance genes being refitted.
+
+What the nuisance genes can do is projected out of the residual and of the changes that the addition makes (Rao 1948;
+here with changes of finite size, because many effects have no slope where they are switched off).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+Array = npt.NDArray[np.float64]
+
+DEPENDENT = 1e-10  # of the largest direction of the nuisance genes; the rest is round-off
+RIDGE = 1e-9  # of the fields' own squares, so that fields that are alike can be solved for
+INVISIBLE = 1e-12  # of a field's length that the nuisance genes cannot make up for: less is round-off
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """An orthonormal basis [N, O] of what the nuisance genes can do to whitened residuals [N]."""
+
+    basis: Array
+
+    @classmethod
+    def of(cls, slopes: Array) -> Nuisance:
+        """From whitened sensitivities [N, F]."""
+        basis, power, _ = np.linalg.svd(slopes, full_matrices=False)
+        return cls(basis[:, power > DEPENDENT * power.max(initial=0.0)])
+
+    def rest(self, vectors: Array) -> Array:
+        """Whitened ``vectors`` [..., M], M <= N, zero beyond M, without what the genes can do: [..., N]."""
+        size = vectors.shape[-1]
+        inside = (vectors @ self.basis[:size]) @ self.basis.T
+        inside[..., :size] -= vectors
+        return np.asarray(-inside)
+
+
+def explained(fields: Array, residual: Array) -> float:
+    """Decrease of the sum of squares of ``residual`` [N] when multiples of the ``fields`` [S, N] are fitted to it."""
+    inner, score = fields @ fields.T, fields @ residual
+    return float(score @ np.linalg.solve(inner + RIDGE * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
+
+
+def amounts(fields: Array, residual: Array, limits: tuple[Array, Array], smallest: float) -> Array:
+    """Multiples [S] of the ``fields`` [S, N] that bring ``residual`` [N] nearest to zero within ``limits``, [S] each.
+
+    A single field is clipped; several are scaled together, so that their proportion stays. A field not longer than
+    ``smallest`` gets zero.
+    """
+    length = np.linalg.norm(fields, axis=1)
+    visible, found = length > smallest, np.zeros(len(fields))
+    if not visible.any():
+        return found
+    part, low, high = fields[visible], limits[0][visible], limits[1][visible]
+    best = -np.linalg.solve(part @ part.T + RIDGE * np.diag(length[visible] ** 2), part @ residual)
+    if len(best) == 1:
+        best = np.clip(best, low, high)
+    else:
+        above = np.where(best > 0, high / np.maximum(best, 1e-300), 1.0)
+        below = np.where(best < 0, low / np.minimum(best, -1e-300), 1.0)
+        best = best * min(1.0, float(above.min()), float(below.min()))
+    found[visible] = best
+    return found
+
+
+def remaining(fields: Array, residual: Array, multiples: Array) -> float:
+    """Sum of squares of ``residual`` [N] plus ``multiples`` [S] of the ``fields`` [S, N]."""
+    return float(np.sum((residual + multiples @ fields) ** 2))
+
+
+def spread(count: int, size: int) -> Array:
+    """``count`` points [count, size] spread evenly over the unit box."""
+    return np.asarray(qmc.Halton(size, scramble=False).random(count + 1)[1:])  # the first of all is a corner

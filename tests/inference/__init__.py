@@ -1,0 +1,1 @@
+"""Tests of the estimation tools on problems with known answers."""
