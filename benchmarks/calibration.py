@@ -21,7 +21,7 @@ from benchmarks.common.machine import commit, cpu
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.result import Result, judge
-from wingfit.calibration.search import CalibrationSpec, Generation, calibrate, model_for, plan
+from wingfit.calibration.search import CalibrationSpec, Generation, calibrate, model_for, prepare
 from wingfit.records import Dataset, Genome, load_dataset
 from wingfit.sim.virtual_rigs.campaign import (
     REFERENCE,
@@ -120,7 +120,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 def evaluators_are_identical(dataset: Dataset) -> bool:
     """The same individuals in this process, with 1, 2 and 4 threads of linear algebra, on pools of 1 and 2, on Ray."""
     spec = CalibrationSpec(division="11")
-    model, stage = model_for(dataset, spec), plan(spec, dataset)[1]
+    model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     rng = np.random.default_rng(0)
     genes = [g for g in model.genes if g.name in stage.free]

@@ -22,7 +22,7 @@ from wingfit.calibration.estimates.likelihood import iterate
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
 from wingfit.records import Dataset, load_dataset
 from wingfit.workers import make_evaluator
 from wingfit.workers.factory import EvaluatorKind
@@ -62,7 +62,7 @@ def from_random(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, seed: int
 ) -> Iterable[tuple[int, float]]:
     """Gauss-Newton from a start drawn evenly from the whole box (in unit coordinates)."""
-    (stage,), model = plan(spec, dataset), model_for(dataset, spec)
+    (stage,), model = prepare(spec, dataset).stages, model_for(dataset, spec)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
     unit = np.random.default_rng([seed, 3]).uniform(size=(1, len(genes)))
@@ -112,7 +112,7 @@ def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1
 
 def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
     """Compile the kernels and build the wing before any clock runs."""
-    (stage,), model = plan(SPEC, dataset), model_for(dataset, SPEC)
+    (stage,), model = prepare(SPEC, dataset).stages, model_for(dataset, SPEC)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
     evaluator.evaluate(problem, np.tile([gene.nominal for gene in genes], (16, 1)))

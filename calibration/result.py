@@ -11,7 +11,7 @@ import numpy.typing as npt
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.uncertainty import Standing, standing
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.plan import Stage, plan
+from wingfit.calibration.preparation import Stage, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.inference.noise.harmonic import noise_distance
@@ -96,9 +96,9 @@ class Comparison:
 @one_blas_thread
 def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
     """Judge a wing's ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
-    model = wing_model(dataset, spec)
+    ready = prepare(spec, dataset)
+    model, stages = wing_model(dataset, spec), ready.stages
     nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
-    stages = plan(spec, dataset)
     both = evaluator.evaluate(
         Problem(model, dataset.recordings, tuple(g.name for g in model.genes), nominal),
         np.array([nominal.values, best.values]),
@@ -130,7 +130,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
             f"effects ('wingfit effects' lists them). Standard errors count on a misfit of at most {ADEQUATE:g} times "
             f"the noise, so no gene is called told"
         )
-    remarks += absent(best.as_dict(), [name for stage in stages for name in stage.free])
+    remarks += absent(best.as_dict(), ready.searched)
     return Result(
         genes=_genes(model, stages, nominal, best, evaluator, adequate),
         recordings=recordings,

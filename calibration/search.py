@@ -13,14 +13,14 @@ from wingfit.calibration.estimates.likelihood import ITERATIONS, Step, iterate
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.genetic import FAILED
-from wingfit.calibration.plan import Stage, plan
+from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
 from wingfit.records import Dataset, Gene
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Model
 
-__all__ = ["CalibrationSpec", "Generation", "Stage", "calibrate", "found", "model_for", "plan", "resolved"]
+__all__ = ["CalibrationSpec", "Generation", "calibrate", "found", "model_for", "prepare", "resolved"]
 
 EXPECTED_GENERATIONS = 45
 EXPECTED_ITERATIONS = 10
@@ -67,14 +67,11 @@ def calibrate(
 
     Resumed equals uninterrupted, bit for bit. ValueError when the spec does not fit the dataset.
     """
-    spec = resolved(spec, dataset)
-    stages = plan(spec, dataset)
-    model = model_for(dataset, spec)
-    state = _State.start(spec, model) if checkpoint is None else _State.from_json(checkpoint, spec)
-    if checkpoint is not None:
-        state.found = found(spec, dataset, checkpoint)
-    while state.stage < len(stages):
-        run = _Run(spec, stages, model, state, evaluator)
+    ready = prepare(spec, dataset)
+    spec = ready.spec
+    state = _State.start(spec, ready.model) if checkpoint is None else _State.from_json(checkpoint, spec)
+    while state.stage < len(ready.stages):
+        run = _Run(ready, state, evaluator)
         if spec.method != "gauss_newton":
             yield from run.search()
         if spec.method == "gauss_newton" or spec.finish:
@@ -86,16 +83,7 @@ def calibrate(
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
     """Full genome of each stage so far, by name, from the last generation's checkpoint."""
-    spec = resolved(spec, dataset)
-    state = _State.from_json(checkpoint, spec)
-    if state.found:
-        return state.found
-    # a checkpoint of version 0.1: the genome that the stage under way began with, and its population
-    *earlier, stage = plan(spec, dataset)[: state.stage + 1]
-    genomes = {one.name: dict(state.base) for one in (*earlier, stage)}
-    genes = [gene for gene in model_for(dataset, spec).genes if gene.name in stage.free]
-    genomes[stage.name] |= _named(genes, _leader(state.population)[2])
-    return genomes
+    return _State.from_json(checkpoint, resolved(spec, dataset)).found
 
 
 @dataclass
@@ -120,7 +108,7 @@ class _State:
     @classmethod
     def from_json(cls, state: dict[str, Any], spec: CalibrationSpec) -> _State:
         fields = dict(state) | {"population": type(_empty(spec)).from_json(state["population"])}
-        found = {name: dict(genome) for name, genome in state.get("found", {}).items()}
+        found = {name: dict(genome) for name, genome in state["found"].items()}
         return cls(**fields | {"base": dict(state["base"]), "found": found})
 
     def as_json(self) -> dict[str, Any]:
@@ -139,12 +127,11 @@ def _empty(spec: CalibrationSpec) -> Population:
 class _Run:
     """One stage under way; ``state`` moves on with every generation."""
 
-    def __init__(
-        self, spec: CalibrationSpec, stages: tuple[Stage, ...], model: Model, state: _State, evaluator: Evaluator
-    ) -> None:
-        self.spec, self.stages, self.state, self.evaluator = spec, stages, state, evaluator
-        self.stage = stages[state.stage]
-        self.problem = Problem(model, self.stage.recordings, self.stage.free, base_genome(model, state.base), spec.axes)
+    def __init__(self, ready: Prepared, state: _State, evaluator: Evaluator) -> None:
+        self.spec, self.stages, self.state, self.evaluator = ready.spec, ready.stages, state, evaluator
+        self.stage = ready.stages[state.stage]
+        base = base_genome(ready.model, state.base)
+        self.problem = Problem(ready.model, self.stage.recordings, self.stage.free, base, ready.spec.axes)
         self.genes = free_genes(self.problem)
 
     def search(self) -> Iterator[Generation]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.plan import plan, prepared
+from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import base_genome
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import Finding
@@ -64,7 +64,7 @@ def diagnose_subject(
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     held_out, copies = _unseen(fitted, held_out)
-    state = Assessment(subject, Stack.of(fitted, axes))
+    state = Assessment(subject, Stack.of(fitted, axes, spec.policy))
     counted = Counted(evaluator, state)
     for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), counted):
         yield Progress(ASSESSED * fraction, stage, state.evaluations)
@@ -107,9 +107,9 @@ def _prepared(
 ) -> tuple[Subject, tuple[Recording, ...], tuple[Recording, ...], tuple[str, ...]]:
     """Subject, recordings that are fitted and held out, as they are fitted, and the free genes."""
     calibration = replace(spec.calibration, mode="joint", axes=_axes(dataset, spec) or spec.calibration.axes)
-    (stage,) = plan(calibration, dataset)
-    held_out = tuple(prepared(calibration, r) for r in dataset.recordings if r.name in dataset.held_out)
-    return subject_of(dataset, calibration), stage.recordings, held_out, stage.free
+    ready = prepare(calibration, dataset)
+    (stage,) = ready.stages
+    return subject_of(dataset, calibration), stage.recordings, ready.held_out, stage.free
 
 
 def _axes(dataset: Dataset, spec: DiagnosisSpec) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.calibration.effects import sizes
-from wingfit.calibration.plan import fitted_through
+from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.subject import Place, Subject, Suspect
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing

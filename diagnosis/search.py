@@ -14,7 +14,6 @@ from wingfit.diagnosis.evidence.fit import UNFIT, Fit
 from wingfit.diagnosis.evidence.nominal import Nominal, first_fit, improves, leaves, promises, settled
 from wingfit.diagnosis.evidence.refit import (
     LAST,
-    RIVALRY,
     Refit,
     again,
     continued,
@@ -33,16 +32,12 @@ from wingfit.diagnosis.search_state import Assessment
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject, Suspect
 from wingfit.diagnosis.verdict.verdict import decided
-from wingfit.diagnosis.verdict.weigh_hypotheses import UNKNOWN, Weighed, beyond_doubt, tolerated, weighed
+from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, beyond_doubt, tolerated, weighed
 
-SOLVED = 0.05  # of the nominal model's excess: an explanation that leaves less needs no weaker rivals
-WEAKER = 0.6  # of the best score
 CONTINUED = 2  # of the best refits, if they have not converged
-HOPEFUL = 0.7  # of the nominal model's excess: a refit that leaves more is not continued
 RUNNERS = 3  # suspects that are fitted from the estimates
 PARTNERS = 3  # of the best explanation
 RIVALS = 3  # explanations to which a partner is sought
-OVERTAKES = 10.0  # in the logarithm of the evidence, that a fit that has not ended may still gain
 SUBSTITUTES = 2  # tried in place of each part of an explanation of several
 
 
@@ -87,7 +82,7 @@ def _settled(
         state.begin(settled(state.subject, state.stack, evaluator, fit, refine=False))
         for fraction, stage in _suspected(state, spec, suspects, evaluator, at_least=nominal.refit):
             yield 0.3 * fraction, stage
-    if not any(improves(one, nominal.refit) for one in state.refits):
+    if not any(improves(state.stack, one, nominal.refit) for one in state.refits):
         state.begin(nominal)
         for fraction, stage in _suspected(state, spec, suspects, evaluator):
             yield 0.3 + 0.7 * fraction, stage
@@ -110,7 +105,7 @@ def _ended(state: Assessment, evaluator: Evaluator, floor: float, suspects: int)
 def _alike(weighed: Weighed) -> list[Entry]:
     """Suspects that explain nearly as well each by itself, if several do: the right one's fit may have been caught."""
     evidence = weighed.evidence[1:]
-    least = max(evidence.max(initial=0.0) - OVERTAKES, 0.0)
+    least = max(evidence.max(initial=0.0) - weighed.policy.overtake, 0.0)
     close = [one for one, found in zip(weighed.refits[1:], evidence, strict=True) if found > least]
     several = len(close) > 1 and all(len(one.trials) == 1 for one in close)
     return [entry for one in close for entry in entries(one.trials[0])] if several else []
@@ -142,7 +137,7 @@ def _unended(weighed: Weighed) -> Refit | None:
     evidence = weighed.evidence[1:]
     for k in np.argsort(-evidence, kind="stable")[: RIVALS if best.trials else 0]:
         rival: Refit = weighed.refits[1:][k]
-        if evidence[k] > evidence.max() - OVERTAKES and not rival.fit.converged:
+        if evidence[k] > evidence.max() - weighed.policy.overtake and not rival.fit.converged:
             return rival
     return None
 
@@ -156,7 +151,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    innocent, most = nominal.innocent, RIVALRY * best.excess + tolerated(stack, 0.0, 0.0)
+    innocent, most = nominal.innocent, stack.policy.rivalry * best.excess + tolerated(stack, 0.0, 0.0)
     leading = sorted((one for one in state.refits if one.excess <= most), key=lambda one: one.excess)[:CONTINUED]
     for finer in nominal.subject.finer():
         tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
@@ -164,7 +159,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
             innocent = finer.told
         known = [found for one, found in tried if found is not None and found is not one]
         better = min(known, key=lambda one: one.excess, default=best)
-        if improves(better, best):
+        if improves(state.stack, better, best):
             break
     else:
         state.nominal = replace(nominal, innocent=innocent)
@@ -173,7 +168,7 @@ def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
     if first is None:
         return
     first = ended(finer, stack, evaluator, first)
-    most = RIVALRY * better.excess + tolerated(stack, 0.0, 0.0)
+    most = stack.policy.rivalry * better.excess + tolerated(stack, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
     followed = [_followed(finer, stack, evaluator, one, better) for one in others]
@@ -191,7 +186,7 @@ def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) 
     if not promises(stack, changes, takes, refit):
         return refit
     found = again(finer, stack, evaluator, refit)
-    if found is None or found.fit.converged or improves(found, refit) or found.excess >= refit.excess:
+    if found is None or found.fit.converged or improves(stack, found, refit) or found.excess >= refit.excess:
         return found
     return continued(finer, stack, evaluator, found)
 
@@ -234,10 +229,10 @@ def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
     """
     nominal = state.known.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
-    if best is nominal or not improves(best, nominal):
+    if best is nominal or not improves(state.stack, best, nominal):
         return None
     found = resumed(state.subject, state.stack, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
-    return found if found is not None and improves(found, nominal) else None
+    return found if found is not None and improves(state.stack, found, nominal) else None
 
 
 def _refits(
@@ -248,7 +243,7 @@ def _refits(
     yield 0.72, "continuing the best refits"
     if _solved(state, nominal, evaluator):
         return
-    if at_least is not None and not any(improves(one, at_least) for one in state.refits):
+    if at_least is not None and not any(improves(state.stack, one, at_least) for one in state.refits):
         return
     if not state.leaves_little:
         yield from _afresh(state, spec, evaluator)
@@ -262,7 +257,7 @@ def _alone(
     state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     stack, fit = state.stack, nominal.refit.fit
-    chosen = worth_a_refit(state.trials, spec.refits)
+    chosen = worth_a_refit(state.stack, state.trials, spec.refits)
     for k, trial in enumerate(chosen):
         if _outdone(state, nominal, trial, chosen[0]):
             continue
@@ -282,13 +277,13 @@ def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} about the estimates"
-    every = [entry for trial in _runners(found) for entry in entries(trial)]
+    every = [entry for trial in _runners(state.stack, found) for entry in entries(trial)]
     yield from ((0.77, stage) for stage in _raced(state, evaluator, every))
 
 
-def _runners(found: Sequence[list[Trial]]) -> list[Trial]:
+def _runners(stack: Stack, found: Sequence[list[Trial]]) -> list[Trial]:
     """The strongest, and all that act at a place: a score test at a few places tells little of these."""
-    strongest = worth_a_refit(found, RUNNERS)
+    strongest = worth_a_refit(stack, found, RUNNERS)
     placed = [trials[0] for trials in found if trials and trials[0].suspect.places and not trials[0].suspect.spots]
     return [*strongest, *(trial for trial in placed if all(trial is not one for one in strongest))]
 
@@ -299,8 +294,8 @@ def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> I
         return
     best = min(one.excess for one in state.refits)
     noisy = tolerated(state.stack, 0.0, 0.0)
-    most = max(min(HOPEFUL * state.known.refit.excess, RIVALRY * best), noisy)
-    wanted = max(UNKNOWN**2 * state.known.refit.excess, noisy)
+    most = max(min(state.stack.policy.hopeful * state.known.refit.excess, state.stack.policy.rivalry * best), noisy)
+    wanted = max(state.stack.policy.unknown_residual**2 * state.known.refit.excess, noisy)
     front: list[tuple[Entry, Fit]] = []
     for front in afresh(state.subject, state.stack, evaluator, state.begun[1], every, most, wanted):
         yield f"refit with {' and '.join(front[0][0].names)} from the estimates"
@@ -376,17 +371,17 @@ def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:
     enough = state.tolerable(nominal)
     for k in np.argsort([one.excess for one in state.refits])[:CONTINUED]:
         one = state.refits[k]
-        if not one.fit.converged and enough < one.excess < HOPEFUL * nominal.refit.excess:
+        if not one.fit.converged and enough < one.excess < state.stack.policy.hopeful * nominal.refit.excess:
             state.refits[k] = continued(state.subject, state.stack, evaluator, one)
     return state.enough(nominal)
 
 
 def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:
     """Whether a refit has explained so much already that a trial so much weaker in its score test cannot compete."""
-    if not state.refits or trial.gain > WEAKER * best.gain:
+    if not state.refits or trial.gain > state.stack.policy.weaker * best.gain:
         return False
     left = min(one.excess for one in state.refits)
-    return left <= max(SOLVED * nominal.refit.excess, tolerated(state.stack, 0.0, 0.0))
+    return left <= max(state.stack.policy.solved * nominal.refit.excess, tolerated(state.stack, 0.0, 0.0))
 
 
 def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:

@@ -15,9 +15,7 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.weigh_hypotheses import UNKNOWN, Weighed, tolerated
-
-PART = 0.25  # of what the form of a law is allowed to leave: more, and a partner is sought
+from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, tolerated
 
 
 @dataclass
@@ -60,7 +58,7 @@ class Assessment:
 
     def tolerable(self, nominal: Nominal) -> float:
         """What an explanation may leave that needs no partner, m^2 or N^2."""
-        return tolerated(self.stack, PART * nominal.refit.excess, 0.0)
+        return tolerated(self.stack, self.stack.policy.partner_form * nominal.refit.excess, 0.0)
 
     def enough(self, nominal: Nominal) -> bool:
         """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
@@ -70,7 +68,7 @@ class Assessment:
     def leaves_little(self) -> bool:
         """Whether an explanation leaves less than a law would that is not in the library."""
         least = min((one.excess for one in self.refits), default=np.inf)
-        return least <= UNKNOWN**2 * self.known.refit.excess
+        return least <= self.stack.policy.unknown_residual**2 * self.known.refit.excess
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.policy import POLICY, Policy
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,7 @@ class DiagnosisSpec:
         refine: whether the model may go to a finer division by itself where the division limits it.
         refits: how many effects are refitted in full at most.
         axes: force axes to fit; empty means all that every recording has.
+        policy: thresholds.
     """
 
     calibration: CalibrationSpec = field(default_factory=CalibrationSpec)
@@ -29,6 +31,7 @@ class DiagnosisSpec:
     refine: bool = True
     refits: int = 8
     axes: tuple[str, ...] = ()
+    policy: Policy = POLICY
 
 
 @dataclass(frozen=True)

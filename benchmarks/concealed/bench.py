@@ -24,7 +24,7 @@ from benchmarks.concealed.plant.simulate import simulate as simulate_wing
 from benchmarks.concealed.plant.vehicle_laws import LAWS as VEHICLE_LAWS
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.trials import Build
-from wingfit.calibration.plan import prepared
+from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.sim.model import Model
@@ -292,7 +292,7 @@ class VehicleBench(Bench[Array, Weighing]):
 
     def fitted(self, recording: Recording) -> Recording:
         """Low-passed at the seed's multiple of the flap frequency (Armanini et al. 2016, 3.4), as forces always are."""
-        return prepared(CalibrationSpec(), recording)
+        return as_fitted(CalibrationSpec(), recording)
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
         """Forces [n, 2] over a beat."""

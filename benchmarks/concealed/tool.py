@@ -9,6 +9,7 @@ from pathlib import Path
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, diagnose
 from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.records import load_dataset
 from wingfit.workers import make_evaluator
 
@@ -21,6 +22,7 @@ class Task:
     dataset: Path
     division: str
     without: tuple[str, ...]
+    policy: Policy = POLICY
 
 
 @dataclass(frozen=True)

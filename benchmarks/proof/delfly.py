@@ -18,7 +18,7 @@ from benchmarks.delfly import LIFT_CORRELATION, fit
 from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import agreements
-from wingfit.calibration.plan import prepared
+from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.search import calibrate
 from wingfit.calibration.spec import CalibrationSpec, vehicle_model
@@ -70,7 +70,7 @@ def located(
     spec, model = CalibrationSpec(preset=BASELINE), vehicle_model(dataset, CalibrationSpec(preset=BASELINE))
     tests = {trial.name: trial for trial in trials}
     return {
-        one.name: fit(model, prepared(spec, one), tests[one.name], evaluator).lacking
+        one.name: fit(model, as_fitted(spec, one), tests[one.name], evaluator).lacking
         for one in dataset.recordings
         if one.name not in dataset.held_out
     }
@@ -93,7 +93,7 @@ def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) 
     model = vehicle_model(dataset, spec)
     genome, found = base_genome(model, values), {}
     for recording in dataset.recordings:
-        filtered = prepared(spec, recording)
+        filtered = as_fitted(spec, recording)
         forces = model.observe([genome.values], filtered).channels[0]
         found[recording.name] = next(
             a.correlation for a in agreements(filtered, forces, "joint") if a.quantity == "lift"

@@ -26,7 +26,7 @@ from wingfit.calibration.forces.result import (
     Source,
 )
 from wingfit.calibration.forces.split_beats import Cut
-from wingfit.calibration.plan import Stage, plan, prepared
+from wingfit.calibration.preparation import Stage, as_fitted, prepare
 from wingfit.calibration.problem import Problem, base_genome, compared
 from wingfit.calibration.result import ADEQUATE, GeneResult
 from wingfit.calibration.search import found as found_by_stage
@@ -86,11 +86,11 @@ def summarise_forces(
     ``checkpoint`` is the last generation's. The global model is one of local estimates; a recording that was not fitted
     is predicted by it or, without it, by the joint estimate or the average of the local ones.
     """
-    spec = resolved(spec, dataset)
-    model, best = vehicle_model(dataset, spec), found_by_stage(spec, dataset, checkpoint)
+    ready = prepare(spec, dataset)
+    spec, model, best = ready.spec, vehicle_model(dataset, spec), found_by_stage(spec, dataset, checkpoint)
     judged = [
         _judge(stage, model, base_genome(model, best[stage.name]), spec, evaluator)
-        for stage in plan(spec, dataset)
+        for stage in ready.stages
         if stage.name in best
     ]
     law, remarks = _global(spec, dataset, [one.estimate for one in judged])
@@ -98,7 +98,7 @@ def summarise_forces(
     everywhere = []
     for recording in dataset.recordings:
         genomes, warnings = _sources(spec, model, nominal, judged, law, recording)
-        everywhere.append(_compare(model, prepared(spec, recording), genomes, spec.axes))
+        everywhere.append(_compare(model, as_fitted(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
     lacking = [_lacking(one, everywhere) for one in judged]
     remarks = (*remarks, *(remark for remark in lacking if remark), *_filtered_before(spec, dataset))
@@ -127,7 +127,7 @@ def compare_forces(
 ) -> ForceComparison:
     """Forces of ``genome`` (full, by name) over a recording, low-passed as in the calibration."""
     spec = resolved(spec, dataset)
-    model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+    model, record = vehicle_model(dataset, spec), as_fitted(spec, dataset.recording(recording))
     return comparison(record, _observed(model, record, [base_genome(model, genome)])[0], source)
 
 
@@ -313,7 +313,7 @@ def _left_out(
         if law is None:
             remarks += [f"with a recording left out: {remark}" for remark in said]
             continue
-        recording = prepared(spec, dataset.recording(one.recordings[0]))
+        recording = as_fitted(spec, dataset.recording(one.recordings[0]))
         values, said = _by_law(model, law, recording.condition)
         remarks += [f"recording {recording.name!r} left out: {remark}" for remark in said]
         found += agreements(recording, _observed(model, recording, [nominal.replace(values)])[0], "global")

@@ -12,7 +12,7 @@ from wingfit.calibration.estimates.linearised import unit_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.fit import CRAWLING, UNFIT, Fit, gained_little, thoroughly
-from wingfit.diagnosis.evidence.refit import RIVALRY, Refit
+from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial, size_columns
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.subject import Subject
@@ -22,7 +22,6 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 14  # of a fit
 RACE = 5  # of each, its start among them, before those that leave least go on
-FASTER = 3.0  # times as fast as its last step was: more is not expected of a fit
 SAME = 0.05  # of a box: fits of the same suspects as near as this are one
 
 
@@ -65,9 +64,9 @@ def afresh(
 
     Where the nominal fit ended its genes have taken up what they could of a suspect, and may not find back. All run for
     RACE steps; then each that may still overtake the best goes on to its end. A fit ends early where it crawls and
-    leaves RIVALRY times as much as the best, or more than ``most`` (m^2 or N^2 beyond the noise). One that does not
-    lead also ends where it would do so, or leave more than is ``wanted``, in the end, though it gained FASTER; and
-    where another has come to the same.
+    leaves far more than the best (`Policy.rivalry`), or more than ``most`` (m^2 or N^2 beyond the noise). One that does
+    not lead also ends where it would leave as much, or more than is ``wanted``, even if it went on faster than it does
+    (`Policy.speed`); and where another has come to the same.
     Yields all that do not leave as much after every step, the best first; nothing where none can be simulated.
     """
     race = _Race(stack, most, wanted)
@@ -107,18 +106,20 @@ class _Race:
         )
 
     def _foreseen(self, runner: _Runner) -> float:
-        """What a fit leaves in the end if it gains FASTER from now on than it did in its last step."""
+        """What a fit leaves in the end if it goes on faster than in its last step (`Policy.speed`)."""
         before, now = (self.stack.excess(fit.coefficients) for fit in runner.fits)
         if now <= 0.0 or now >= before:
             return now
-        return float(now * (now / before) ** (FASTER * (STEPS + 1 - runner.taken)))
+        return float(now * (now / before) ** (self.stack.policy.speed * (STEPS + 1 - runner.taken)))
 
     def _left(self, runner: _Runner) -> float:
         return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
 
     def _behind(self) -> float:
         """What leaves more is no rival of the best; above what noise may make of nothing."""
-        return max(RIVALRY * min(self._left(one) for one in self.runners), tolerated(self.stack, 0.0, 0.0))
+        return max(
+            self.stack.policy.rivalry * min(self._left(one) for one in self.runners), tolerated(self.stack, 0.0, 0.0)
+        )
 
     def _in_front(self) -> list[tuple[Entry, Fit]]:
         begun = sorted((one for one in self.runners if one.fits), key=lambda one: one.cost)

@@ -21,11 +21,6 @@ Array = npt.NDArray[np.float64]
 
 STEPS = 20
 ROUNDS = 3  # of refinement
-PROMISING = 0.1  # of the excess that a finer division must take away by the linearised model to be fitted
-MOST = 1.5  # times what the finer division changes: the true wing may be finer still
-MATTERS = 0.25  # of the noise: a division that leaves less is fine enough
-BETTER = 0.25  # of the excess that a finer division must take away to be worth its cost
-LIMIT = 0.3  # of the noise: a misfit below needs no finer division
 
 
 @dataclass(frozen=True)
@@ -78,7 +73,7 @@ def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, r
             left, finest, tried = changes, finer.told, ""
             if refine and promises(stack, changes, takes, now):
                 found = again(finer, stack, evaluator, now)
-                better = ended(finer, stack, evaluator, found) if found and improves(found, now) else None
+                better = ended(finer, stack, evaluator, found) if found and improves(stack, found, now) else None
                 tried = finer.told if found is not None else ""
             if better is not None:
                 break
@@ -97,8 +92,9 @@ def promises(stack: Stack, changes: float, takes: float, now: Refit) -> bool:
 
     Of one that changes more than the whole misfit the linearised model knows nothing.
     """
-    matters = changes >= MATTERS * stack.noise and now.excess >= (LIMIT * stack.noise) ** 2
-    return matters and (takes > PROMISING or changes**2 >= now.excess)
+    policy = stack.policy
+    matters = changes >= policy.finer_matters * stack.noise and now.excess >= (policy.finer_limit * stack.noise) ** 2
+    return matters and (takes > policy.finer_promise or changes**2 >= now.excess)
 
 
 def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
@@ -114,15 +110,15 @@ def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> 
     nuisance = Nuisance(stack, fit)
     rest, left = nuisance.rest(found[0] - fit.coefficients), nuisance.left
     power = float(rest @ rest)
-    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, MOST))
+    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, stack.policy.division_factor))
     excess = max(float(left @ left) - len(left), 1e-300)
     taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
     return float(np.sqrt(stack.weight @ (rest[: len(stack.scale)] * stack.scale) ** 2)), taken
 
 
-def improves(finer: Refit, coarse: Refit) -> bool:
+def improves(stack: Stack, finer: Refit, coarse: Refit) -> bool:
     """Whether a finer division takes away so much of the excess that it is worth its cost."""
-    return finer.excess < (1.0 - BETTER) * coarse.excess and coarse.excess > 0.0
+    return finer.excess < (1.0 - stack.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
 
 
 def _percent(part: float, whole: float) -> str:

@@ -23,14 +23,7 @@ Array = npt.NDArray[np.float64]
 STEPS = 6  # of a refit
 FURTHER = 10  # of one that is continued
 LAST = 20  # of the best, to its end
-WORTH = 0.25  # of the best gain: a suspect with less is not refitted
 PARTNERS = 4  # tried beside the best, and as pairs without it
-HELPS = 0.5  # of what an explanation leaves: a partner that would take less is not tried
-ALIKE = 0.8  # of what a suspect does: another that can do as much is tried in its place
-FREE = 0.1  # of a gene's box: how far a recording left out may move it, as a standard deviation
-BROKEN = 1.5  # times the chi-squared that the score test promises to leave: a refit that leaves more went astray
-CHANCE = 4.0  # times what noise makes of a prediction on average: so much it makes by chance (chi-squared of one)
-RIVALRY = 3.0  # times what the best leaves: an explanation that leaves more is no rival
 HALVINGS = 3  # of a start that cannot be simulated
 
 
@@ -78,7 +71,7 @@ def left_out(stack: Stack, fit: Fit) -> float | None:
     grams = [slopes[part].T @ slopes[part] for part in stack.parts]
     scores = [slopes[part].T @ white[part] for part in stack.parts]
     trust, prior = stack.trust(fit.coefficients), (fit.unit - 0.5) / PRIOR**2
-    gram = trust * sum(grams) + np.eye(len(fit.unit)) * (FREE**-2 + PRIOR**-2)
+    gram = trust * sum(grams) + np.eye(len(fit.unit)) * (stack.policy.gene_freedom**-2 + PRIOR**-2)
     score = trust * sum(scores) + prior
     total = 0.0
     for r, part in enumerate(stack.parts):
@@ -89,7 +82,9 @@ def left_out(stack: Stack, fit: Fit) -> float | None:
         worse = float(weight @ ((here + own @ move) ** 2 - here**2))
         noisy = trust**2 * spread @ others @ spread
         by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
-        total += float(weight @ (here**2 - stack.variance[part])) + max(worse - CHANCE * by_noise, 0.0)
+        total += float(weight @ (here**2 - stack.variance[part])) + max(
+            worse - stack.policy.prediction_noise * by_noise, 0.0
+        )
     return total
 
 
@@ -115,7 +110,7 @@ def refitted(
         except UNFIT:
             continue
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
-        astray = stack.chi_squared(fit.coefficients) > BROKEN * trials[0].leaves
+        astray = stack.chi_squared(fit.coefficients) > stack.policy.astray * trials[0].leaves
         if len(trials) == 1 and astray and not sizes.all():
             with suppress(*UNFIT):
                 first = _some(subject, stack, problem, evaluator, start, before, sizes)
@@ -198,17 +193,18 @@ def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, 
         return None
 
 
-def worth_a_refit(found: Sequence[list[Trial]], most: int) -> list[Trial]:
-    """The best trial of each suspect that takes at least WORTH of what the strongest does; strongest first."""
+def worth_a_refit(stack: Stack, found: Sequence[list[Trial]], most: int) -> list[Trial]:
+    """The best trial of each suspect worth a refit (`Policy.worth_refit`), strongest first."""
+    policy = stack.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
-    return [trial for trial in best[:most] if trial.gain >= WORTH * best[0].gain and trial.gain > 0.0]
+    return [trial for trial in best[:most] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
 def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
     """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
     nuisance = Nuisance(stack, base.fit)
     left = nuisance.left
-    worth = HELPS * (float(left @ left) - len(left))
+    worth = stack.policy.partner_gain * (float(left @ left) - len(left))
     return [trial for gain, trial in _takers(nuisance, left, found, base.names)[:most] if gain > worth]
 
 
@@ -235,7 +231,7 @@ def substitutes(
     kept = np.array([name not in own for name in refit.fit.problem.free])
     nuisance = Nuisance(stack, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
     done = nuisance.rest(change)
-    worth = ALIKE * float(done @ done)
+    worth = stack.policy.substitute * float(done @ done)
     return [one for gain, one in _takers(nuisance, done, found, refit.names)[:most] if gain > worth]
 
 

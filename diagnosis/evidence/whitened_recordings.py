@@ -12,14 +12,11 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
+from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
-
-PIECES = 6.0  # independent pieces of what a model misses, per recording
-MOST_PIECES = 48.0
-TOLERANCE = 0.1  # of the noise: a model is not asked to be better, however long the recording
 
 
 @dataclass(frozen=True)
@@ -39,9 +36,10 @@ class Stack:
     views: tuple[HarmonicFit, ...]
     axes: tuple[str, ...]
     tolerance: float
+    policy: Policy = POLICY
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = ()) -> Stack:
+    def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> Stack:
         """Reduce ``recordings``; ValueError for one that is of no use, or for none."""
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
@@ -50,7 +48,7 @@ class Stack:
         )
         noise = np.sqrt(np.mean(np.concatenate([view.noise[view.used] ** 2 for view in views])))
         largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
-        return cls(tuple(recordings), views, axes, max(TOLERANCE * float(noise), 1e-6 * largest))
+        return cls(tuple(recordings), views, axes, max(policy.tolerance * float(noise), 1e-6 * largest), policy)
 
     @cached_property
     def noiseless(self) -> Stack:
@@ -103,7 +101,7 @@ class Stack:
     @cached_property
     def pieces(self) -> float:
         """Number of independent pieces that what a model misses has: a few for each recording, however long."""
-        return min(PIECES * len(self.recordings), MOST_PIECES)
+        return min(self.policy.pieces * len(self.recordings), self.policy.most_pieces)
 
     def surprise(self, coefficients: Array) -> Array:
         """Minus twice the log-likelihood [...] of coefficients [..., D]: noise, and beyond it a misfit of unknown size.
@@ -122,7 +120,7 @@ class Stack:
     @cached_property
     def most_trust(self) -> float:
         """The same beside a misfit as large as the tolerance: no fit ends nearer to the best, and no model is exact."""
-        return float(1.0 / (1.0 + TOLERANCE**2 * len(self.scale) / self.pieces))
+        return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.pieces))
 
     def _beyond(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))

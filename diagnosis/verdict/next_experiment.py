@@ -16,7 +16,7 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import Advice
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.weigh_hypotheses import SURE, Weighed, tolerated
+from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, tolerated
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
 
@@ -144,7 +144,7 @@ def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float
     unit = stack.noise**2
     tau = tolerated(stack, weighed.left[0] * unit, 0.0) / unit + float(weighed.left.min())
     gain = 0.5 * stack.pieces / (1.0 - share) * np.log1p(share * apart**2 / tau)
-    odds = np.log(SURE / (1.0 - SURE))
+    odds = np.log(stack.policy.single / (1.0 - stack.policy.single))
     resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))
     lag, incidence = float(np.degrees(condition.phase_lag)), float(np.degrees(condition.angle_of_attack))
     where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"

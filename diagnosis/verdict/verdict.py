@@ -13,7 +13,7 @@ from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from wingfit.diagnosis.subject import Suspect
-from wingfit.diagnosis.verdict.weigh_hypotheses import ALIKE, DOUBT, KNOWN, SURE, Weighed
+from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed
 
 LISTED = 12  # suspects that were not refitted and are told all the same
 
@@ -31,6 +31,7 @@ class Decision:
 
 def decided(weighed: Weighed) -> Decision:
     """Which verdict the probabilities of the hypotheses make."""
+    policy = weighed.policy
     nominal, effects = float(weighed.probabilities[0]), weighed.probabilities[1:]
     refits = weighed.refits[1:]
     probability: dict[str, float] = dict.fromkeys(VERDICTS, 0.0)
@@ -40,8 +41,8 @@ def decided(weighed: Weighed) -> Decision:
     best = weighed.refits[0]
     if len(effects):
         top = int(np.argmax(effects))
-        possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= ALIKE * max(total, 1e-300)]
-        sure = refits[top] if effects[top] >= SURE * total else _shared(possible)
+        possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= policy.possible * max(total, 1e-300)]
+        sure = refits[top] if effects[top] >= policy.single * total else _shared(possible)
         one: Verdict = "measurement fault" if sure and _measured(sure) else "named"
         if sure:
             holds = [set(sure.names) <= set(refit.names) for refit in refits]
@@ -51,11 +52,11 @@ def decided(weighed: Weighed) -> Decision:
     verdict: Verdict
     if nominal >= lacking:
         verdict = "adequate"
-    elif total >= KNOWN * lacking:
+    elif total >= policy.listed * lacking:
         verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
-        if weighed.evidence[1:].max(initial=0.0) > DOUBT:  # the nearest is put in if it earns it
+        if weighed.evidence[1:].max(initial=0.0) > policy.least_evidence:  # the nearest is put in if it earns it
             best = refits[int(np.argmax(weighed.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()

@@ -10,8 +10,8 @@ explain: a likelihood in which the misfit of a law that is right but for its for
 E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
 nu the number of independent pieces that such misfits have (a few for each recording). Beforehand each effect is as
 unlikely as the suspects are many. Two hypotheses always compete beside the effects: *nothing is lacking*, and
-*something that is not in the library*, which is taken to explain all but a part UNKNOWN of the misfit at the price of
-the genes that a law of its own would need.
+*something that is not in the library*, which is taken to explain all but a part of the misfit
+(`Policy.unknown_residual`) at the price of the genes that a law of its own would need.
 """
 
 from __future__ import annotations
@@ -24,21 +24,9 @@ import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.policy import POLICY, Policy
 
 Array = npt.NDArray[np.float64]
-
-ADEQUATE = 0.3  # of the noise: a misfit beyond it that is no larger is none
-FORM = 0.15  # of the misfit of the nominal model: what a law right but for its form leaves
-GENE = 2.0  # price of a gene in units of the logarithm of the evidence
-UNKNOWN = 0.35  # root mean square that an unknown law would leave, in parts of the nominal model's
-UNKNOWN_GENES = 6.0
-REFUTED = 4.0  # standard errors of it, which refute the nominal model by themselves
-SLACK = 2.0  # standard errors of a mean square beyond the noise, which noise alone may make
-PREDICTED = 0.25  # of the weight, for recordings left out
-DOUBT = 2.0  # in the logarithm of the evidence: below, an explanation is not looked for, and none is put in
-SURE = 0.85  # probability from which a single explanation is named
-KNOWN = 0.75  # of the probability of all that is lacking: effects of the library with less leave it unnamed
-ALIKE = 0.05  # probability from which another explanation is said to be possible
 
 
 @dataclass(frozen=True)
@@ -50,6 +38,7 @@ class Weighed:
     probabilities: Array
     unknown: float
     left: Array
+    policy: Policy = POLICY
 
 
 def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float, suspects: int) -> Weighed:
@@ -58,20 +47,24 @@ def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float,
     ``floor`` (m or N) is what the model's division leaves; ``suspects`` how many were considered: each of them is as
     unlikely beforehand as they are many.
     """
+    policy = stack.policy
     every = (nominal, *refits)
     unit = stack.noise**2
     tau = tolerated(stack, nominal.excess, floor) / unit
-    left = np.array([_misfit(one, tau * unit) / unit for one in every])
+    left = np.array([_misfit(stack, one, tau * unit) / unit for one in every])
     genes = np.array([one.freedom for one in every], float)
     named = np.array([len(one.trials) for one in every], float)
     log = _evidence(stack, tau + left, genes, named, suspects)
-    unknown = -0.5 * stack.pieces * np.log(tau + UNKNOWN**2 * left[0]) - GENE * UNKNOWN_GENES
+    unknown = (
+        -0.5 * stack.pieces * np.log(tau + policy.unknown_residual**2 * left[0])
+        - policy.gene_cost * policy.unknown_genes
+    )
     top = max(log.max(), unknown)
     weight, other = np.exp(log - top), np.exp(unknown - top)
     if refuted(stack, nominal.excess, floor):
         weight[0] = 0.0
     total = weight.sum() + other
-    return Weighed(every, log - log[0], weight / total, float(other / total), left)
+    return Weighed(every, log - log[0], weight / total, float(other / total), left, stack.policy)
 
 
 def refuted(stack: Stack, excess: float, floor: float) -> bool:
@@ -79,13 +72,15 @@ def refuted(stack: Stack, excess: float, floor: float) -> bool:
 
     However few the pieces of it are: it is not known what is lacking then, but that something is.
     """
-    made = (ADEQUATE * stack.noise) ** 2 + floor**2
-    return excess - made > REFUTED * stack.uncertainty
+    made = (stack.policy.negligible * stack.noise) ** 2 + floor**2
+    return excess - made > stack.policy.refuted * stack.uncertainty
 
 
 def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: int) -> Array:
     """Logarithm of the evidence, for mean squares ``left`` in parts of the noise's, the floor included."""
-    return np.asarray(-0.5 * stack.pieces * np.log(left) - GENE * genes - np.log(max(suspects, 2)) * named)
+    return np.asarray(
+        -0.5 * stack.pieces * np.log(left) - stack.policy.gene_cost * genes - np.log(max(suspects, 2)) * named
+    )
 
 
 def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
@@ -93,21 +88,28 @@ def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
     if refuted(stack, nominal.excess, 0.0):
         return False
     tau = tolerated(stack, nominal.excess, 0.0)
-    left = _misfit(nominal, tau)
+    left = _misfit(stack, nominal, tau)
     ends = _evidence(stack, np.array([tau + left, tau]) / stack.noise**2, np.arange(2.0), np.arange(2.0), suspects)
-    return bool(ends[1] < ends[0] - DOUBT)
+    return bool(ends[1] < ends[0] - stack.policy.least_evidence)
 
 
 def tolerated(stack: Stack, excess: float, floor: float) -> float:
     """Mean square (m^2 or N^2) that a right explanation may leave of the nominal model's ``excess``."""
-    return (ADEQUATE * stack.noise) ** 2 + floor**2 + FORM**2 * max(excess, 0.0) + SLACK * stack.uncertainty
+    policy = stack.policy
+    return (
+        (policy.negligible * stack.noise) ** 2
+        + floor**2
+        + policy.form**2 * max(excess, 0.0)
+        + policy.allowance * stack.uncertainty
+    )
 
 
-def _misfit(refit: Refit, tau: float) -> float:
-    """Mean square beyond the noise, as fitted and, to the part PREDICTED of its logarithm, as predicted.
+def _misfit(stack: Stack, refit: Refit, tau: float) -> float:
+    """Mean square beyond the noise: fitted and predicted, averaged in their logarithms (`Policy.predicted_weight`).
 
     What a linearised model foretells of a recording left out may be wrong by any factor.
     """
+    policy = stack.policy
     fitted = max(refit.excess, 0.0)
     predicted = fitted if refit.predicted is None else max(refit.predicted, 0.0)
-    return float((tau + fitted) ** (1.0 - PREDICTED) * (tau + predicted) ** PREDICTED - tau)
+    return float((tau + fitted) ** (1.0 - policy.predicted_weight) * (tau + predicted) ** policy.predicted_weight - tau)

@@ -11,7 +11,7 @@ from wingfit.calibration.forces import estimation
 from wingfit.calibration.forces.agreement import agreements
 from wingfit.calibration.forces.estimation import Prediction
 from wingfit.calibration.forces.result import Agreement, ForceComparison, ForceResult, GlobalModel, Source
-from wingfit.calibration.plan import prepared
+from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.result import Comparison, GeneResult, Result
 from wingfit.calibration.search import CalibrationSpec, Generation
@@ -98,8 +98,7 @@ class ModelEngine:
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
         """Plan the calibration without running it."""
-        search.plan(spec, dataset)
-        return search.resolved(spec, dataset)
+        return search.prepare(spec, dataset).spec
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
         """Genes of the model with this division, or these terms."""
@@ -111,8 +110,8 @@ class ModelEngine:
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
         """Standing of the genes while the search runs: no errors of estimation yet."""
-        model = search.model_for(dataset, spec)
-        searched = {name for stage in search.plan(spec, dataset) for name in stage.free}
+        ready = search.prepare(spec, dataset)
+        model, searched = ready.model, ready.searched
         nominal, best = base_genome(model).normalised(), base_genome(model, genome).normalised()
         return tuple(
             GeneResult(
@@ -169,7 +168,7 @@ class ModelEngine:
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> tuple[Agreement, ...]:
         """Compute one recording's forces and how they agree."""
-        model, record = vehicle_model(dataset, spec), prepared(spec, dataset.recording(recording))
+        model, record = vehicle_model(dataset, spec), as_fitted(spec, dataset.recording(recording))
         observed = model.observe([base_genome(model, genome).values], record)
         if observed.reasons[0] is not None:
             raise ValueError(f"the forces under {recording!r} cannot be computed: {observed.reasons[0]}")

@@ -18,7 +18,7 @@ from wingfit.calibration.estimates.uncertainty import uncertainty
 from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.initial_effect_position import placed
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
 from wingfit.calibration.summary import summarise
 from wingfit.records import Dataset, Gene, Genome, Recording
 from wingfit.sim.effects.contract import Effect, Parameter, Values
@@ -101,13 +101,13 @@ def shifted(dataset: Dataset, shift: Array) -> Dataset:
 
 def refused(dataset: Dataset, said: str, **spec: object) -> None:
     with pytest.raises(ValueError, match=said):
-        plan(replace(SPEC, **spec), dataset)  # type: ignore[arg-type]
+        prepare(replace(SPEC, **spec), dataset)  # type: ignore[arg-type]
 
 
 @pytest.mark.usefixtures("bump")
 def test_aerodynamic_effects_are_fitted_in_air_and_all_others_in_vacuum(small: tuple[Dataset, Genome]) -> None:
     dataset, _ = small
-    structure, air = plan(replace(SPEC, effects=("bump", "camera_shift")), dataset)
+    structure, air = prepare(replace(SPEC, effects=("bump", "camera_shift")), dataset).stages
     assert structure.free == (*STRUCTURAL, *SHIFT)
     assert air.free == (*AERODYNAMIC, "bump.size", "bump.place")
     assert (group_of("camera_shift.x"), group_of("bump.place"), group_of("E_f")) == (
@@ -115,7 +115,7 @@ def test_aerodynamic_effects_are_fitted_in_air_and_all_others_in_vacuum(small: t
         "aerodynamics",
         "structure",
     )
-    structure, air = plan(replace(SPEC, effects=("residual_air",)), dataset)
+    structure, air = prepare(replace(SPEC, effects=("residual_air",)), dataset).stages
     assert "residual_air.density" in structure.free, "what is left in a vacuum shows there alone"
     assert "residual_air.density" not in air.free
     assert effect_of("E_f") is effect_of("bump") is effect_of("bump.colour") is effect_of("nothing.x") is None
@@ -124,7 +124,7 @@ def test_aerodynamic_effects_are_fitted_in_air_and_all_others_in_vacuum(small: t
 @pytest.mark.usefixtures("bump")
 def test_genes_of_effects_are_named_and_fixed_like_others(small: tuple[Dataset, Genome]) -> None:
     dataset, _ = small
-    (stage,) = plan(replace(SPEC, mode="joint", genes=("camera_shift.y", "L_a")), dataset)
+    (stage,) = prepare(replace(SPEC, mode="joint", genes=("camera_shift.y", "L_a")), dataset).stages
     assert stage.free == ("L_a", "camera_shift.y")
     held = replace(SPEC, mode="joint", genes=("L_a",), fixed={"camera_shift.z": 1e-3})
     first = next(calibrate(held, dataset, Here()))
@@ -141,7 +141,7 @@ def test_effects_that_cannot_be_are_refused(small: tuple[Dataset, Genome], force
     refused(dataset, "unknown effect 'added_moss'; there are .*camera_shift", effects=("added_moss",))
     refused(dataset, "'bump' is named 2 times; name it once", effects=("bump", "bump"))
     with pytest.raises(ValueError, match="'bump' does not apply to a vehicle"):
-        plan(CalibrationSpec(effects=("bump",)), forces)
+        prepare(CalibrationSpec(effects=("bump",)), forces)
 
 
 def test_the_bounds_of_an_effect_are_its_own(small: tuple[Dataset, Genome]) -> None:

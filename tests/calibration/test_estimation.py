@@ -9,7 +9,7 @@ import pytest
 
 from wingfit.calibration.forces.estimation import compare_forces, predict, summarise_forces
 from wingfit.calibration.forces.result import ForceResult
-from wingfit.calibration.plan import plan
+from wingfit.calibration.preparation import prepare
 from wingfit.calibration.search import CalibrationSpec, calibrate
 from wingfit.records import Dataset, LowPass, Recording
 from wingfit.sim.virtual_rigs.balance import DRAG, EXAMPLE, HELD_OUT, TRIALS, Balance, campaign, true_beat
@@ -225,7 +225,7 @@ NO_BEAT = "holds no whole beat without a gap"
 def test_whatever_is_accepted_can_be_judged(dataset: Dataset, spec: CalibrationSpec, refused: str | None) -> None:
     if refused is not None:
         with pytest.raises(ValueError, match=refused):
-            plan(spec, dataset)
+            prepare(spec, dataset)
         return
     _, result = run(spec, dataset)
     assert {a.recording for a in result.agreements} == {r.name for r in dataset.recordings}
@@ -314,4 +314,4 @@ def test_what_is_only_predicted_may_lack_the_fitted_axis(dataset: Dataset) -> No
     assert {a.quantity for a in found.agreements if a.recording == "test-7"} == {"z"}
     assert found.held_out_after is not None
     with pytest.raises(ValueError, match="force axis 'x' is to be fitted"):
-        plan(replace(LOCAL, recordings=()), replace(mixed, held_out=()))
+        prepare(replace(LOCAL, recordings=()), replace(mixed, held_out=()))

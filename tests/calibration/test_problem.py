@@ -7,7 +7,7 @@ import pytest
 
 from wingfit.calibration.evaluator import Unit, run_unit
 from wingfit.calibration.problem import Misfit, Problem, base_genome
-from wingfit.calibration.search import CalibrationSpec, model_for, plan
+from wingfit.calibration.search import CalibrationSpec, model_for, prepare
 from wingfit.records import Dataset, Genome
 
 
@@ -22,7 +22,7 @@ def test_an_individual_has_the_same_bits_alone_and_anywhere_in_a_batch(
 ) -> None:
     dataset = small[0] if kind == "tracks" else forces
     spec = CalibrationSpec(division="4")
-    model, stage = model_for(dataset, spec), plan(spec, dataset)[0]
+    model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[0]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model), spec.axes)
     genes = [gene for gene in model.genes if gene.name in stage.free]
     unit = np.random.default_rng(0).uniform(0.3, 0.7, (8, len(genes)))

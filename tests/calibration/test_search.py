@@ -15,7 +15,7 @@ from wingfit.calibration.estimates.uncertainty import standing
 from wingfit.calibration.evaluator import as_batch, gather, run_unit, units
 from wingfit.calibration.problem import Evaluation, Problem, base_genome, misfit
 from wingfit.calibration.result import compare, judge
-from wingfit.calibration.search import CalibrationSpec, calibrate, found, plan, resolved
+from wingfit.calibration.search import CalibrationSpec, calibrate, found, prepare, resolved
 from wingfit.calibration.spec import wing_model
 from wingfit.inference.noise.harmonic import noise_distance
 from wingfit.records import Condition, Dataset, Gene, Genome, Recording
@@ -44,12 +44,12 @@ class Here:
 
 def test_stages_follow_the_thesis(small: tuple[Dataset, Genome]) -> None:
     dataset, _ = small
-    structure, air = plan(CalibrationSpec(division="4"), dataset)
+    structure, air = prepare(CalibrationSpec(division="4"), dataset).stages
     assert structure.free == STRUCTURAL
     assert [r.name for r in structure.recordings] == [dataset.recordings[0].name]
     assert air.free == AERODYNAMIC
     assert [r.name for r in air.recordings] == [dataset.recordings[1].name]
-    (joint,) = plan(CalibrationSpec(division="4", mode="joint"), dataset)
+    (joint,) = prepare(CalibrationSpec(division="4", mode="joint"), dataset).stages
     assert joint.free == (*STRUCTURAL, *AERODYNAMIC)
     assert len(joint.recordings) == 2
 
@@ -293,7 +293,7 @@ def test_comparison_lies_on_the_recording(small: tuple[Dataset, Genome]) -> None
 
 def refused(spec: CalibrationSpec, dataset: Dataset, match: str) -> None:
     with pytest.raises(ValueError, match=match):
-        plan(spec, dataset)
+        prepare(spec, dataset)
 
 
 def test_specs_that_do_not_fit_are_refused_with_what_would(small: tuple[Dataset, Genome], marker_only: Dataset) -> None:

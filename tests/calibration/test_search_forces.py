@@ -10,8 +10,8 @@ import pytest
 
 from tests.calibration.conftest import FORCE_TRUTHS
 from tests.calibration.test_search import Here, refused
-from wingfit.calibration.plan import prepared
-from wingfit.calibration.search import CalibrationSpec, calibrate, plan
+from wingfit.calibration.preparation import as_fitted
+from wingfit.calibration.search import CalibrationSpec, calibrate, prepare
 from wingfit.records import Dataset, LowPass
 
 
@@ -26,7 +26,7 @@ def test_each_recording_of_forces_is_a_stage_of_its_own(forces: Dataset) -> None
         assert whole[-1].checkpoint["found"][recording.name] == end.genome
         for name, value in truth.items():
             assert end.genome[name] == pytest.approx(value, rel=0.05), name
-        fitted = prepared(CalibrationSpec(), recording)
+        fitted = as_fitted(CalibrationSpec(), recording)
         assert end.distance == pytest.approx(np.sqrt(end.best / fitted.valid[:, 0].sum()))
     assert whole[-1].progress == 1
     cut = len([g for g in whole if g.stage.startswith(stages[0])])
@@ -44,25 +44,25 @@ def test_forces_together_have_one_genome(forces: Dataset) -> None:
 
 
 def test_forces_are_low_passed_before_they_are_fitted(forces: Dataset) -> None:
-    (first, _) = plan(CalibrationSpec(), forces)
+    (first, _) = prepare(CalibrationSpec(), forces).stages
     (record,) = first.recordings
     assert record.low_pass == LowPass(3.2 * 12.5)
     assert (
         np.nanmax(np.abs(np.diff(record.values, axis=0))) < np.abs(np.diff(forces.recordings[0].values, axis=0)).max()
     )
-    (wide, _) = plan(CalibrationSpec(low_pass=67.0), forces)
+    (wide, _) = prepare(CalibrationSpec(low_pass=67.0), forces).stages
     assert wide.recordings[0].low_pass == LowPass(67.0)
-    (raw, _) = plan(CalibrationSpec(low_pass=0.0), forces)
+    (raw, _) = prepare(CalibrationSpec(low_pass=0.0), forces).stages
     assert raw.recordings[0] is forces.recordings[0]
-    assert plan(CalibrationSpec(low_pass=67.0), replace(forces, recordings=(record, forces.recordings[1])))[
+    assert prepare(CalibrationSpec(low_pass=67.0), replace(forces, recordings=(record, forces.recordings[1]))).stages[
         0
     ].recordings == (record,)
 
 
 def test_what_a_vehicle_searches_and_what_is_refused(forces: Dataset) -> None:
-    assert plan(CalibrationSpec(), forces)[0].free == ("C_l", "C_r", "C_F")
-    assert plan(CalibrationSpec(without=("clap_and_peel",)), forces)[0].free == ("C_l", "C_r")
-    assert plan(CalibrationSpec(genes=("C_D0", "C_l")), forces)[0].free == ("C_l", "C_D0")
+    assert prepare(CalibrationSpec(), forces).stages[0].free == ("C_l", "C_r", "C_F")
+    assert prepare(CalibrationSpec(without=("clap_and_peel",)), forces).stages[0].free == ("C_l", "C_r")
+    assert prepare(CalibrationSpec(genes=("C_D0", "C_l")), forces).stages[0].free == ("C_l", "C_D0")
     refused(CalibrationSpec(preset="best"), forces, "unknown model 'best'")
     refused(CalibrationSpec(without=("lift",)), forces, "no term 'lift' to leave out")
     refused(CalibrationSpec(axes=("y",)), forces, "'y' is to be fitted, but recording")

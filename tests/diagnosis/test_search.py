@@ -15,7 +15,8 @@ from wingfit.diagnosis import DiagnosisSpec
 from wingfit.diagnosis.evidence.competing_fits import Entry
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
-from wingfit.diagnosis.search import OVERTAKES, _alike, _exchanges, assess
+from wingfit.diagnosis.policy import POLICY
+from wingfit.diagnosis.search import _alike, _exchanges, assess
 from wingfit.diagnosis.search_state import Assessment
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -37,12 +38,12 @@ def refit(*trials: Trial, excess: float = 1.0) -> Any:
 
 def known(evidence: Sequence[float], *refits: Any) -> Any:
     """Refits beside a nominal model, with how much more probable than that each is."""
-    return SimpleNamespace(refits=(refit(), *refits), evidence=np.array([0.0, *evidence]))
+    return SimpleNamespace(refits=(refit(), *refits), evidence=np.array([0.0, *evidence]), policy=POLICY)
 
 
 def state(*tried: Trial) -> Any:
     """An assessment in which these were ``tried``, beside noise of 1."""
-    stack = SimpleNamespace(noise=1.0, uncertainty=0.0)
+    stack = SimpleNamespace(noise=1.0, uncertainty=0.0, policy=POLICY)
     return SimpleNamespace(stack=stack, trials=[[one] for one in tried])
 
 
@@ -52,9 +53,9 @@ def names(entries: Sequence[Entry]) -> list[tuple[str, ...]]:
 
 def test_single_explanations_that_are_hard_to_tell_apart_race() -> None:
     mass, cubic, gain = refit(trial("point_mass")), refit(trial("cubic")), refit(trial("gain"))
-    close = known([40.0, 40.0 - 0.9 * OVERTAKES, 40.0 - 1.1 * OVERTAKES], mass, cubic, gain)
+    close = known([40.0, 40.0 - 0.9 * POLICY.overtake, 40.0 - 1.1 * POLICY.overtake], mass, cubic, gain)
     assert names(_alike(close)) == [("point_mass",), ("point_mass",), ("cubic",)]  # what has a place, from two places
-    assert _alike(known([40.0, 0.9 * OVERTAKES], mass, cubic)) == []
+    assert _alike(known([40.0, 0.9 * POLICY.overtake], mass, cubic)) == []
     assert _alike(known([4.0, -0.1], mass, cubic)) == [], "what explains nothing is no rival"
     assert _alike(known([])) == []
 

@@ -22,7 +22,7 @@ from tests.diagnosis.pendulum_rig import PendulumRig, recorded
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
 from wingfit.calibration.result import judge
-from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, plan
+from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
 from wingfit.diagnosis import DiagnosisSpec, diagnose_subject
 from wingfit.records import Dataset, load_dataset
 from wingfit.records.blas_threads import OneBlasThread
@@ -61,7 +61,7 @@ def bits(evaluation: Evaluation) -> list[object]:
 def problem(division: str = "11") -> tuple[Problem, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
     """The aerodynamic stage of the example campaign, and nine individuals."""
     dataset, spec = load_dataset(EXAMPLE), CalibrationSpec(division=division)
-    model, stage = model_for(dataset, spec), plan(spec, dataset)[1]
+    model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     genes = [gene for gene in model.genes if gene.name in stage.free]
     rng = np.random.default_rng(0)
     values = np.array([[float(gene.from_unit(rng.uniform())) for gene in genes] for _ in range(9)])

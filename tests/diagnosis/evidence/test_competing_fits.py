@@ -14,6 +14,7 @@ from tests.diagnosis.pendulum_rig import SUSPECTS
 from wingfit.diagnosis.evidence.competing_fits import RACE, _Race, afresh, entries
 from wingfit.diagnosis.evidence.fit import CannotBeginError
 from wingfit.diagnosis.evidence.screen import Trial
+from wingfit.diagnosis.policy import POLICY
 
 NOTHING = cast("Any", None)
 FALLING = [2000.0 - 100.0 * k for k in range(20)]
@@ -22,6 +23,7 @@ FALLING = [2000.0 - 100.0 * k for k in range(20)]
 def stack(noise: float = 0.0) -> Any:
     """One for which a fit's cost is what it leaves, and counts in full."""
     return SimpleNamespace(
+        policy=POLICY,
         excess=lambda c: c,
         trust=lambda c: 1.0,  # noqa: ARG005
         chi_squared=lambda c: c,

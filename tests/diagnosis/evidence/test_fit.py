@@ -21,7 +21,8 @@ from wingfit.diagnosis.evidence.intervals import covariance
 from wingfit.diagnosis.evidence.nominal import Nominal, promises
 from wingfit.diagnosis.evidence.refit import judged, left_out, refitted, substitutes
 from wingfit.diagnosis.evidence.screen import Nuisance, screened
-from wingfit.diagnosis.evidence.whitened_recordings import PIECES, TOLERANCE, Stack
+from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.search import _elsewhere, _settled
 from wingfit.diagnosis.search_state import Assessment
 from wingfit.workers.in_process import InProcessEvaluator
@@ -61,7 +62,7 @@ def one() -> Stack:
 def test_noise_counts_as_noise_and_a_misfit_beyond_it_by_its_logarithm() -> None:
     stack = one()
     D, nu = len(stack.scale), stack.pieces
-    assert nu == PIECES * len(stack.recordings)
+    assert nu == POLICY.pieces * len(stack.recordings)
     direction = stack.scale / np.sqrt(D)  # of chi-squared one
     for chi in (0.5 * D, D, D + 0.1 * nu, D + nu, 50.0 * D):
         beyond = max(chi - D, 0.0)
@@ -102,7 +103,7 @@ def test_a_model_that_lacks_something_keeps_its_genes_within_the_box() -> None:
 def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the_tolerance_allows() -> None:
     stack = one()
     found = fit(stack)
-    floor = TOLERANCE**2 * len(stack.scale) / stack.pieces
+    floor = POLICY.tolerance**2 * len(stack.scale) / stack.pieces
     assert stack.most_trust == pytest.approx(1.0 / (1.0 + floor))
     slopes = found.jacobian / stack.scale[:, None]
     gram = slopes.T @ slopes
@@ -269,7 +270,7 @@ def test_a_way_round_that_cannot_be_simulated_ends_no_refit(monkeypatch: pytest.
         asked.append(arguments)
         raise CannotBeginError("it flutters")
 
-    monkeypatch.setattr("wingfit.diagnosis.evidence.refit.BROKEN", 0.0)
+    stack = replace(stack, policy=replace(POLICY, astray=0.0))
     monkeypatch.setattr("wingfit.diagnosis.evidence.refit._some", fails)
     assert refitted(RIG, stack, nominal, EVALUATOR, trials[:1]) is not None
     assert asked

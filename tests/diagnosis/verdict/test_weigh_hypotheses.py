@@ -13,9 +13,10 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import Stack
 from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.location.differences import _variables, acting
+from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.search import _unended
 from wingfit.diagnosis.verdict.verdict import _part, decided, summary
-from wingfit.diagnosis.verdict.weigh_hypotheses import KNOWN, Weighed, beyond_doubt, refuted, tolerated, weighed
+from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, beyond_doubt, refuted, tolerated, weighed
 from wingfit.records import Condition
 
 
@@ -34,7 +35,7 @@ def refit(
 
 
 def stack(recordings: int = 6, uncertainty: float = 0.0) -> Stack:
-    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=uncertainty))
+    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=uncertainty, policy=POLICY))
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
@@ -180,10 +181,10 @@ def test_an_effect_that_something_unknown_rivals_is_not_named() -> None:
     for left in np.linspace(0.5, 0.9, 41):
         every = weighed(stack(), refit(2.0), [refit(left, ("a",))], 0.0, 40)
         share = every.probabilities[1] / (every.probabilities[1] + every.unknown)
-        assert decided(every).verdict == ("named" if share >= KNOWN else "unnamed")
+        assert decided(every).verdict == ("named" if share >= POLICY.listed else "unnamed")
         shares.append(share)
-    assert min(shares) < 0.5 < KNOWN < max(shares)
-    assert any(0.5 < share < KNOWN for share in shares)
+    assert min(shares) < 0.5 < POLICY.listed < max(shares)
+    assert any(0.5 < share < POLICY.listed for share in shares)
 
 
 def test_of_two_that_fit_alike_the_one_that_predicts_recordings_left_out_is_more_probable() -> None:
@@ -213,7 +214,9 @@ def test_a_single_suspect_is_no_likelier_beforehand_than_one_of_two() -> None:
 @pytest.mark.parametrize(("nominal", "uncertainty"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
 def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, uncertainty: float) -> None:
     def judged(unit: float) -> tuple[list[float], bool, bool]:
-        scaled = cast("Stack", SimpleNamespace(noise=unit, pieces=36.0, uncertainty=uncertainty * unit**2))
+        scaled = cast(
+            "Stack", SimpleNamespace(noise=unit, pieces=36.0, uncertainty=uncertainty * unit**2, policy=POLICY)
+        )
         before, *others = (
             refit(unit * left, (name,), predicted=2.0 * unit * left)
             for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))

@@ -1,4 +1,7 @@
-"""The stages of a calibration: which genes are free on which recordings, and what is refused before anything runs."""
+"""From a request and a dataset to what is fitted: model, filtered recordings, free genes and stages.
+
+All that does not fit together is refused here, before anything is simulated.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,12 @@ import numpy as np
 from wingfit.calibration.effects import group_of, refuse_idle
 from wingfit.calibration.forces.split_beats import Cut
 from wingfit.calibration.problem import base_genome, compared
-from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
+from wingfit.calibration.spec import CalibrationSpec, Mode, model_for, resolved
 from wingfit.records import Dataset, LowPass, Recording
 from wingfit.sim.filtering import default_cutoff, low_passed
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.wing.alignment import recorded_crossing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as vacuum in a staged calibration
 
@@ -27,36 +32,69 @@ class Stage:
     recordings: tuple[Recording, ...]
 
 
-def plan(spec: CalibrationSpec, dataset: Dataset) -> tuple[Stage, ...]:
-    """The stages of a calibration; ValueError when the spec does not fit the dataset."""
+@dataclass(frozen=True)
+class Prepared:
+    """A dataset as a calibration or a diagnosis uses it.
+
+    Attributes:
+        spec: with mode and method decided.
+        model: with its effects.
+        stages: searches in their order; a joint calibration has one.
+        held_out: recordings that are never fitted, filtered like the others.
+    """
+
+    spec: CalibrationSpec
+    model: FlexibleWing | BladeElementWing
+    stages: tuple[Stage, ...]
+    held_out: tuple[Recording, ...]
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the genes that any stage searches."""
+        return tuple(dict.fromkeys(name for stage in self.stages for name in stage.free))
+
+
+def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
+    """Everything that is decided before anything is simulated; ValueError when the spec does not fit the dataset."""
     spec = resolved(spec, dataset)
     model = model_for(dataset, spec)
     known = [gene.name for gene in model.genes]
     _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
     base_genome(model, spec.fixed)
+    fitted = _fitted(spec, dataset)
+    for recording in dataset.recordings:  # all of them are judged in the end
+        _refuse_unusable(spec, dataset, recording, recording in fitted)
+    wanted = spec.genes or model.searched
+    free = tuple(name for name in known if name in wanted and name not in spec.fixed)
+    if not free:
+        raise ValueError("nothing to calibrate: every gene is fixed, or the model has none that is searched by itself")
+    refuse_idle(spec.effects, free, spec.fixed)
+    stages = _stages(spec.mode, free, tuple(as_fitted(spec, recording) for recording in fitted))
+    held_out = tuple(as_fitted(spec, one) for one in dataset.recordings if one.name in dataset.held_out)
+    return Prepared(spec, model, stages, held_out)
+
+
+def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
+    """Recordings to fit, as they were recorded."""
+    _refuse_repeated("recording", spec.recordings)
     recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
     if not recordings:
         raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
     for recording in recordings:
         if recording.name in dataset.held_out:
             raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
-    _refuse_repeated("recording", spec.recordings)
-    for recording in dataset.recordings:  # all of them are judged in the end
-        _refuse_unusable(spec, dataset, recording, recording in recordings)
-    wanted = spec.genes or model.searched
-    free = tuple(name for name in known if name in wanted and name not in spec.fixed)
-    if not free:
-        raise ValueError("nothing to calibrate: every gene is fixed, or the model has none that is searched by itself")
-    refuse_idle(spec.effects, free, spec.fixed)
-    recordings = tuple(prepared(spec, recording) for recording in recordings)
-    if spec.mode == "joint":
+    return recordings
+
+
+def _stages(mode: Mode | None, free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
+    if mode == "joint":
         return (Stage("joint", free, recordings),)
-    if spec.mode == "local":
+    if mode == "local":
         return tuple(Stage(recording.name, free, (recording,)) for recording in recordings)
     return _staged(free, recordings)
 
 
-def prepared(spec: CalibrationSpec, recording: Recording) -> Recording:
+def as_fitted(spec: CalibrationSpec, recording: Recording) -> Recording:
     """``recording`` as it is fitted: forces low-passed, unless they have been or are not to be."""
     through = fitted_through(spec, recording)
     return recording if through in (None, recording.low_pass) else low_passed(recording, through)
@@ -79,9 +117,9 @@ def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[S
     structural = tuple(name for name in free if group_of(name) == "structure")
     aerodynamic = tuple(name for name in free if group_of(name) == "aerodynamics")
     if (structural and not vacuum) or (aerodynamic and not air):
-        lacking, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
+        missing, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
         raise ValueError(
-            f"a staged calibration fits the {which} genes on recordings in {lacking}, and there is none "
+            f"a staged calibration fits the {which} genes on recordings in {missing}, and there is none "
             f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or name other genes"
         )
     stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
@@ -107,7 +145,7 @@ def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recordi
                 f"recording {recording.name!r} has no instant with all of the fitted force axes "
                 f"({', '.join(spec.axes)}); there is nothing to compare: leave the recording out of the dataset"
             )
-        Cut.of(prepared(spec, recording))
+        Cut.of(as_fitted(spec, recording))
         return
     if not np.isfinite(recording.positions).all(axis=2).any():
         raise ValueError(

@@ -1,0 +1,130 @@
+"""Which verdicts change when a threshold of the diagnosis is halved or doubled.
+
+``python -m benchmarks.policy --json`` diagnoses a fixed sample of concealed trials with each threshold of
+:class:`wingfit.diagnosis.policy.Policy` at half and at twice its value, and ends with one JSON object. A trial counts
+as changed where the verdict or the effects that it names differ from those with the policy as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from benchmarks.concealed.seal import read
+from benchmarks.concealed.suite import Folders, each, make, pool, task
+from benchmarks.concealed.tool import Outcome, Task, run
+from benchmarks.concealed.trials import Trial, plan
+from wingfit.diagnosis.policy import POLICY, described
+
+SEED = 8  # of the concealed suite
+FACTORS = {"halved": 0.5, "doubled": 2.0}
+PROBABILITIES = ("single", "listed", "possible", "predicted_weight")
+"""Fractions, whose odds are halved and doubled: a probability of 1.7 means nothing."""
+RIGHT = {"null": "adequate", "unlisted": "unnamed"}
+
+
+class Said(NamedTuple):
+    """What a diagnosis concluded: the verdict, and the effects that it names."""
+
+    verdict: str
+    named: tuple[str, ...]
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Said:
+        """``failed`` where there is no finding."""
+        found = outcome.finding
+        return cls("failed", ()) if found is None else cls(found.verdict, tuple(sorted(found.named)))
+
+    def __str__(self) -> str:
+        return f"{self.verdict} ({', '.join(self.named)})" if self.named else self.verdict
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.policy", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
+    parser.add_argument("--wings", type=int, default=1, help="wings in the sample, the fastest first; vehicles are all")
+    parser.add_argument("--keep", type=Path, help="keep the datasets in this folder, and use those that it holds")
+    parser.add_argument("--only", action="append", default=[], help="only this threshold; may be repeated")
+    arguments = parser.parse_args()
+    start = time.perf_counter()
+    with tempfile.TemporaryDirectory() as scratch:
+        folders = Folders(arguments.keep or Path(scratch))
+        trials = sample(arguments.wings)
+        make(trials, folders, arguments.jobs)
+        table = changes(trials, folders, arguments.jobs, arguments.only)
+    _print(table)
+    if arguments.json:
+        print(json.dumps({**table, "seed": SEED, "seconds": round(time.perf_counter() - start)}))
+
+
+def sample(wings: int) -> list[Trial]:
+    """All vehicles of the quick concealed suite, and as many of its wings, coarse models first."""
+    trials = plan(SEED, quick=True)
+    coarse = sorted((one for one in trials if one.build.division), key=lambda one: len(one.build.division))
+    return [one for one in trials if not one.build.division] + coarse[:wings]
+
+
+def varied(name: str, factor: float) -> float:
+    """The value of a threshold at so many times its value, of a fraction at so many times its odds."""
+    value = float(getattr(POLICY, name))
+    if name not in PROBABILITIES:
+        return value * factor
+    odds = factor * value / (1.0 - value)
+    return odds / (1.0 + odds)
+
+
+def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -> dict[str, Any]:
+    """What each threshold changes, halved and doubled."""
+    thresholds = [one for one in described() if not only or one["name"] in only]
+    if unknown := set(only) - {one["name"] for one in described()}:
+        raise SystemExit(f"unknown threshold {', '.join(sorted(unknown))}; `--only` takes names of Policy's fields")
+    tasks = [task(trial, trial.name, folders) for trial in trials]
+    cases = [(one["name"], how) for one in thresholds for how in FACTORS]
+    every: list[Task] = list(tasks)
+    for name, how in cases:
+        policy = replace(POLICY, **{name: varied(name, FACTORS[how])})
+        every += [replace(one, policy=policy) for one in tasks]
+    with pool(jobs) as executor:
+        said = [Said.of(one) for one in each(executor, run, every, "diagnosing")]
+    before, rows = said[: len(tasks)], {one["name"]: dict(one) for one in thresholds}
+    for k, (name, how) in enumerate(cases):
+        after = said[(k + 1) * len(tasks) : (k + 2) * len(tasks)]
+        rows[name][how] = {
+            trial.name: f"{old} -> {new}" for trial, old, new in zip(trials, before, after, strict=True) if old != new
+        }
+    idle = [name for name, row in rows.items() if not any(row[how] for how in FACTORS)]
+    return {
+        "trials": {one.name: f"{one.group}: {said}" for one, said in zip(trials, before, strict=True)},
+        "right": sum(_right(one, folders, found) for one, found in zip(trials, before, strict=True)),
+        "thresholds": list(rows.values()),
+        "change_nothing": idle,
+    }
+
+
+def _right(trial: Trial, folders: Folders, said: Said) -> bool:
+    """Whether the policy as it is concludes what was hidden."""
+    hidden = read(folders.answer(trial.name)).names
+    wanted = RIGHT.get(trial.group)
+    return said.verdict == wanted if wanted else set(said.named) == set(hidden)
+
+
+def _print(table: dict[str, Any]) -> None:
+    print(f"{len(table['trials'])} trials, {table['right']} right with the policy as it is", file=sys.stderr)
+    for row in table["thresholds"]:
+        parts = [f"{how}: {len(row[how])} changed" for how in FACTORS]
+        print(f"{row['name']:18} {row['value']:6g}  {', '.join(parts)}")
+        for how in FACTORS:
+            for trial, change in row[how].items():
+                print(f"{'':26}{how} {trial}: {change}")
+
+
+if __name__ == "__main__":
+    main()
