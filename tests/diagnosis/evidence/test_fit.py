@@ -188,7 +188,7 @@ def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
     changes: float, takes: float, left: float, expected: int
 ) -> None:
     """It takes a part of the misfit; or it changes more than all of that, and the tangent knows nothing of it."""
-    stack, now = SimpleNamespace(noise=1.0), SimpleNamespace(excess=left**2)
+    stack, now = SimpleNamespace(noise=1.0, policy=POLICY), SimpleNamespace(excess=left**2)
     assert promises(cast("Any", stack), changes, takes, cast("Any", now)) == bool(expected)
 
 
@@ -215,7 +215,7 @@ def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
     monkeypatch.setattr("wingfit.diagnosis.search.settled", lambda *_, refine: fits[refine])
     monkeypatch.setattr("wingfit.diagnosis.search._suspected", tried)
     monkeypatch.setattr("wingfit.diagnosis.search.beyond_doubt", lambda *_: False)
-    state = Assessment(cast("Any", "coarse"), cast("Any", None))
+    state = Assessment(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
     parts = [part for part, _ in _settled(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
     assert begun == asked
     assert cast("Any", state.nominal).subject == taken
