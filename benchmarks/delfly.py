@@ -23,7 +23,7 @@ from benchmarks.estimators import estimators
 from benchmarks.physics.delfly_tables import closest_law_percent, fling_ends, lift_by_root_pitch, tables_law
 from wingfit.calibration.estimates.likelihood import Estimate, estimate, iterate
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.forces.agreement import agreements, lacking
+from wingfit.calibration.forces.agreement import agreements, missing_interval
 from wingfit.calibration.forces.global_model import at, fit_global
 from wingfit.calibration.forces.result import Agreement, GlobalModel, LocalEstimate, Quantity
 from wingfit.calibration.problem import Problem, base_genome
@@ -71,7 +71,7 @@ class Fitted:
     problem: Problem
     estimate: Estimate
     agreement: dict[Quantity, Agreement]
-    lacking: tuple[float, float] | None
+    missing_interval: tuple[float, float] | None
 
     @property
     def errors(self) -> dict[str, float]:
@@ -100,7 +100,7 @@ def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: 
     best = replace(problem, base=problem.base.replace(found.values))
     forces = model.observe([best.base.values], recording).channels[0]
     agreement = {a.quantity: a for a in agreements(recording, forces, "local")}
-    return Fitted(trial, recording, best, found, agreement, lacking(best, evaluator))
+    return Fitted(trial, recording, best, found, agreement, missing_interval(best, evaluator))
 
 
 def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
@@ -231,9 +231,9 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
     """How well coefficients come back, where the poorer models fail, and how well the lift is met."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
-        "misfit_tstar_range": widest([one.lacking for one in fitted["without_fling"]]),
-        "misfit_tstar_range_berman_wang": widest([one.lacking for one in fitted["berman_wang"]]),
-        "misfit_located_with_fling": sum(one.lacking is not None for one in fitted["proposed"]),
+        "misfit_tstar_range": widest([one.missing_interval for one in fitted["without_fling"]]),
+        "misfit_tstar_range_berman_wang": widest([one.missing_interval for one in fitted["berman_wang"]]),
+        "misfit_located_with_fling": sum(one.missing_interval is not None for one in fitted["proposed"]),
     }
     for name, suffix in (("proposed", ""), ("without_fling", "_without_fling"), ("berman_wang", "_berman_wang")):
         figures[f"lift_correlation{suffix}"], figures[f"lift_rmse_percent{suffix}"] = mean_lift(fitted[name])
@@ -242,7 +242,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
             "lift_correlation": one.agreement["lift"].correlation,
             "lift_rmse_percent": one.agreement["lift"].rmse_percent,
             "coefficients": one.estimate.values,
-            "misfit_tstar_range": one.lacking,
+            "misfit_tstar_range": one.missing_interval,
         }
         for name, one in finer.items()
     }
@@ -314,7 +314,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
                 "lift_rmse_percent": poorer.agreement["lift"].rmse_percent,
                 "lift_correlation": poorer.agreement["lift"].correlation,
                 "mean_lift_modelled_n": poorer.agreement["lift"].mean_modelled,
-                "misfit_tstar_range": poorer.lacking,
+                "misfit_tstar_range": poorer.missing_interval,
             },
         }
         for one, poorer in zip(fitted["proposed"], fitted["without_fling"], strict=True)

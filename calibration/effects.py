@@ -1,4 +1,4 @@
-"""Effects in a calibration: where their genes are fitted, and which words an absent effect is worth."""
+"""Effects in a calibration: the stage that fits their genes, and remarks on effects that stay switched off."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def group_of(gene: str) -> Group:
 
 
 def is_measured(gene: str) -> bool:
-    """Whether a gene belongs to a fault of a measurement, which the forces or the wing themselves know nothing of."""
+    """Whether a gene belongs to a fault of a measurement, which does not act on the wing or its forces."""
     effect = effect_of(gene)
     return effect is not None and effect.family == "measurement"
 
@@ -57,7 +57,7 @@ def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[st
 
 
 def absent(genome: Mapping[str, float], free: Collection[str]) -> tuple[str, ...]:
-    """Remarks on effects that are switched off in ``genome``: what their other genes say means nothing."""
+    """Remarks on effects that are switched off in ``genome``: the values of their other genes are meaningless."""
     found = {effect.name: effect for name in free if (effect := effect_of(name))}
     remarks = []
     for effect in found.values():

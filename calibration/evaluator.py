@@ -1,4 +1,4 @@
-"""The slot through which a search evaluates individuals, and the units of work that every implementation shares.
+"""The interface through which a search evaluates individuals, and the units of work of every implementation.
 
 Work is cut into units of at most ``LANES`` individuals and one recording, always in the same way, so that every
 implementation does the same arithmetic on the same units and returns the same bits.
@@ -19,7 +19,7 @@ from wingfit.sim.kernels import LANES
 
 
 class Evaluator(Protocol):
-    """Evaluates batches of individuals; where the work runs is the implementation's affair."""
+    """Evaluates batches of individuals; the implementation decides where the work runs."""
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem."""

@@ -1,4 +1,4 @@
-"""Where Gauss-Newton looks first for an effect that is switched off.
+"""The initial place of an effect that is switched off when Gauss-Newton starts.
 
 At size zero the genes that say where an effect acts, and how, have no slope: nothing would move them until the size
 has moved, and a place that is far off may push that back to zero. But there they have no meaning either, so they may be
@@ -23,7 +23,7 @@ from wingfit.sim.effects.contract import Effect
 
 Array = npt.NDArray[np.float64]
 
-PLACES = 15  # tried of an effect, besides where it stands; a batch of two groups of lanes with a single size
+PLACES = 15  # places tried, besides the initial one: with a single size a batch of two groups of lanes
 SMALL = 0.02  # of a size's box
 
 
@@ -80,7 +80,7 @@ class _Weighed:
 
 
 def _movable(problem: Problem, unit: Array) -> list[Effect]:
-    """Effects at zero of which both a size and another gene are searched."""
+    """Effects at zero whose size and at least one other gene are searched."""
     genes = free_genes(problem)
     genome = problem.base.as_dict() | dict(zip(problem.free, values_at(genes, unit[None])[0].tolist(), strict=True))
     found = {effect.name: effect for name in problem.free if (effect := effect_of(name))}
@@ -101,7 +101,7 @@ def _tried(unit: Array, shape: list[int]) -> Array:
 
 
 def _limits(size: list[int], unit: Array) -> tuple[Array, Array]:
-    """Least and largest multiples [S] of a small size: a single size that can only grow cannot be negative."""
+    """Least and largest multiples [S] of a small size; a single size that can only grow cannot be negative."""
     one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
     return np.full(len(size), 0.0 if one_sided else -np.inf), np.full(len(size), np.inf)
 

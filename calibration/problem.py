@@ -62,8 +62,8 @@ class Misfit:
         distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N; inf for a failed one.
         samples: number of (frame, marker) pairs, or of (instant, axis) pairs, compared.
         reasons: per individual, why it failed, else None.
-        residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless asked
-            for.
+        residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless
+            requested.
         kind: whether of tracks or of forces.
     """
 
@@ -84,13 +84,15 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
         fitted = compared(record, problem.axes)
         difference[:, ~fitted] = np.nan
         kept: Array = difference[:, fitted] ** 2
-        told = "the modelled forces are not finite"
+        not_finite = "the modelled forces are not finite"
     else:
         seen = np.isfinite(record.positions).all(axis=2).ravel()
         kept = (difference.reshape(len(difference), -1, 3) ** 2).sum(axis=2)[:, seen]
-        told = "the simulated tracks are not finite"
+        not_finite = "the simulated tracks are not finite"
     finite = [bool(np.isfinite(one).all()) for one in kept]
-    reasons = tuple(reason or (None if fine else told) for reason, fine in zip(observed.reasons, finite, strict=True))
+    reasons = tuple(
+        reason or (None if fine else not_finite) for reason, fine in zip(observed.reasons, finite, strict=True)
+    )
     failed = np.array([reason is not None for reason in reasons])
     # One row after the other: the order in which numpy sums along an axis depends on the number of rows.
     squares = np.where(failed, np.inf, [one.sum() for one in kept])

@@ -1,4 +1,4 @@
-"""What a calibration hands out: genes with their standing, misfits before and after, tracks to lay over each other."""
+"""The result of a calibration on tracks: genes with their errors, misfits before and after, simulated tracks."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class GeneResult:
     """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
 
     ``standard_error`` is relative to the value (:mod:`wingfit.calibration.estimates.uncertainty`); ``identifiable``
-    says whether the data can tell the gene: an error of at most 7.5 %, a value off its bounds, and a misfit that noise
-    explains (ADEQUATE); None where the gene was not searched. ``absolute_error`` is the standard error in ``unit``.
+    is true for an error of at most 7.5 %, a value off its bounds, and a misfit that noise explains (ADEQUATE); None
+    where the gene was not searched. ``absolute_error`` is the standard error in ``unit``.
     """
 
     name: str
@@ -62,7 +62,7 @@ class RecordingResult:
 class Result:
     """Outcome of a calibration; distances in m, means over recordings weighted by samples.
 
-    ``noise`` is the mean distance that tracking noise alone leaves, estimated from the scatter between beats.
+    ``noise`` is the mean distance by tracking noise alone, estimated from the scatter between beats.
     ``remarks`` say in words what a reader must know before trusting the rest.
     """
 
@@ -81,7 +81,7 @@ class Comparison:
     """Simulated and recorded tracks of one recording, [T, M, 3] in m; NaN where not recorded.
 
     ``phase`` is the phase of the beat in [0, 1), zero where the reference crosses the horizontal on the upstroke.
-    ``accuracy`` is the largest error (m) of a marker that was asked for, ``solution`` what it took.
+    ``accuracy`` is the largest error (m) of a requested marker, ``solution`` the numerical effort.
     """
 
     recording: str
@@ -95,7 +95,7 @@ class Comparison:
 
 @one_blas_thread
 def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
-    """Judge a wing's ``genome`` (full, by name) on every recording of the dataset, the held-out ones too."""
+    """Compare a wing's ``genome`` (full, by name) with every recording of the dataset, held-out ones included."""
     ready = prepare(spec, dataset)
     model, stages = wing_model(dataset, spec), ready.stages
     nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
@@ -125,10 +125,10 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
     ]
     if noise is not None and not adequate:
         remarks.append(
-            f"the best genome leaves {after * 1e3:.2f} mm on the fitted recordings, {after / noise:.1f} times what "
-            f"tracking noise leaves: the search was cut short, or the model lacks something: try a finer division, or "
-            f"effects ('wingfit effects' lists them). Standard errors count on a misfit of at most {ADEQUATE:g} times "
-            f"the noise, so no gene is called told"
+            f"the residual of the best genome on the fitted recordings is {after * 1e3:.2f} mm, {after / noise:.1f} "
+            f"times the tracking noise: the search was cut short, or the model misses physics: try a finer "
+            f"discretisation, or effects ('wingfit effects' lists them). Standard errors assume at most {ADEQUATE:g} times the noise, "
+            f"so no gene counts as identifiable"
         )
     remarks += absent(best.as_dict(), ready.searched)
     return Result(

@@ -1,4 +1,4 @@
-"""A calibration from the outside: its stages searched one after the other, generation by generation."""
+"""Runs a calibration: searches its stages one after the other, and reports after each generation."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Population = genetic.Population | cma.Distribution
 
 @dataclass(frozen=True)
 class Generation:
-    """One finished generation, what a watcher sees; ``checkpoint`` (JSON) is all that is needed to go on from here.
+    """Progress after one generation; ``checkpoint`` (JSON) is all that is needed to resume from here.
 
     A Gauss-Newton iteration is a generation too. It minimises the cost of Eq. 22, which weighs recordings and channels
     by their noise, so that its ``best`` need not fall every time.

@@ -1,4 +1,4 @@
-"""What a user asks of a calibration, and the model that it asks for."""
+"""The settings of a calibration, and the model that they select."""
 
 from __future__ import annotations
 
@@ -106,5 +106,5 @@ def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:
 
 
 def model_for(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing | BladeElementWing:
-    """The model that a dataset asks for."""
+    """The model for the kind of the dataset."""
     return wing_model(dataset, spec) if dataset.kind == "tracks" else vehicle_model(dataset, spec)

@@ -18,7 +18,7 @@ from wingfit.records.blas_threads import one_blas_thread
 def summarise(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> Result | ForceResult:
-    """Judge the genome of a calibration's last ``checkpoint`` on every recording of the dataset, held-out ones too."""
+    """The result of a calibration's last ``checkpoint`` on every recording of the dataset, held-out ones included."""
     if dataset.kind == "forces":
         return summarise_forces(spec, dataset, evaluator, checkpoint)
     (*_, genome) = found(spec, dataset, checkpoint).values()

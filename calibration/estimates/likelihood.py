@@ -40,7 +40,7 @@ Array = npt.NDArray[np.float64]
 # crawls along them.
 DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-4, 1e6  # of each gene's curvature
-LEAST_CURVATURE = 4.0  # damped at least as much as a prior of the box's half width: a gene that is not told stays
+LEAST_CURVATURE = 4.0  # damps at least as a prior of the box's half width does: an unidentifiable gene stays
 LEAST_GAIN = 1e-3  # of the decrease that the linearised problem promises
 STEP = 1e-3  # unit coordinates
 COST = 1e-5  # of J's 1/2 sum v^T R^-1 v, which is half the number of samples
@@ -49,7 +49,7 @@ ITERATIONS = 50
 
 @dataclass(frozen=True)
 class Step:
-    """One iteration, what a watcher sees; ``checkpoint`` (JSON) is all that is needed to go on from here.
+    """Progress after one iteration; ``checkpoint`` (JSON) is all that is needed to resume from here.
 
     Attributes:
         index: number of the iteration, from 0.
@@ -134,7 +134,7 @@ def iterate(
     """Iterate from ``start`` (genes that it does not name start at the base) or on from ``checkpoint``.
 
     Ends when no step is better, when a step is smaller than STEP and gains less than COST of the cost, when two in
-    succession gain as little (what then still moves is not told by the data), or after ``iterations``. Resumed equals
+    succession gain as little (what then still moves is not identifiable), or after ``iterations``. Resumed equals
     uninterrupted, bit for bit. ValueError when the start cannot be simulated. Effects that are switched off start so,
     at the place that promises most (:mod:`wingfit.calibration.initial_effect_position`).
     """
@@ -185,7 +185,7 @@ def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]
     found = np.array([values[gene.name] for gene in genes])
     return tuple(
         f"{gene.name} is at its {'lower' if value <= gene.lower else 'upper'} bound {value:.4g}: the best value may "
-        "lie beyond; the errors of the others take it as known"
+        "lie beyond; the standard errors of the other genes hold for this value"
         for gene, value, at_bound in zip(genes, found, stopped(genes, found), strict=True)
         if at_bound
     )

@@ -1,4 +1,4 @@
-"""What the data can tell about each gene: Cramer-Rao bounds at an estimate, correlations, and the same in words."""
+"""How well each gene is identified: Cramer-Rao bounds at an estimate, correlations, and remarks."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ class Uncertainty:
         values: [F], at which this was evaluated.
         covariance: [F, F] of the values, Cramer-Rao bounds for coloured residuals, the gene box being a weak prior.
         relative: [F, F] covariance of the values relative to themselves, shares normalised.
-        told: [F], False for a gene that a bound stopped, or whose neighbours cannot be simulated: its error is
+        known: [F], False for a gene that a bound stopped, or whose neighbours cannot be simulated: its error is
             infinite, and those of the others are for its value as it is.
         noise: R of each recording, [C, C], m^2 or N^2.
         cost: Eq. 22 at the values, with that R.
-        remarks: what the data cannot tell, in words.
+        remarks: which genes are not identifiable, and why.
     """
 
     free: tuple[str, ...]
     values: Array
     covariance: Array
     relative: Array
-    told: npt.NDArray[np.bool_]
+    known: npt.NDArray[np.bool_]
     noise: tuple[Array, ...]
     cost: float
     remarks: tuple[str, ...]
@@ -71,7 +71,7 @@ class Uncertainty:
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard error of each value, in the gene's unit."""
-        errors = np.where(self.told, np.sqrt(np.diag(self.covariance)), np.inf)
+        errors = np.where(self.known, np.sqrt(np.diag(self.covariance)), np.inf)
         return dict(zip(self.free, errors.tolist(), strict=True))
 
     @property
@@ -83,7 +83,7 @@ class Uncertainty:
     @property
     def standing(self) -> dict[str, Standing]:
         """Standing of each gene."""
-        errors = np.where(self.told, np.sqrt(np.diag(self.relative)), np.inf)
+        errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
         absolute = self.standard_errors
         return {
             n: Standing(float(e), bool(e <= IDENTIFIABLE), absolute[n]) for n, e in zip(self.free, errors, strict=True)
@@ -121,7 +121,7 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
         values=values,
         covariance=unit * per_value * per_value[:, None],
         relative=relative,
-        told=linear.known,
+        known=linear.known,
         noise=tuple(n.covariance for n in noise),
         cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
         remarks=(*doubts, *_remarks(genes, relative, linear.known, free)),
@@ -131,30 +131,30 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
 def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) -> tuple[Array, tuple[str, ...]]:
     """Covariance [F, F] of an estimate in unit coordinates, and remarks on what it rests on.
 
-    The box is a weak prior, without which nothing would bound a gene that the data ignore; one that is not ``told`` has
-    nothing but this, and the others are judged as if it were known.
+    The box is a weak prior, without which nothing would bound a gene that the data ignore; one that is not ``known``
+    has nothing but this prior, and the errors of the others hold for its value as it is.
     """
-    told = np.flatnonzero(linear.known)
+    known = np.flatnonzero(linear.known)
     covariance = np.eye(len(problem.free)) * PRIOR**2
-    if not len(told):
+    if not len(known):
         return covariance, ()
     records = problem.recordings
     parts = [
-        _Part.of(record, n, residual, slope[:, :, told])
+        _Part.of(record, n, residual, slope[:, :, known])
         for record, n, residual, slope in zip(records, noise, linear.residuals, linear.sensitivities, strict=True)
     ]
-    prior = np.eye(len(told)) / PRIOR**2
+    prior = np.eye(len(known)) / PRIOR**2
     bread = np.asarray(np.linalg.inv(sum(part.information for part in parts) + prior), float)
     beats = sum(len(part.scores) for part in parts)
     if beats >= ENOUGH and all(len(part.scores) >= FEWEST for part in parts):
         meat = sum(part.from_beat_to_beat(bread) for part in parts) * widening(beats)
     else:
         meat = _from_samples(parts, bread)
-    covariance[np.ix_(told, told)] = bread @ (meat + prior) @ bread
+    covariance[np.ix_(known, known)] = bread @ (meat + prior) @ bread
     few = [p for p in parts if p.record.kind == "forces" and len(p.scores) < FEWEST]
     return covariance, tuple(
-        f"recording {part.record.name!r} has {len(part.scores)} whole beats, and fewer than {FEWEST} hardly tell how "
-        "much beats differ: standard errors may be too small"
+        f"recording {part.record.name!r} has {len(part.scores)} whole beats, and fewer than {FEWEST} say little "
+        "about how much beats differ: standard errors may be too small"
         for part in few
     )
 
@@ -200,7 +200,7 @@ class _Part:
 def _from_samples(parts: list[_Part], bread: Array) -> Array:
     """Covariance [F, F] of the sum of scores, from the correlations of samples.
 
-    Beats too few to be taken at their word still warn: where they scatter more, their scatter is taken.
+    Few beats still give a lower limit: where they scatter more, their scatter is used.
     """
     total = np.zeros_like(bread)
     for part, meat in zip(parts, score_covariances([part.block() for part in parts], bread), strict=True):
@@ -213,11 +213,11 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
 
 
 def _remarks(
-    genes: list[Gene], relative: Array, told: npt.NDArray[np.bool_], free: npt.NDArray[np.bool_]
+    genes: list[Gene], relative: Array, known: npt.NDArray[np.bool_], free: npt.NDArray[np.bool_]
 ) -> tuple[str, ...]:
-    """What the data cannot tell of the genes that no bound stopped."""
+    """Remarks on the genes that are not at a bound."""
     (kept,) = np.nonzero(free)
-    return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], told[kept], IDENTIFIABLE)
+    return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], known[kept], IDENTIFIABLE)
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:

@@ -161,7 +161,7 @@ def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity,
 def located(
     recording: Recording, residual: Array, sensitivities: Array | None = None, quantity: Quantity = "x"
 ) -> tuple[float, float] | None:
-    """Find where in the beat a model lacks something.
+    """Find where in the beat a model misses physics.
 
     ``residual`` [n] is the modelled minus the recorded mean beat, N, and ``sensitivities`` [n, F] its derivatives by
     the coefficients that were fitted. The answer is the shortest interval of the beat (t*) without which the model,
@@ -173,7 +173,7 @@ def located(
     The interval may run over the end of the beat: then its end is above 1. None where the misfit is not significant:
     beats are taken as exchangeable about their mean, their deviations get random signs, and the mean square of FLIPS
     such means must reach that of the residual in at most SIGNIFICANCE of the cases (a wild bootstrap, Wu 1986). None
-    also with fewer than FEWEST_BEATS beats, which cannot tell.
+    also with fewer than FEWEST_BEATS beats, too few to decide.
     """
     samples = whole_beats(recording, points=len(residual)).samples[quantity]
     if len(samples) < FEWEST_BEATS or not _significant(samples, residual):
@@ -184,8 +184,8 @@ def located(
 
 
 @one_blas_thread
-def lacking(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
-    """Find where in the beat the model of ``problem`` lacks something, at the problem's base genome.
+def missing_interval(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
+    """Find where in the beat the model of ``problem`` misses physics, at the problem's base genome.
 
     On the first fitted axis of its recording number ``recording``; see :func:`located`.
     """

@@ -1,4 +1,4 @@
-"""What comes out of a calibration on forces: estimates with their errors, a global model, agreements, predictions."""
+"""Results of a calibration on forces: estimates with their errors, a global model, agreements, predictions."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class _Judged:
-    """A stage, what is known about the genome it found, and the estimate made of that."""
+    """A stage with its best genome, the uncertainty of that, and the local estimate."""
 
     stage: Stage
     genome: Genome
@@ -81,7 +81,7 @@ class _Compared:
 def summarise_forces(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> ForceResult:
-    """Judge what a calibration found on every recording of the dataset, the held-out ones too.
+    """Compare the estimates of a calibration with every recording of the dataset, held-out ones included.
 
     ``checkpoint`` is the last generation's. The global model is one of local estimates; a recording that was not fitted
     is predicted by it or, without it, by the joint estimate or the average of the local ones.
@@ -100,14 +100,14 @@ def summarise_forces(
         genomes, warnings = _sources(spec, model, nominal, judged, law, recording)
         everywhere.append(_compare(model, as_fitted(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
-    lacking = [_lacking(one, everywhere) for one in judged]
-    remarks = (*remarks, *(remark for remark in lacking if remark), *_filtered_before(spec, dataset))
+    misfits = [_misfit_remark(one, everywhere) for one in judged]
+    remarks = (*remarks, *(remark for remark in misfits if remark), *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}
     left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]
     held_out = [one for one in everywhere if one.recording.name in dataset.held_out]
     return ForceResult(
-        genes=_genes(model, nominal, judged, not any(lacking)),
+        genes=_genes(model, nominal, judged, not any(misfits)),
         estimates=tuple(one.estimate for one in judged),
         global_model=law,
         agreements=tuple(agreement for one in everywhere for agreement in one.agreements),
@@ -266,8 +266,8 @@ def _scatter(recording: Recording, fitted: npt.NDArray[np.bool_]) -> float | Non
     return float(np.sqrt(np.mean(noise[fitted] ** 2)))
 
 
-def _lacking(judged: _Judged, everywhere: list[_Compared]) -> str | None:
-    """A remark where an estimate leaves more than noise explains."""
+def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
+    """A remark where the residual of an estimate is larger than noise explains."""
     mine = [c for c in everywhere if c.recording.name in judged.estimate.recordings and c.scatter is not None]
     left = _rms(mine, ("local", "joint"))
     if left is None:
@@ -275,11 +275,11 @@ def _lacking(judged: _Judged, everywhere: list[_Compared]) -> str | None:
     noise = np.sqrt(np.average([(c.scatter or 0.0) ** 2 for c in mine], weights=[c.samples for c in mine]))
     if left <= ADEQUATE * noise:
         return None
-    beside = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
+    ratio = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
     return (
-        f"{judged.estimate.name}: the best coefficients leave {left * 1e3:.3g} mN, {beside}: the model or its motion "
-        f"lacks something ('wingfit effects' lists what can be added), or the search was cut short. Standard errors "
-        f"count on at most {ADEQUATE:g} times the scatter, so no coefficient is called told"
+        f"{judged.estimate.name}: the residual of the best coefficients is {left * 1e3:.3g} mN, {ratio}: the model or "
+        f"its motion misses physics ('wingfit effects' lists what can be added), or the search was cut short. Standard "
+        f"errors assume at most {ADEQUATE:g} times the scatter, so no coefficient counts as identifiable"
     )
 
 
@@ -288,11 +288,11 @@ def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
 
     None where no recording has the fitted axes.
     """
-    told = [one for one in some if one.samples]
-    if not told:
+    usable = [one for one in some if one.samples]
+    if not usable:
         return None
-    squares = [next((one.rms[s] for s in order if s in one.rms), np.nan) ** 2 * one.samples for one in told]
-    return float(np.sqrt(np.sum(squares) / sum(one.samples for one in told)))
+    squares = [next((one.rms[s] for s in order if s in one.rms), np.nan) ** 2 * one.samples for one in usable]
+    return float(np.sqrt(np.sum(squares) / sum(one.samples for one in usable)))
 
 
 def _left_out(
@@ -321,7 +321,7 @@ def _left_out(
 
 
 def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-    """Remarks on recordings to which the low-pass that was asked for was not applied."""
+    """Remarks on recordings to which the requested low-pass was not applied."""
     return tuple(
         f"recording {recording.name!r} says that it has been low-passed at {recording.low_pass.cutoff:g} Hz; "
         f"{spec.low_pass:g} Hz was not applied to it"
@@ -331,7 +331,7 @@ def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]
 
 
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
-    """Genes with the mean of the estimates, the largest of their errors, and whether all can tell them."""
+    """Genes with the mean of the estimates, the largest standard error, and whether every estimate identifies them."""
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
     for gene in model.genes:

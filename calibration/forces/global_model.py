@@ -26,7 +26,7 @@ FEWEST = 4  # conditions: three coefficients of the law, and one more to contrad
 FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the law, for its own scatter to be estimated
 SMALL = 0.05  # of the root mean square of a coefficient: errors of smaller values are relative to this
 WEATHER = 0.05  # relative; the density of the air differs by as much from day to day, and warns of nothing
-COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be told apart
+COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be separated
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def fit_global(
     Mandel 1982); without it a condition with many beats would rule the fit although the law, not the noise, limits it.
     With fewer than FREE_FOR_SCATTER conditions to spare, or ``weighted`` False, all count the same, as in the source.
 
-    ValueError where the conditions are too few, or frequency and pitch cannot be told apart.
+    ValueError where the conditions are too few, or frequency and pitch cannot be separated.
     """
     if len(estimates) != len(conditions):
         raise ValueError(f"{len(estimates)} estimates need as many conditions, got {len(conditions)}")
@@ -97,14 +97,14 @@ def _refuse_untellable(frequency: Array, pitch: Array) -> None:
     for name, unit, x in (("flap frequency", "Hz", frequency), ("body pitch", "rad", pitch)):
         if np.ptp(x) < 1e-6 * (1 + np.abs(x).max()):
             raise ValueError(
-                f"the {name} is {x[0]:.4g} {unit} in all {len(x)} conditions, so its effect cannot be told; "
+                f"the {name} is {x[0]:.4g} {unit} in all {len(x)} conditions, so its effect is not identifiable; "
                 f"add a recording at another {name}, or use the average of the coefficients"
             )
     alike = float(np.corrcoef(frequency, pitch)[0, 1])
     if abs(alike) > COLLINEAR:
         raise ValueError(
             f"flap frequency and body pitch change together (correlation {alike:.3f}; at most {COLLINEAR:g} can be "
-            f"told apart): add a recording with the same frequency at another pitch, or use the average"
+            f"separated): add a recording with the same frequency at another pitch, or use the average"
         )
 
 
@@ -112,15 +112,15 @@ def _few(conditions: int) -> tuple[str, ...]:
     if conditions >= 3 + FREE_FOR_SCATTER:
         return ()
     return (
-        f"{conditions} conditions: the law's own scatter cannot be told, so every condition counts the same; "
+        f"{conditions} conditions: the law's own scatter is not known, so every condition has the same weight; "
         f"from {3 + FREE_FOR_SCATTER} on they are weighted by their standard errors",
     )
 
 
 def _untold(names: Sequence[str], estimates: Sequence[LocalEstimate]) -> tuple[str, ...]:
-    """Remarks on coefficients that no condition tells even by their size."""
+    """Remarks on coefficients that no condition identifies."""
     return tuple(
-        f"{name} is told under none of the conditions: its law says nothing"
+        f"{name} could not be identified in any condition; its dependence on frequency and pitch is not meaningful"
         for name in names
         if all(e.standard_errors[name] >= abs(e.values[name]) for e in estimates)
     )
@@ -130,13 +130,13 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
     """Fit one coefficient to ``design`` [n, 3] or, for a mean, [n, 1]."""
     local = np.array([estimate.values[name] for estimate in estimates])
     errors = np.array([estimate.standard_errors[name] for estimate in estimates])
-    told = np.isfinite(errors)
-    if told.sum() < design.shape[1]:  # nothing tells it: what was assumed, so that it still has a value
-        told = np.ones_like(told)
-    fit = _fit(design[told], local[told], errors[told], weighted)
+    identified = np.isfinite(errors)
+    if identified.sum() < design.shape[1]:  # not identified: keep the assumed value
+        identified = np.ones_like(identified)
+    fit = _fit(design[identified], local[identified], errors[identified], weighted)
     off = np.abs(design @ fit.coefficients - local) / _sizes(local)
     constant, per_hz, per_rad = (*fit.coefficients.tolist(), 0.0, 0.0)[:3]
-    left_out = [_left_out(int(k), design, local, errors, told, weighted) for k in np.flatnonzero(told)]
+    left_out = [_left_out(int(k), design, local, errors, identified, weighted) for k in np.flatnonzero(identified)]
     seen = [error for error in left_out if error is not None]
     return GlobalGene(
         name,
@@ -144,7 +144,7 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
         per_hz,
         per_rad,
         fit.scatter,
-        float(off[told].max()),
+        float(off[identified].max()),
         max(seen) if len(seen) == len(left_out) else None,
     )
 
@@ -179,10 +179,10 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
 
 
 def _left_out(
-    k: int, design: Array, local: Array, errors: Array, told: npt.NDArray[np.bool_], weighted: bool
+    k: int, design: Array, local: Array, errors: Array, identified: npt.NDArray[np.bool_], weighted: bool
 ) -> float | None:
     """Relative error at condition ``k`` of the law fitted without it; None where the rest determines no law."""
-    rest = told.copy()
+    rest = identified.copy()
     rest[k] = False
     if rest.sum() < design.shape[1] or not _independent(design[rest]):
         return None

@@ -48,10 +48,10 @@ class GlobalGene:
 
     Attributes:
         scatter: standard deviation of the local coefficients about the law beyond their standard errors; None where
-            the conditions are too few to tell, and every one of them counts the same.
+            the conditions are too few, and all have the same weight.
         largest_error: largest relative difference from a local estimate.
-        left_out_error: largest relative difference from a local estimate that the fit had not seen; None with too few
-            conditions.
+        left_out_error: largest relative difference from a local estimate that was left out of the fit; None with too
+            few conditions.
     """
 
     name: str

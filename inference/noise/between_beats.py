@@ -1,4 +1,4 @@
-"""Uncertainty of forces from beat to beat: what one beat says about a gene differs from what the next one says.
+"""Noise that differs between beats: the covariance of an estimate from the scores of single beats.
 
 The scatter of measured forces grows and falls with the forces themselves, since the flow separates anew in every beat.
 Such noise is not stationary within the beat. A formula that takes its correlations as those of a stationary one
@@ -18,12 +18,12 @@ from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
 
-FEWEST_MEAN = 3  # beats from which a mean beat can be told from noise
+FEWEST_MEAN = 3  # beats at least, to separate a mean beat from noise
 HARMONICS = 8  # of the mean beat
-ENOUGH = 24  # beats from which their series is taken at its word
-FEWEST = 8  # beats below which it says too little to be looked at
+ENOUGH = 24  # beats at least, for the covariance to rest on the series of beats alone
+FEWEST = 8  # beats below which the series is not used at all
 TAPER = np.array([1.0, 1.0, 1.0, 0.5])  # of lags 0, 1, 2, 3 beats
-WHOLE = 0.9  # of the samples that most beats have: what a beat must have to count
+WHOLE = 0.9  # fraction of the median number of samples that a whole beat must have
 
 
 def beat_scores(
@@ -77,9 +77,9 @@ def _beats(record: Recording) -> npt.NDArray[np.int64]:
 
 
 def widening(beats: float) -> float:
-    """Factor on a variance that is known from so many beats only.
+    """Factor on a variance that was estimated from this number of beats.
 
-    They tell it with about nu = B / sum_k taper_k^2 degrees of freedom, and what is divided by its root then follows
+    It has about nu = B / sum_k taper_k^2 degrees of freedom, and a quotient by its root follows
     Student's t, whose variance is nu / (nu - 2).
     """
     freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())

@@ -1,4 +1,4 @@
-"""Autocovariance of residuals, and what it makes of the uncertainty of an estimate.
+"""Noise that is correlated from sample to sample: its autocovariance, and the covariance of an estimate under it.
 
 Cramer-Rao bounds of white noise are too small for coloured residuals. The covariance of an estimate is then
 M^-1 [sum_ij S_i^T R^-1 R_vv(i - j) R^-1 S_j] M^-1 with the information M = sum_i S_i^T R^-1 S_i (Maine and Iliff 1981;
@@ -10,9 +10,9 @@ residuals and sensitivities come whitened by R, so that R_vv is a matrix of corr
 MEMORIES times the memory 1 + 2 sum_k rho_k^2 over lags up to L (Bartlett's count of samples per independent one),
 and at most a third of the recording. Negative spectral densities are set to zero, so that the result is a covariance.
 
-**What the fit took.** Residuals are noise minus what the fit absorbed, v = (1 - S M^-1 S^T) e, and their correlations
-are smaller than the noise's, the more so the longer its memory. The expected loss follows from the noise's
-correlations; they are found by fixed-point iteration.
+**Noise that the fit absorbed.** Residuals are noise minus what the fit absorbed, v = (1 - S M^-1 S^T) e, and their
+correlations are smaller than the noise's, the more so the longer its memory. The expected loss follows from the noise's
+correlations; they are estimated by fixed-point iteration.
 
 **Gaps and uneven frames.** Frames are put on a grid of the median interval; products count where both samples were
 seen.

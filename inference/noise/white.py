@@ -11,8 +11,8 @@ from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
 
-FLOOR = 1e-6  # of the largest recorded value: a fit better than this is taken for this good, so that R stays regular
-POOLED = 5.0  # samples that the mean variance of a recording counts for in the variance of each of its tracks
+FLOOR = 1e-6  # of the largest recorded value: residuals are taken to be at least this large, so that R stays regular
+POOLED = 5.0  # samples: weight of the mean variance of a recording in the variance of each track
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Noise:
         Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
         channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
         drawn a little to their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
-        Channels that are not fitted get variance 1, which leaves no trace.
+        Channels that are not fitted get variance 1, which has no influence.
         """
         seen = np.isfinite(residuals)
         v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)

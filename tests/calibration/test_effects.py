@@ -180,7 +180,7 @@ def test_gauss_newton_finds_a_typical_shift_of_the_cameras(small: tuple[Dataset,
 
 
 def test_gauss_newton_finds_a_typical_offset_of_a_balance_on_each_recording(forces: Dataset) -> None:
-    """Beside the coefficients, unasked; one of an axis that is not fitted stays at zero and is not called told."""
+    """Without being named; that of an axis that is not fitted stays at zero and does not count as identifiable."""
     typical = EFFECTS["balance_offset"].typical(forces.vehicle)
     spec = CalibrationSpec(effects=("balance_offset",))
     model = model_for(forces, spec)
@@ -273,5 +273,5 @@ def test_the_uncertainty_at_zero_size_is_that_of_the_rest() -> None:
     without = uncertainty(replace(problem, free=("a", "bump.size")), Here())
     assert np.isfinite(with_place.covariance).all()
     np.testing.assert_allclose(with_place.covariance[:2, :2], without.covariance, rtol=1e-6)
-    assert any("bump.place is not told" in remark for remark in with_place.remarks)
+    assert any("bump.place is not identifiable" in remark for remark in with_place.remarks)
     assert with_place.standing["bump.place"].standard_error > 0.5

@@ -274,10 +274,10 @@ def test_the_headline_is_the_root_mean_square_of_all_samples(dataset: Dataset) -
 
 
 def test_a_model_that_lacks_something_tells_no_coefficient(dataset: Dataset, local: ForceResult) -> None:
-    assert not any("lacks something" in remark for remark in local.remarks)
+    assert not any("misses physics" in remark for remark in local.remarks)
     assert [g.name for g in local.genes if g.identifiable] == ["C_l", "C_r", "C_F"]
     poorer = run(replace(LOCAL, without=("clap_and_peel",)), dataset)[1]
-    said = [remark for remark in poorer.remarks if "lacks something" in remark]
+    said = [remark for remark in poorer.remarks if "misses physics" in remark]
     assert len(said) == 6
     assert "times the scatter from beat to beat" in said[0]
     assert not any(g.identifiable for g in poorer.genes)

@@ -9,8 +9,8 @@ from wingfit.calibration.estimates.likelihood import estimate
 from wingfit.calibration.forces.agreement import (
     agreements,
     comparison,
-    lacking,
     located,
+    missing_interval,
     quantities,
     spectrum,
     whole_beats,
@@ -242,7 +242,7 @@ def test_missing_fling_is_found_where_the_wings_peel(left_out: tuple[str, ...], 
     problem = Problem(model, (low,), model.searched, base_genome(model, DRAG), ("x",))
     evaluator = make_evaluator("in_process")
     best = problem.base.replace(estimate(problem, evaluator, {}).values)
-    place = lacking(replace(problem, base=best), evaluator)
+    place = missing_interval(replace(problem, base=best), evaluator)
     assert (place is not None) is expected
     if place is not None:
         assert 0 <= place[0] < 0.15

@@ -169,4 +169,6 @@ def test_a_coefficient_that_nothing_tells_is_said() -> None:
         replace(estimate(str(k), {"C_l": law(c), "C_r": 1.4}), standard_errors={"C_l": 0.01, "C_r": 4.0})
         for k, c in enumerate(CONDITIONS)
     ]
-    assert fit_global(unsure, CONDITIONS).remarks == ("C_r is told under none of the conditions: its law says nothing",)
+    assert fit_global(unsure, CONDITIONS).remarks == (
+        "C_r could not be identified in any condition; its dependence on frequency and pitch is not meaningful",
+    )

@@ -122,7 +122,7 @@ def test_a_gene_without_neighbours_stays_and_the_others_are_fitted() -> None:
     assert found.values["a"] == 1.0
     assert found.uncertainty.standard_errors["a"] == np.inf
     assert found.uncertainty.standard_errors["b"] < 1
-    assert "a cannot be judged: no genome beside the best can be simulated" in found.remarks
+    assert "a has no known error: no neighbour of the best genome can be simulated" in found.remarks
 
 
 def test_shorter_steps_are_tried_where_both_neighbours_fail() -> None:

@@ -113,7 +113,7 @@ def test_a_gene_at_its_bound_leaves_the_others_their_errors() -> None:
     assert errors["c"] == np.inf
     assert [errors["a"], errors["b"]] == pytest.approx(list(fixed.uncertainty.standard_errors.values()), rel=1e-2)
     assert any("c is at its upper bound 1.3" in remark for remark in stopped.remarks)
-    assert not any("c cannot be judged" in remark for remark in stopped.remarks)
+    assert not any("c has no known error" in remark for remark in stopped.remarks)
 
 
 @pytest.mark.parametrize("beats", [5, 12, 40])
@@ -124,7 +124,8 @@ def test_where_bounds_stop_every_gene_there_is_still_an_answer(beats: int) -> No
     assert found.values == {"c": pytest.approx(1.1)}
     assert found.uncertainty.standard_errors == {"c": np.inf}
     assert found.remarks == (
-        "c is at its upper bound 1.1: the best value may lie beyond; the errors of the others take it as known",
+        "c is at its upper bound 1.1: the best value may lie beyond; the standard errors of the other genes hold for "
+        "this value",
     )
 
 
@@ -239,9 +240,9 @@ def test_the_ratio_of_twins_is_told_and_said() -> None:
     found = estimate(
         problem(recorded(0.01 * remembering(600, 1, np.random.default_rng(7)), model=model), model), HERE, {}
     )
-    assert any(remark.startswith("a and b make up for each other") or "a : b" in remark for remark in found.remarks)
+    assert any(remark.startswith("a and b compensate each other") or "a : b" in remark for remark in found.remarks)
     assert found.correlation[0, 1] > 0.99
-    assert not any("c is not told" in remark for remark in found.remarks)
+    assert not any("c is not identifiable" in remark for remark in found.remarks)
 
 
 def gene(name: str, share: str | None = None) -> Gene:
@@ -255,19 +256,21 @@ def test_what_the_data_cannot_tell_is_put_into_words() -> None:
     pair = [gene("C_l"), gene("C_D0")]
     ratio = np.array([[0.5, 0.499], [0.499, 0.5]])
     (said,) = remarks(pair, ratio, ALL, 0.075)
-    assert said == "only the ratio C_l : C_D0 is told by these data, to 4.5%; the bounds of each are C_l 71%, C_D0 71%"
+    assert (
+        said == "only the ratio C_l : C_D0 is identifiable, to 4.5%; the standard errors of each are C_l 71%, C_D0 71%"
+    )
     (said,) = remarks(pair, ratio * np.array([[1, -1], [-1, 1]]), ALL, 0.075)
-    assert said.startswith("only the product C_l x C_D0 is told by these data, to 4.5%")
+    assert said.startswith("only the product C_l x C_D0 is identifiable, to 4.5%")
     (said,) = remarks(pair, np.diag([1e-4, 0.36]), ALL, 0.075)
-    assert said == "C_D0 is not told by these data: its bound is 60%"
+    assert said == "C_D0 is not identifiable from these data: its standard error is 60%"
     uneven = np.outer([1.0, -0.5], [1.0, -0.5]) * 0.3 + 1e-5 * np.eye(2)
     (said,) = remarks(pair, uneven, ALL, 0.075)
-    assert said.startswith("C_l and C_D0 make up for each other: C_l ")
+    assert said.startswith("C_l and C_D0 compensate each other: C_l ")
     assert "+10 %" in said.replace("-10 %", "+10 %")
     assert remarks(pair, np.diag([1e-4, 1e-3]), ALL, 0.075) == ()
     both = remarks(pair, 0.2 * np.eye(2), ALL, 0.075)
-    assert len(both) == 2, "two genes that are not told, though no trade-off"
-    assert all("is not told by these data: its bound is 45%" in one for one in both)
+    assert len(both) == 2, "two genes that are not identifiable, though there is no trade-off"
+    assert all("is not identifiable from these data: its standard error is 45%" in one for one in both)
 
 
 def test_shares_are_named_together_and_lost_genes_first() -> None:
@@ -275,8 +278,8 @@ def test_shares_are_named_together_and_lost_genes_first() -> None:
     covariance = np.diag([0.04, 1e-4, 0.5])
     said = remarks(genes, covariance, np.array([True, True, False]), 0.075)
     assert said == (
-        "G_r cannot be judged: no genome beside the best can be simulated",
-        "of the shares L, these data do not tell L_1 (bound 20%)",
+        "G_r has no known error: no neighbour of the best genome can be simulated",
+        "these data do not identify the shares L: L_1 (standard error 20%)",
     )
 
 
@@ -293,4 +296,4 @@ def test_a_gene_that_the_data_ignore_has_the_error_of_its_box() -> None:
     known = uncertainty(given, HERE)
     assert known.standard_errors["b"] == pytest.approx(5.0)
     assert known.standard_errors["a"] < 0.4
-    assert any(remark.startswith("b is not told by these data") for remark in known.remarks)
+    assert any(remark.startswith("b is not identifiable from these data") for remark in known.remarks)

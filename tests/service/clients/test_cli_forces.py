@@ -110,7 +110,7 @@ def test_the_result_as_tables(wingfit: Wingfit, client: Client, run_id: str) -> 
     assert row.split()[1] == f"{1e3 * (lift['mean_recorded_n'] or 0):.3g}"
     assert f"{1e3 * (lift['mean_modelled_n'] or 0):.3g} ({correlation(lift['correlation'])})" in row
     assert "fitted from 10.3 to 13.3 Hz" in out
-    assert err.count("scatter cannot be told") == 1
+    assert err.count("scatter is not known") == 1
     assert json.loads(wingfit("runs", "result", run_id, "--json")[1]) == result
 
 
