@@ -127,8 +127,8 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         remarks.append(
             f"the residual of the best genome on the fitted recordings is {after * 1e3:.2f} mm, {after / noise:.1f} "
             f"times the tracking noise: the search was cut short, or the model misses physics: try a finer "
-            f"discretisation, or effects ('wingfit effects' lists them). Standard errors assume at most {ADEQUATE:g} times the noise, "
-            f"so no gene counts as identifiable"
+            f"discretisation, or effects ('wingfit effects' lists them). Standard errors assume at most "
+            f"{ADEQUATE:g} times the noise, so no gene counts as identifiable"
         )
     remarks += absent(best.as_dict(), ready.searched)
     return Result(

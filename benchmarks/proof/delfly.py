@@ -70,7 +70,7 @@ def located(
     spec, model = CalibrationSpec(preset=BASELINE), vehicle_model(dataset, CalibrationSpec(preset=BASELINE))
     tests = {trial.name: trial for trial in trials}
     return {
-        one.name: fit(model, as_fitted(spec, one), tests[one.name], evaluator).lacking
+        one.name: fit(model, as_fitted(spec, one), tests[one.name], evaluator).missing_interval
         for one in dataset.recordings
         if one.name not in dataset.held_out
     }

@@ -131,7 +131,7 @@ def test_where_bounds_stop_every_gene_there_is_still_an_answer(beats: int) -> No
 
 def test_few_beats_are_said() -> None:
     short, long = (recorded(0.03 * remembering(80 * beats, 1, np.random.default_rng(9))) for beats in (5, 30))
-    assert any("5 whole beats, and fewer than 8 hardly tell" in r for r in estimate(problem(short), HERE, {}).remarks)
+    assert any("5 whole beats, and fewer than 8 say little" in r for r in estimate(problem(short), HERE, {}).remarks)
     assert not any("whole beats" in remark for remark in estimate(problem(long), HERE, {}).remarks)
 
 
