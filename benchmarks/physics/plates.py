@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,16 +12,10 @@ from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes
 from wingfit.sim.kernels.connectors import connect, relative_pose, tangent
 from wingfit.sim.solver.scene import at_rest
-from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import lanes, wing_genes
-from wingfit.sim.wing.structure import Structure, build
+from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
-
-
-def straight_rod(name: str, x: float, y_tip: float, diameter: float, density: float = 0.0, glue: float = 0.0) -> Rod:
-    """A rod along the span from the root at y = 0."""
-    return Rod(name, x, 0.0, x, y_tip, diameter, density, glue)
 
 
 def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], markers: tuple[Marker, ...] = ()) -> Wing:
@@ -34,10 +27,6 @@ def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], ma
         "plate", stations, Materials(20.0, 0.0), rods, (rods[0].name, rods[1].name), marks, (tip.name,),
         Hinge(0.0, 0.0), FourierDrive(0.0, (), ()),
     )  # fmt: skip
-
-
-def cut(wing: Wing, division: str) -> Structure:
-    return build(wing, Division.parse(division))
 
 
 def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
@@ -79,8 +68,3 @@ def displacement(K: Array, load: Array, held: tuple[int, ...] = ()) -> Array:
     u = np.zeros(len(K))
     u[free] = np.linalg.solve(K[np.ix_(free, free)], load.ravel()[free])
     return u.reshape(-1, 6)
-
-
-def with_materials(wing: Wing, foam: float, skin: float) -> Wing:
-    """The wing with foam of a density (kg/m^3) and skin (kg/m^2)."""
-    return replace(wing, materials=Materials(foam, skin))

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 from wingfit.workers.node_alive import TIMEOUT_SECONDS
 
 # Head, object manager and node manager (by convention), client, dashboard, its agents, and the range of workers.

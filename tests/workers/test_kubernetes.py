@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 from tests.workers.test_deployment import pins
 from wingfit.service.http import request_limits
 from wingfit.service.settings import Settings

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 
 # The repository is put aside, because it may lie below /tmp, and comes back where it was.
 SCRIPT = """

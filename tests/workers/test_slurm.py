@@ -18,8 +18,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from benchmarks.common.ray_nodes import IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
-from benchmarks.durability.works import EXAMPLES
+from tests.oracles.processes import EXAMPLES, IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
 from wingfit.client.client import Client, ServerAwayError
 
 SCRIPT = REPOSITORY / "deploy" / "slurm" / "wingfit.sbatch"

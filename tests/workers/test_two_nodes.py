@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from ray.util import get_node_ip_address
 
-from benchmarks.common.ray_nodes import REPOSITORY, Node, environment, free_port
+from tests.oracles.processes import REPOSITORY, Node, environment, free_port
 from tests.workers import pendulum
 from tests.workers.driver import ANSWER, digest
 from wingfit.workers import make_evaluator
