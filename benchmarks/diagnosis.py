@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.common import machine
 from benchmarks.concealed.bench import WingBench
-from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.cli.base.output import progress

@@ -12,16 +12,20 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant import observe, observe_forces, vehicle
-from benchmarks.concealed.plant.catalogue import KINDS
-from benchmarks.concealed.plant.hidden import Effect, Hidden, Kind
-from benchmarks.concealed.plant.observe import Filming, draw_filming, film, with_noise
-from benchmarks.concealed.plant.observe_cameras import Cameras, draw_cameras
-from benchmarks.concealed.plant.observe_forces import Weighing, draw_weighing, silent, weigh
-from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters
-from benchmarks.concealed.plant.simulate import Beat
-from benchmarks.concealed.plant.simulate import simulate as simulate_wing
-from benchmarks.concealed.plant.vehicle_laws import LAWS as VEHICLE_LAWS
+from benchmarks.concealed.plant.law import Concealed, Law, Parameters
+from benchmarks.concealed.plant.measurement.balance import FAULTS as BALANCE_FAULTS
+from benchmarks.concealed.plant.measurement.balance import Weighing, draw_weighing, silent, weigh
+from benchmarks.concealed.plant.measurement.cameras import Cameras, draw_cameras
+from benchmarks.concealed.plant.measurement.film import FAULTS as CAMERA_FAULTS
+from benchmarks.concealed.plant.measurement.film import Filming, draw_filming, film, with_noise
+from benchmarks.concealed.plant.vehicle.laws import LAWS as VEHICLE_LAWS
+from benchmarks.concealed.plant.vehicle.simulate import PROPOSED
+from benchmarks.concealed.plant.vehicle.simulate import simulate as simulate_vehicle
+from benchmarks.concealed.plant.wing.simulate import Beat
+from benchmarks.concealed.plant.wing.simulate import simulate as simulate_wing
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
+from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden
+from benchmarks.concealed.plant.wing_effects.kind import Kind
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.trials import Build
 from wingfit.calibration.plan import prepared
@@ -186,7 +190,7 @@ class WingBench(Bench[Beat, Filmset]):
     @property
     def faults(self) -> Mapping[str, Law]:
         """Of cameras, clocks and trackers."""
-        return observe.FAULTS
+        return CAMERA_FAULTS
 
     @property
     def physics(self) -> Mapping[str, Law]:
@@ -266,7 +270,7 @@ class VehicleBench(Bench[Array, Weighing]):
     @property
     def faults(self) -> Mapping[str, Law]:
         """Of the balance."""
-        return observe_forces.FAULTS
+        return BALANCE_FAULTS
 
     @property
     def physics(self) -> Mapping[str, Law]:
@@ -296,8 +300,8 @@ class VehicleBench(Bench[Array, Weighing]):
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
         """Forces [n, 2] over a beat."""
-        terms = tuple(term for term in vehicle.PROPOSED if term not in self.build.without)
-        return vehicle.simulate(self.rig, genome, condition, hidden, terms=terms)
+        terms = tuple(term for term in PROPOSED if term not in self.build.without)
+        return simulate_vehicle(self.rig, genome, condition, hidden, terms=terms)
 
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from benchmarks.concealed.answer import Answer, Secret
 from benchmarks.concealed.bench import Bench, Made, bench_of
-from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
 from benchmarks.concealed.trials import Trial, conditions, name_of

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.concealed.bench import WingBench
-from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from benchmarks.proof.told import (
     Claim,

@@ -16,7 +16,7 @@ F = TypeVar("F", bound=Callable[..., object])
 def _folder() -> Path:
     """Named after what is compiled: numba itself would not notice a change in a file that is called into."""
     here = Path(__file__).resolve().parent
-    sources = [text for text in (file.read_bytes() for file in sorted(here.glob("*.py"))) if b"@compiled" in text]
+    sources = [text for text in (file.read_bytes() for file in sorted(here.rglob("*.py"))) if b"@compiled" in text]
     digest = hashlib.sha256(b"".join(sources)).hexdigest()[:16]
     for base in (Path(numba.config.CACHE_DIR or here / "__pycache__"), Path(tempfile.gettempdir())):
         folder = base / f"plant-{digest}"

@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
 from benchmarks.concealed.laboratory import Addition, Order, add, make
-from benchmarks.concealed.plant import observe, observe_forces
-from benchmarks.concealed.plant.catalogue import UNKNOWN
+from benchmarks.concealed.plant.measurement import balance, film
+from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
 from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
 from benchmarks.concealed.strength import rms
@@ -260,7 +260,7 @@ def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
     assert sum(trial.build.plant != trial.build.division for trial in trials) >= len(trials) / 3
     assert {trial.build.division for trial in trials} == {"", "4", "11", "24"}
     assert len({trial.name for trial in trials}) == len(trials) == len({trial.seed for trial in trials})
-    physics = {kind for (kind,) in set(unlisted)} - set(observe.FAULTS) - set(observe_forces.FAULTS)
+    physics = {kind for (kind,) in set(unlisted)} - set(film.FAULTS) - set(balance.FAULTS)
     assert len(physics & set(UNKNOWN)) >= 3  # of the wing's plant
     assert len(physics - set(UNKNOWN)) >= 2  # of the vehicle's
     groups = [trial.group for trial in trials[:60]]

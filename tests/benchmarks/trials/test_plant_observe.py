@@ -9,12 +9,12 @@ import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.concealed.plant import observe_forces
-from benchmarks.concealed.plant.observe import FAULTS, Filmed, Filming, draw_filming, film, tracked, with_noise
-from benchmarks.concealed.plant.observe_cameras import direction_values, divided, draw_cameras, places
-from benchmarks.concealed.plant.observe_forces import Weighed, Weighing, draw_weighing, silent, weigh
-from benchmarks.concealed.plant.observe_law import Concealed
-from benchmarks.concealed.plant.observe_noise import COLOURS, Noise, bursts, coloured, draw_noise, track_noise
+from benchmarks.concealed.plant.law import Concealed
+from benchmarks.concealed.plant.measurement import balance
+from benchmarks.concealed.plant.measurement.balance import Weighed, Weighing, draw_weighing, silent, weigh
+from benchmarks.concealed.plant.measurement.cameras import direction_values, divided, draw_cameras, places
+from benchmarks.concealed.plant.measurement.film import FAULTS, Filmed, Filming, draw_filming, film, tracked, with_noise
+from benchmarks.concealed.plant.measurement.noise import COLOURS, Noise, bursts, coloured, draw_noise, track_noise
 from wingfit.records import Condition, Dataset, load_dataset, save_dataset
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.virtual_rigs.balance import delfly
@@ -165,7 +165,7 @@ def test_no_fault_is_exactly_none_and_more_is_more(name: str) -> None:
 
 
 def test_listed_faults_are_in_the_library_and_the_others_are_not() -> None:
-    for laws in (FAULTS, observe_forces.FAULTS):
+    for laws in (FAULTS, balance.FAULTS):
         for law in laws.values():
             assert (law.name in EFFECTS) == law.listed
             for gene in law.values(law.draw(rng())):
@@ -304,9 +304,9 @@ def test_scatter_from_beat_to_beat_and_noise_are_as_large_as_told(tmp_path: Path
     assert len(load_dataset(tmp_path / "balance").recordings) == 3
 
 
-@pytest.mark.parametrize("name", observe_forces.FAULTS)
+@pytest.mark.parametrize("name", balance.FAULTS)
 def test_no_fault_of_the_balance_is_exactly_none_and_more_is_more(name: str) -> None:
-    drawn = observe_forces.FAULTS[name].draw(rng(3))
+    drawn = balance.FAULTS[name].draw(rng(3))
 
     def hide(part: float) -> Array:
         return weighed({name: drawn | {"strength": part * drawn["strength"]}}).clean

@@ -11,15 +11,15 @@ import pytest
 from scipy.signal import resample
 
 import benchmarks.concealed.plant as plant
-from benchmarks.concealed.plant.band import factor, solve
-from benchmarks.concealed.plant.catalogue import KINDS, LISTED, UNKNOWN
-from benchmarks.concealed.plant.geometry import Cut, counts_of
-from benchmarks.concealed.plant.hidden import Effect, Hidden, drawn
-from benchmarks.concealed.plant.joints import joints, shares, torsion_constant
-from benchmarks.concealed.plant.linkage import angles, rocker, series_of
-from benchmarks.concealed.plant.march import A, C
-from benchmarks.concealed.plant.settle import Accuracy
-from benchmarks.concealed.plant.simulate import Beat, simulate
+from benchmarks.concealed.plant.wing.banded import factor, solve
+from benchmarks.concealed.plant.wing.geometry import Cut, counts_of
+from benchmarks.concealed.plant.wing.integrator import A, C
+from benchmarks.concealed.plant.wing.joints import joints, shares, torsion_constant
+from benchmarks.concealed.plant.wing.linkage import angles, rocker, series_of
+from benchmarks.concealed.plant.wing.periodic import Accuracy
+from benchmarks.concealed.plant.wing.simulate import Beat, simulate
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS, LISTED, UNKNOWN
+from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden, drawn
 from wingfit.records import Condition, FourBarDrive
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
@@ -55,7 +55,7 @@ def rms(difference: Array) -> float:
 
 
 def test_the_plant_shares_no_code_with_the_tool() -> None:
-    for file in Path(plant.__file__).parent.glob("*.py"):
+    for file in Path(plant.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []

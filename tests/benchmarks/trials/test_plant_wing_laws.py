@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.concealed.plant.attached import point_loads
-from benchmarks.concealed.plant.build import Draft, rig_of
-from benchmarks.concealed.plant.catalogue import KINDS
-from benchmarks.concealed.plant.hidden import Hidden
-from benchmarks.concealed.plant.linkage import angles
-from benchmarks.concealed.plant.rig import AIR_LAWS, CARRIED, LAG, LAG_RATE, STALL, VORTEX, Motion, Rig
-from benchmarks.concealed.plant.springs import dead_zone, joint_loads, remembered_loads
-from benchmarks.concealed.plant.stream import air_loads
+from benchmarks.concealed.plant.wing.air_loads import air_loads
+from benchmarks.concealed.plant.wing.build import Draft, rig_of
+from benchmarks.concealed.plant.wing.joint_loads import dead_zone, joint_loads, remembered_loads
+from benchmarks.concealed.plant.wing.linkage import angles
+from benchmarks.concealed.plant.wing.point_loads import point_loads
+from benchmarks.concealed.plant.wing.rig import AIR_LAWS, CARRIED, LAG, LAG_RATE, STALL, VORTEX, Motion, Rig
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
+from benchmarks.concealed.plant.wing_effects.hidden import Hidden
 from wingfit.records import Condition
 from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.flexible_wing import FlexibleWing

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import zeta as hurwitz
 
-from benchmarks.concealed.plant.observe_law import Law, Parameters
+from benchmarks.concealed.plant.law import Law, Parameters
 from wingfit.records import Condition, Vehicle
 from wingfit.records.dataset import STANDARD_GRAVITY
 

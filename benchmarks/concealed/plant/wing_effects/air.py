@@ -1,10 +1,19 @@
-"""Aerodynamics that the tool's library has as well, in other forms; the laws are in :mod:`.stream`."""
+"""Aerodynamics that the tool's library has as well, in other forms; the laws are in ``wing/air_loads.py``."""
 
 from __future__ import annotations
 
-from benchmarks.concealed.plant.build import Draft
-from benchmarks.concealed.plant.hidden import Kind, Values
-from benchmarks.concealed.plant.rig import CARRIED, LAG, LAG_RATE, STALL, STALL_ANGLE, STALL_DELAY, VORTEX, VORTEX_ANGLE
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.rig import (
+    CARRIED,
+    LAG,
+    LAG_RATE,
+    STALL,
+    STALL_ANGLE,
+    STALL_DELAY,
+    VORTEX,
+    VORTEX_ANGLE,
+)
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import Wing
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from benchmarks.concealed.plant.observe_law import Concealed, Parameters, strength
+from benchmarks.concealed.plant.law import Concealed, Parameters, strength
 from wingfit.records import Wing
 
 Array = npt.NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.compiled import compiled
-from benchmarks.concealed.plant.rig import BAND, BRAKE, STOP, Motion, Rig
-from benchmarks.concealed.plant.vectors import V3, ZERO, act, axis, cross, dot, plus, row, turned
+from benchmarks.concealed.plant.wing.rig import BAND, BRAKE, STOP, Motion, Rig
+from benchmarks.concealed.plant.wing.vectors import V3, ZERO, act, axis, cross, dot, plus, row, turned
 
 Array = npt.NDArray[np.float64]
 

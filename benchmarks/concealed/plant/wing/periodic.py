@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from benchmarks.concealed.plant.march import C, State, beat
-from benchmarks.concealed.plant.rig import Rig
+from benchmarks.concealed.plant.wing.integrator import C, State, beat
+from benchmarks.concealed.plant.wing.rig import Rig
 
 Array = npt.NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import math
 
 from scipy.optimize import brentq
 
-from benchmarks.concealed.plant.build import Draft
-from benchmarks.concealed.plant.geometry import Cut, Lump
-from benchmarks.concealed.plant.hidden import Kind, Values
-from benchmarks.concealed.plant.rig import DAHL, MAXWELL, SLIDER
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.geometry import Cut, Lump
+from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, SLIDER
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import Wing
 
 _SPECTRUM = ((0.5, 1.0), (0.5, 6.0))  # parts of the stiffness that relaxes, and their times in parts of the first

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.build import Draft
-from benchmarks.concealed.plant.hidden import Kind, Values
-from benchmarks.concealed.plant.linkage import series_of
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.linkage import series_of
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import FourBarDrive, Wing
 
 Complex = npt.NDArray[np.complex128]

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import resample
 
-from benchmarks.concealed.plant.build import Draft, rig_of, rod_table
-from benchmarks.concealed.plant.hidden import Effect, Hidden, Truth
-from benchmarks.concealed.plant.march import State
-from benchmarks.concealed.plant.rig import Rig, states_of
-from benchmarks.concealed.plant.settle import Accuracy, settle
+from benchmarks.concealed.plant.wing.build import Draft, rig_of, rod_table
+from benchmarks.concealed.plant.wing.integrator import State
+from benchmarks.concealed.plant.wing.periodic import Accuracy, settle
+from benchmarks.concealed.plant.wing.rig import Rig, states_of
+from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden, Truth
 from wingfit.records import Condition, Wing
 
 Array = npt.NDArray[np.float64]

@@ -2,51 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from benchmarks.concealed.plant.build import Draft
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
+from benchmarks.concealed.plant.wing_effects.kind import Family, Kind, Values
 from wingfit.records import Wing
-
-Array = npt.NDArray[np.float64]
-Family = Literal["structure", "inertia", "actuation", "aerodynamics"]
-Values = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of effect.
-
-    Attributes:
-        name: as in the tool's library if ``listed``, else the plant's own.
-        family: what sort of thing it is.
-        listed: whether the library has it.
-        unit: of its strength; ``typical``: a strength that is easily seen beside noise of half a millimetre.
-        largest: strength beyond which it makes no sense, or no periodic motion is sure to be found.
-        shape: other parameters by name, with typical value and range: (value, lower, upper).
-        source: where the law is from, and in which form.
-        put: changes a draft for a strength and the parameters; called once the wing is cut unless ``before`` is set.
-        genes: true values of the library's genes, of those that mean the same.
-        acting: how large it is [n] while its place is at heights [n] (m) and rises at rates [n] (m/s); only of effects
-            of which nothing but the motion tells when they act.
-    """
-
-    name: str
-    family: Family
-    listed: bool
-    unit: str
-    typical: float
-    largest: float
-    source: str
-    put: Callable[[Draft, float, Values], None]
-    shape: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    genes: Callable[[Wing, float, Values], dict[str, float]] | None = None
-    before: bool = False
-    acting: Callable[[Draft, Values, Array, Array], Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,10 +24,9 @@ class Effect:
     @property
     def kind(self) -> Kind:
         """Of it; ValueError where there is none of that name."""
-        kinds = _kinds()
-        if self.name not in kinds:
-            raise ValueError(f"the plant cannot hide {self.name!r}; it can hide {', '.join(kinds)}")
-        return kinds[self.name]
+        if self.name not in KINDS:
+            raise ValueError(f"the plant cannot hide {self.name!r}; it can hide {', '.join(KINDS)}")
+        return KINDS[self.name]
 
     @property
     def values(self) -> dict[str, float]:
@@ -111,7 +74,7 @@ class Hidden:
 
     def put_into(self, draft: Draft) -> None:
         """Cut the wing up and change it, kind after kind in the order of the catalogue."""
-        order = list(_kinds())
+        order = list(KINDS)
         present = [e for e in sorted(self.effects, key=lambda e: order.index(e.kind.name)) if e.strength != 0.0]
         for effect in present:
             if effect.kind.before:
@@ -145,10 +108,3 @@ def drawn(name: str, strength: float, rng: np.random.Generator) -> Effect:
     """An effect of a kind with all its other parameters drawn evenly from their ranges."""
     shape = Effect(name, strength).kind.shape
     return Effect(name, strength, {key: float(rng.uniform(low, high)) for key, (_, low, high) in shape.items()})
-
-
-def _kinds() -> dict[str, Kind]:
-    """The catalogue; it needs this module."""
-    from benchmarks.concealed.plant.catalogue import KINDS
-
-    return KINDS

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt
 
-from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters, check_known, strength
-from benchmarks.concealed.plant.observe_noise import COLOURS, Colour, coloured
+from benchmarks.concealed.plant.law import Concealed, Law, Parameters, check_known, strength
+from benchmarks.concealed.plant.measurement.noise import COLOURS, Colour, coloured
 from wingfit.records import Condition, Recording, Vehicle
 from wingfit.records.dataset import STANDARD_GRAVITY
 

@@ -15,14 +15,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.attached import point_loads
-from benchmarks.concealed.plant.band import factor, solve
 from benchmarks.concealed.plant.compiled import compiled
-from benchmarks.concealed.plant.matrix import assemble
-from benchmarks.concealed.plant.rig import AIR_STATES, Motion, Rig
-from benchmarks.concealed.plant.springs import joint_loads, remembered_loads
-from benchmarks.concealed.plant.stream import air_loads
-from benchmarks.concealed.plant.vectors import axis, cross, dot, plus, row, turn_by
+from benchmarks.concealed.plant.wing.air_loads import air_loads
+from benchmarks.concealed.plant.wing.banded import factor, solve
+from benchmarks.concealed.plant.wing.joint_loads import joint_loads, remembered_loads
+from benchmarks.concealed.plant.wing.point_loads import point_loads
+from benchmarks.concealed.plant.wing.rig import AIR_STATES, Motion, Rig
+from benchmarks.concealed.plant.wing.step_matrix import assemble
+from benchmarks.concealed.plant.wing.vectors import axis, cross, dot, plus, row, turn_by
 
 Array = npt.NDArray[np.float64]
 

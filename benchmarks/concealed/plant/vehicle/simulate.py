@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.observe_law import Concealed, check_known, strength
-from benchmarks.concealed.plant.vehicle_laws import (
+from benchmarks.concealed.plant.law import Concealed, check_known, strength
+from benchmarks.concealed.plant.vehicle.laws import (
     AFTERWARDS,
     CIRCULATION,
     GUSTS,

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.build import Draft
-from benchmarks.concealed.plant.hidden import Kind, Values
-from benchmarks.concealed.plant.linkage import angles
-from benchmarks.concealed.plant.rig import APPENDAGE, BAND, BRAKE, POINTS, STOP
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.linkage import angles
+from benchmarks.concealed.plant.wing.rig import APPENDAGE, BAND, BRAKE, POINTS, STOP
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 
 Array = npt.NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.geometry import Cut
+from benchmarks.concealed.plant.wing.geometry import Cut
 from wingfit.records import Rod
 
 Array = npt.NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""The matrix of Newton's iteration, M + h C + h^2 K: symmetric, its lower half in a band (:mod:`.band`)."""
+"""The matrix of Newton's iteration, M + h C + h^2 K: symmetric, its lower half in a band (:mod:`.banded`)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,21 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.compiled import compiled
-from benchmarks.concealed.plant.rig import BAND, BRAKE, CARRIED, KEEPS, MAXWELL, PARAMETER, STIFF, STOP, Motion, Rig
-from benchmarks.concealed.plant.springs import angle_between, dead_zone
-from benchmarks.concealed.plant.stream import carried, frame_of
-from benchmarks.concealed.plant.vectors import V3, ZERO, axis, cross, dot, plus, row, turned
+from benchmarks.concealed.plant.wing.air_loads import carried, frame_of
+from benchmarks.concealed.plant.wing.joint_loads import angle_between, dead_zone
+from benchmarks.concealed.plant.wing.rig import (
+    BAND,
+    BRAKE,
+    CARRIED,
+    KEEPS,
+    MAXWELL,
+    PARAMETER,
+    STIFF,
+    STOP,
+    Motion,
+    Rig,
+)
+from benchmarks.concealed.plant.wing.vectors import V3, ZERO, axis, cross, dot, plus, row, turned
 
 Array = npt.NDArray[np.float64]
 

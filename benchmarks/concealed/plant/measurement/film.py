@@ -12,9 +12,9 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from benchmarks.concealed.plant.observe_cameras import Cameras, Tracks, direction_values, draw_cameras, places, seen
-from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters, check_known, strength
-from benchmarks.concealed.plant.observe_noise import Noise, bursts, draw_noise, track_noise
+from benchmarks.concealed.plant.law import Concealed, Law, Parameters, check_known, strength
+from benchmarks.concealed.plant.measurement.cameras import Cameras, Tracks, direction_values, draw_cameras, places, seen
+from benchmarks.concealed.plant.measurement.noise import Noise, bursts, draw_noise, track_noise
 from wingfit.records import Condition, Recording, Wing
 
 Array = npt.NDArray[np.float64]

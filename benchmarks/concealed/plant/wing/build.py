@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant.geometry import Cut, Lump
-from benchmarks.concealed.plant.joints import Joint, joints, shares
-from benchmarks.concealed.plant.linkage import series_of
-from benchmarks.concealed.plant.march import C
-from benchmarks.concealed.plant.rig import AIR_LAWS, JETS, LAG, POINTS, STALL, Rig
+from benchmarks.concealed.plant.wing.geometry import Cut, Lump
+from benchmarks.concealed.plant.wing.integrator import C
+from benchmarks.concealed.plant.wing.joints import Joint, joints, shares
+from benchmarks.concealed.plant.wing.linkage import series_of
+from benchmarks.concealed.plant.wing.rig import AIR_LAWS, JETS, LAG, POINTS, STALL, Rig
 from wingfit.records import Condition, Drive, Wing
 
 Array = npt.NDArray[np.float64]
