@@ -1,7 +1,8 @@
-"""Where plants are recorded: datasets for the tool, answers for the seal.
+"""Record the trials: simulate and record each plant, save the dataset for the diagnosis, and seal the answer.
 
-What is drawn: parameters of the rig, conditions, quality of the recordings, shape of what is hidden. Its strength is
-searched, so that the scorer's refit leaves the misfit that is aimed at. The same trial gives the same bits.
+Parameters of the rig, conditions, recording quality and the shape of the hidden effect are drawn at random. The
+strength of the effect is searched, so that the scorer's refit of the nominal model leaves the misfit aimed at. The same
+trial always gives the same bits.
 """
 
 from __future__ import annotations
@@ -25,15 +26,15 @@ from wingfit.records import Condition, Dataset, Recording, load_dataset, save_da
 
 Array = npt.NDArray[np.float64]
 
-ATTEMPTS = 4  # draws of a trial, where the plant cannot run one
-ROUNDS = 8  # of a refit, at most: genes may take up nearly all of a mass by slow steps
-CORRECTIONS = 1  # of a strength by full refits; what then lacks, less noise makes up for
-LITTLE = 0.85  # of the d that is aimed at: what stays below is recorded with less noise, where cameras get as good
+ATTEMPTS = 4  # draws of a trial, if the plant cannot be simulated with the first ones
+ROUNDS = 8  # limit of a refit's iterations; genes that can imitate a mass almost completely converge slowly
+CORRECTIONS = 1  # full refits to correct a strength; the remaining error is corrected by lowering the noise
+LITTLE = 0.85  # fraction of the target d below which the noise is lowered, as far as real equipment allows
 
 
 @dataclass(frozen=True)
 class Order:
-    """A trial to be made: where its dataset goes, and in which folder its answer is sealed."""
+    """A trial to be recorded, the path of its dataset, and the folder for its sealed answer."""
 
     trial: Trial
     dataset: Path
@@ -42,7 +43,10 @@ class Order:
 
 @dataclass(frozen=True)
 class Addition:
-    """One more recording of a trial's rig under ``condition``: its dataset, and where the longer one goes."""
+    """One more recording of a trial's rig under ``condition``.
+
+    The path of its dataset, and that of the extended dataset.
+    """
 
     trial: Trial
     condition: Condition
@@ -53,10 +57,9 @@ class Addition:
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A rig on the bench: everything that its recordings are made of.
+    """A rig on its bench with everything that determines its recordings.
 
-    ``level`` multiplies the noise of the quality that was drawn. An ``ideal`` one is recorded without noise, and with
-    nothing missing; all else is the same.
+    ``level`` multiplies the noise that was drawn. An ``ideal`` specimen is recorded without noise and without gaps.
     """
 
     bench: Bench[Any, Any]
@@ -69,28 +72,31 @@ class Specimen:
 
     @cached_property
     def quality(self) -> Any:
-        """How well it is recorded."""
+        """Settings of cameras or balance."""
         drawn = self.bench.quality(np.random.default_rng([self.seed, self.attempt, 2]))
         return self.bench.ideal(drawn) if self.ideal else self.bench.quieter(drawn, self.level)
 
     @property
     def least_level(self) -> float:
-        """How far its noise can be lowered."""
+        """Smallest possible ``level``."""
         return self.bench.least(replace(self, level=1.0, ideal=False).quality)
 
     def made(self, number: int, condition: Condition) -> Made:
-        """Its recording ``number``, under ``condition``."""
+        """Recording ``number``, under ``condition``."""
         rng = np.random.default_rng([self.seed, self.attempt, 3, number])
         found = self.bench.recording(condition, self.genome, self.hidden, self.quality, rng)
         return found._replace(recording=replace(found.recording, name=name_of(condition)))
 
     def fitted(self, conditions: Sequence[Condition]) -> tuple[Recording, ...]:
-        """The first recordings, as they are fitted."""
+        """Recordings under ``conditions``, filtered as for a fit."""
         made = (self.made(number, condition).recording for number, condition in enumerate(conditions))
         return tuple(self.bench.fitted(one) for one in made)
 
     def secret(self, name: str, condition: Condition) -> Secret:
-        """What is told of one thing that is hidden; when it acts is read from the beat under ``condition``."""
+        """The hidden effect ``name`` as it goes into the answer.
+
+        Its phase is read from the beat under ``condition``.
+        """
         law, parameters = self.bench.laws[name], self.hidden[name]
         beat = self.bench.beat(condition, self.genome, self.hidden)
         return Secret(
@@ -106,12 +112,15 @@ class Specimen:
         )
 
     def noise(self, conditions: Sequence[Condition]) -> float:
-        """Root mean square of the noise in the first recordings, m or N."""
+        """RMS noise of the recordings under ``conditions``, m or N."""
         return rms(np.array([self.made(number, condition).noise for number, condition in enumerate(conditions)]))
 
 
 def make(order: Order) -> str:
-    """Record a trial and seal its answer; returns the answer's hash."""
+    """Record a trial, save its dataset and seal its answer; returns the SHA-256 of the answer.
+
+    RuntimeError if the plant cannot be simulated in any of ATTEMPTS draws.
+    """
     reasons = []
     for attempt in range(ATTEMPTS):
         try:
@@ -125,7 +134,7 @@ def make(order: Order) -> str:
 
 
 def add(order: Addition) -> None:
-    """Record one more condition of a trial's rig; the dataset is longer by it."""
+    """Record one more condition of a trial's rig, and save the dataset extended by it."""
     dataset, answer = load_dataset(order.dataset), read(order.sealed / f"{order.trial.name}.json")
     hidden = {secret.name: dict(secret.parameters) for secret in answer.secrets}
     bench = bench_of(order.trial.build)
@@ -174,11 +183,11 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """What is left of changes when the nominal model is refitted: of a bare specimen under the fitted conditions.
+    """Residuals of the refitted nominal model when something is hidden in a bare specimen, under the fitted conditions.
 
-    The plant is changed at the model's own division, which is cheaper and means the same. A strength is searched with
-    the genes' tangent about the true genome first, then by full refits, each of which may begin where one before ended
-    (``ends``: what it left, and where, by what is hidden).
+    The change due to a hidden effect is simulated with the discretisation of the model, which is cheaper and gives the
+    same change. A strength is searched first with the model linearised at the true genome, then by full refits.
+    ``ends`` caches RMS residual and genes at the end of each full refit; later refits can start from them.
     """
 
     bare: Specimen
@@ -191,7 +200,7 @@ class Strength:
 
     @classmethod
     def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
-        """The nominal model about the specimen's own genome."""
+        """Set up for ``bare``, with the nominal model at its own true genome."""
         ideal = replace(bare, ideal=True)
         coarse = replace(ideal, bench=bare.bench.coarse())
         recordings = ideal.fitted(fitted)
@@ -200,14 +209,17 @@ class Strength:
         return cls(ideal, tuple(fitted), refit, coarse, plain)
 
     def change(self, hidden: Concealed) -> Array:
-        """[D] that hiding ``hidden`` changes. It is remembered."""
+        """[D] change of all recordings due to ``hidden``, cached."""
         key = _key(hidden)
         if key not in self.changes:
             self.changes[key] = stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
         return self.changes[key]
 
     def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
-        """The specimen with each of ``drawn`` as strong as ``target`` asks; with less noise where it must."""
+        """The specimen with each effect of ``drawn`` at strength d = ``target``.
+
+        Its noise is lowered if that is not reached.
+        """
         hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
         for name, parameters in drawn.items():
             hidden[name], found = self._sized(name, parameters, target, noise)
@@ -218,7 +230,7 @@ class Strength:
     def _sized(
         self, name: str, parameters: Mapping[str, float], target: float, noise: float
     ) -> tuple[dict[str, float], float]:
-        """Parameters with the strength that leaves ``target`` times the noise, and what they leave."""
+        """Parameters with the strength whose refit leaves ``target`` times the noise, and the ratio that is reached."""
 
         def sized(size: float) -> dict[str, float]:
             return {**parameters, "strength": size * parameters["strength"]}
@@ -240,7 +252,10 @@ class Strength:
         return sized(size), found
 
     def final(self, specimen: Specimen) -> float:
-        """Root mean square that a full refit leaves of what is hidden, m or N; of a single thing it is known by now."""
+        """RMS residual of a full refit with everything hidden in ``specimen``, m or N.
+
+        For a single effect it is cached.
+        """
         hidden = specimen.hidden
         key = _key(hidden)
         if hidden and key not in self.ends:
@@ -252,9 +267,9 @@ class Strength:
         return self.ends[_key(hidden)][0]
 
     def division(self) -> float:
-        """The same of the plant with nothing hidden, linearly: by the model's division, and by what solvers differ.
+        """RMS residual of the linearised refit with nothing hidden, m or N: the effect of discretisation and solver.
 
-        At equal divisions only the solvers differ, and no refit is needed to see that it is little.
+        With equal discretisation only the solvers differ; that difference is small and is not refitted.
         """
         change = stacked(self.refit.recordings) - self.refit.nominal
         return rms(change) if self.coarse.bench is self.bare.bench else self.refit.linear(change)

@@ -1,4 +1,4 @@
-"""The tool as a user runs it: a dataset on disk goes in, a finding comes out. Nothing here knows an answer."""
+"""The diagnosis as a user runs it: a dataset on disk goes in, a finding comes out. No answer is known here."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wingfit.workers import make_evaluator
 
 @dataclass(frozen=True)
 class Task:
-    """What a user asks: a dataset, the division of a wing's model, and the terms that a vehicle's model lacks."""
+    """A request: a dataset, the division of a wing's model, and the terms that a vehicle's model leaves out."""
 
     trial: str
     dataset: Path
@@ -25,7 +25,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of it; ``reason`` is why there is no finding, and "" where there is one."""
+    """Result of a task; ``reason`` says why there is no finding, and is "" if there is one."""
 
     trial: str
     finding: Finding | None
@@ -34,7 +34,7 @@ class Outcome:
 
 
 def run(task: Task) -> Outcome:
-    """Diagnose in this process."""
+    """Diagnose in this process. An exception of the diagnosis becomes the ``reason``."""
     start, finding, reason = time.perf_counter(), None, ""
     calibration = CalibrationSpec(without=task.without)
     if task.division:
@@ -44,7 +44,7 @@ def run(task: Task) -> Outcome:
         for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration), evaluator):
             finding = progress.finding
         reason = "" if finding else "it ended without a finding"
-    except Exception as error:  # a crash of the tool is a failed trial, and the other trials go on
+    except Exception as error:  # a crash counts as a failed trial; the other trials continue
         finding, reason = None, f"{type(error).__name__}: {error}"
     finally:
         evaluator.close()

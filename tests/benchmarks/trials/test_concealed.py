@@ -212,9 +212,9 @@ def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
     assert figures["rates"]["null: false alarms"][:2] == [1, 2]
     assert len(at(marks, 5)) == 1
     rows = Table((*marks, replace(marks[0], division="4", plant="8x1")), advised, 1, 3.0).rows()
-    assert rows["wing 4 of 4: nulls without alarm"].startswith(" 50.0 %  (1 of 2")
-    assert rows["wing 4 of 8x1: nulls without alarm"].startswith("100.0 %  (1 of 1")
-    assert rows["wing 4 of 4: unlisted unnamed"].startswith(" 50.0 %  (1 of 2")
+    assert rows["wing 4 of 4: nulls without false alarm"].startswith(" 50.0 %  (1 of 2")
+    assert rows["wing 4 of 8x1: nulls without false alarm"].startswith("100.0 %  (1 of 1")
+    assert rows["wing 4 of 4: unlisted, left unnamed"].startswith(" 50.0 %  (1 of 2")
     json.dumps(figures)
 
 
