@@ -1,4 +1,4 @@
-"""What may be hidden in a vehicle, or on the way from a motion or a force into a recording."""
+"""Description of what can be hidden in a vehicle or in the measurement."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 
 Parameters = Mapping[str, float]
 Concealed = Mapping[str, Parameters]
-"""What is hidden: parameters by name of the law. "strength" is its size; at zero there is nothing."""
+"""Hidden effects: parameters by name of the law. "strength" is the size; at zero there is no effect."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """One thing that may be hidden.
+    """An effect or a fault that can be hidden.
 
     Attributes:
-        name: of the effect in the library that means the same; of what the library lacks, a name of its own.
+        name: of the library's effect with the same meaning, or a name of its own if the library has none.
         side: physics, or a fault of the measurement.
-        typical: strength at which it is as large as it is met in practice.
-        source: where it is from.
-        listed: whether the library has it.
+        typical: strength that is typical in practice.
+        source: literature.
+        listed: whether the library has the effect.
         both_signs: whether the strength may be negative.
-        shape: bounds between which each of its other parameters is drawn. Those called "span" and "chord" (parts) and
-            "phase" (beats) say where and when it acts.
-        values: genes of the library, by name, that mean the same as its parameters.
+        shape: range from which each other parameter is drawn. "span" and "chord" (fractions) and "phase" (beats) say
+            where and when the effect acts.
+        values: computes the library's genes with the same meaning, by name, from the parameters.
     """
 
     name: str
@@ -39,19 +39,19 @@ class Law:
     values: Callable[[Parameters], Mapping[str, float]] = lambda _: {}
 
     def draw(self, rng: np.random.Generator, size: float = 1.0) -> dict[str, float]:
-        """Parameters at random, the strength ``size`` times the typical one (of either sign where it may have it)."""
+        """Random parameters, with the strength ``size`` times the typical one and a random sign if both are allowed."""
         sign = rng.choice([-1.0, 1.0]) if self.both_signs else 1.0
         drawn = {name: float(rng.uniform(low, high)) for name, (low, high) in self.shape.items()}
         return {"strength": float(sign * size * self.typical), **drawn}
 
 
 def strength(concealed: Concealed, name: str) -> float:
-    """Strength of what is called ``name``; 0 where it is not hidden."""
+    """Strength of the effect ``name``; 0 if it is not hidden."""
     return concealed[name]["strength"] if name in concealed else 0.0
 
 
 def check_known(concealed: Concealed, laws: Mapping[str, Law]) -> None:
-    """ValueError for a name that is none of ``laws``, or parameters that are not its own."""
+    """ValueError for a name that is not in ``laws``, or for parameters that do not belong to it."""
     for name, parameters in concealed.items():
         if name not in laws:
             raise ValueError(f"nothing called {name!r} can be hidden here; there are {', '.join(laws)}")

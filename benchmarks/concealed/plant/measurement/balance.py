@@ -1,4 +1,7 @@
-"""From the forces of a vehicle to a recording of its balance: scatter of beats, mount, amplifier, noise, faults."""
+"""From the forces of a vehicle to a recording by a balance.
+
+Variation between beats, mount, amplifier, noise, faults.
+"""
 
 from __future__ import annotations
 
@@ -19,28 +22,28 @@ from wingfit.records.dataset import STANDARD_GRAVITY
 
 Array = npt.NDArray[np.float64]
 
-_FINER = 4  # samples that are computed for each that is kept
-_LEAD = 6  # beats before and after the recording, in which filters settle
-_STAGES = 4  # of an amplifier that delays
-_UNEQUAL = 0.9  # of a gain error: that of z over that of x
+_FINER = 4  # oversampling before the final decimation
+_LEAD = 6  # beats before and after the recording, for the filters' transients
+_STAGES = 4  # low-pass stages of a delaying amplifier
+_UNEQUAL = 0.9  # gain error of z relative to that of x
 _DECIMALS = 5
-_CUT = 0.4  # of the rate: what is above is filtered out before samples are dropped
+_CUT = 0.4  # cut-off of the filter before the decimation, relative to the sampling rate
 
 
 @dataclass(frozen=True)
 class Weighing:
-    """How forces are recorded. What is here is noise: none of it repeats with the beat.
+    """Settings of the balance. They describe noise: none of it repeats with the beat.
 
     Attributes:
-        colour, memory: of the sensor's noise, from sample to sample.
+        colour, memory: of the sensor's noise; memory is its lag-1 autocorrelation.
         sensor: its standard deviation, N.
-        rattle: standard deviation of what shakes the mount at its natural frequency, N.
+        rattle: standard deviation of vibrations of the mount at its natural frequency, N.
         mount: that frequency along x and z, Hz.
         wander: standard deviation of a slow drift, N.
-        scatter: of the force from beat to beat, relative.
-        jitter: of the instant at which a beat begins, beats.
+        scatter: relative variation of the force between beats.
+        jitter: variation of the start of a beat, beats.
         rate: samples per second.
-        beats: in a recording.
+        beats: number of beats in a recording.
     """
 
     colour: Colour
@@ -56,7 +59,7 @@ class Weighing:
 
 
 class Weighed(NamedTuple):
-    """A recording, the same without noise [T, C], and the root mean square of the noise, N (of all frequencies)."""
+    """A recording, the same without noise [T, C], and the RMS of the noise (N, all frequencies)."""
 
     recording: Recording
     clean: Array
@@ -64,7 +67,7 @@ class Weighed(NamedTuple):
 
 
 def draw_weighing(rng: np.random.Generator) -> Weighing:
-    """Any balance like the one of Armanini et al. (2016, sect. 3.2)."""
+    """A random balance similar to that of Armanini et al. (2016), section 3.2."""
     colours = [c for c in COLOURS if c != "shake"]
     low = [0.0, 8e-4, 4e-3, 105.0, 85.0, 2e-4, 0.008, 2e-4]
     high = [0.7, 2.5e-3, 1e-2, 150.0, 120.0, 6e-4, 0.025, 6e-4]
@@ -74,7 +77,7 @@ def draw_weighing(rng: np.random.Generator) -> Weighing:
 
 
 def silent(weighing: Weighing) -> Weighing:
-    """The same balance without any noise."""
+    """The same balance without noise."""
     return replace(weighing, sensor=0.0, rattle=0.0, wander=0.0, scatter=0.0, jitter=0.0)
 
 
@@ -90,7 +93,7 @@ def weigh(
 ) -> Weighed:
     """Record the periodic ``forces`` [n, 2] along body x and z (N, from t* = 0) of a vehicle on a balance.
 
-    ``hidden`` are parameters of what is wrong, by names of :data:`FAULTS`. The draws of ``rng`` do not depend on it.
+    ``hidden``: parameters of the faults, by name as in :data:`FAULTS`. The draws of ``rng`` do not depend on them.
     """
     hidden = hidden or {}
     check_known(hidden, FAULTS)
@@ -105,7 +108,7 @@ def weigh(
 def _measured(
     forces: Array, vehicle: Vehicle, air: Condition, weighing: Weighing, hidden: Concealed, rng: np.random.Generator
 ) -> Array:
-    """[T, 2] in N at the rate of the recording."""
+    """[T, 2] in N at the recording's rate."""
     fine, frequency = weighing.rate * _FINER, air.flap_frequency
     kept = math.ceil(weighing.beats * weighing.rate / frequency)
     lead = round(_LEAD * weighing.rate / frequency) * _FINER
@@ -123,12 +126,12 @@ def _measured(
 
 
 def _clock(t: Array, hidden: Concealed) -> Array:
-    """Instants at which samples are truly taken."""
+    """True sampling times."""
     return np.asarray(t * (1.0 + strength(hidden, "strobe_rate")) + strength(hidden, "clock_offset"))
 
 
 def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
-    """Unit noise with one value in the middle of each beat and a smooth curve through them; ``at`` [T] in beats."""
+    """Unit noise with one value in the middle of each beat and a smooth curve between; ``at`` [T] in beats."""
     first = math.floor(at[0]) - 3
     count = math.ceil(at[-1]) - first + 4
     values = coloured("first_order", memory, (count,), rng)
@@ -136,21 +139,22 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _noise(weighing: Weighing, count: int, fine: float, rng: np.random.Generator) -> Array:
-    """Rattle of the mount, and a slow wander."""
+    """Vibration of the mount, and a slow drift."""
     out = np.empty((count, 2))
     for k, natural in enumerate(weighing.mount):
         b, a = _mount(natural, 0.02, fine)
         shaken = lfilter(b, a, rng.standard_normal(count))
         slow = np.cumsum(rng.standard_normal(count))
-        slow -= np.linspace(slow[0], slow[-1], count)  # a bridge: it comes back to where it was
+        slow -= np.linspace(slow[0], slow[-1], count)  # a Brownian bridge: it ends where it began
         out[:, k] = weighing.rattle * shaken / shaken.std() + weighing.wander * (slow - slow.mean()) / slow.std()
     return out
 
 
 def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
-    """Filter from the force on a mass to what its spring and damper pass on, the force being held between samples.
+    """Filter from the force on a mass to the force that its spring and damper transmit.
 
-    x'' + 2 zeta w x' + w^2 x = F, and w^2 x + 2 zeta w x' is measured (Den Hartog 1956, transmissibility).
+    x'' + 2 zeta w x' + w^2 x = F, and w^2 x + 2 zeta w x' is measured (Den Hartog 1956, transmissibility). The force is
+    held between samples.
     """
     w = 2.0 * math.pi * natural
     numerator, denominator = [2.0 * damping * w, w * w], [1.0, 2.0 * damping * w, w * w]
@@ -159,10 +163,10 @@ def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
 
 
 def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
-    """Axes, mount and amplifier, in time."""
+    """Axes, mount and amplifier, in the time domain."""
     if strength(hidden, "balance_tilt"):
         a = strength(hidden, "balance_tilt")
-        forces = forces @ np.array([[1.0, a], [-a, 1.0]])  # a matrix of calibration that knows no cross-talk
+        forces = forces @ np.array([[1.0, a], [-a, 1.0]])  # cross-talk that the calibration matrix omits
     if strength(hidden, "balance_resonance"):
         p = hidden["balance_resonance"]
         b, a_ = _mount(p["frequency"], p["damping"], rate)
@@ -170,8 +174,8 @@ def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
         forces = forces + p["strength"] * (swung - forces)
     if strength(hidden, "filter_delay"):
         held = strength(hidden, "filter_delay") * rate / _STAGES
-        slow = held / (1.0 + held)  # an implicit step of 1 / (1 + tau s / 4): its delay is exact
-        for _ in range(_STAGES):  # four alike, one after the other
+        slow = held / (1.0 + held)  # an implicit step of 1 / (1 + tau s / 4), with exact delay
+        for _ in range(_STAGES):  # four equal stages in series
             forces = lfilter([1.0 - slow], [1.0, -slow], forces - forces[0], axis=0) + forces[0]
     if strength(hidden, "dry_friction"):
         forces = _stuck(forces, hidden["dry_friction"])
@@ -179,7 +183,7 @@ def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
 
 
 def _stuck(forces: Array, p: Parameters) -> Array:
-    """A pivot that sticks: what is shown follows the force at a distance (the play operator, Krejci 1996)."""
+    """A pivot with stiction: the output follows the force at a distance (the play operator, Krejci 1996)."""
     reach, out = p["strength"], np.empty_like(forces)
     shown = forces[0]
     for t, force in enumerate(forces):
@@ -189,7 +193,7 @@ def _stuck(forces: Array, p: Parameters) -> Array:
 
 
 def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Array:
-    """Gain, end of the range, zero and drift of what is shown."""
+    """Gain, saturation, zero error and drift of the output."""
     gain = 1.0 + strength(hidden, "scale_error") * np.array([1.0, _UNEQUAL])
     forces = forces * gain
     if strength(hidden, "clipping"):
@@ -227,11 +231,11 @@ FAULTS = {
             shape={"frequency": (45.0, 90.0), "damping": (0.02, 0.06)},
         ),
         _listed("filter_delay", typical=1.5e-3, source="four equal stages (Tietze, Schenk and Gamm 2008)"),
-        _listed("balance_offset", typical=5e-3, source="a zero of its own, N (AIAA R-091A 2020)", shape=_WAY),
+        _listed("balance_offset", typical=5e-3, source="zero error, N (AIAA R-091A 2020)", shape=_WAY),
         _listed(
             "balance_drift",
             typical=4e-3,
-            source="creep of gauges as the logarithm of time (Doebelin 2004)",
+            source="creep of strain gauges, logarithmic in time (Doebelin 2004)",
             shape={"time": (0.1, 0.5)} | _WAY,
         ),
         _listed("scale_error", typical=0.05, source="gains of both axes, unequal (AIAA R-091A 2020)", both_signs=True),
@@ -245,11 +249,11 @@ FAULTS = {
         _listed(
             "strobe_rate",
             typical=4e-4,
-            source="a clock that is off",
+            source="clock error",
             both_signs=True,
             values=lambda p: {"strobe_rate.part": p["strength"]},
         ),
         _unlisted("dry_friction", typical=0.02, source="play operator (Krejci 1996)"),
-        _unlisted("clipping", typical=0.5, source="an amplifier at the end of its range, rounded"),
+        _unlisted("clipping", typical=0.5, source="saturation of an amplifier, rounded"),
     )
 }

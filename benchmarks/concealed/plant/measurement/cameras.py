@@ -1,4 +1,4 @@
-"""Two real cameras: pinhole projection, what may be wrong with it, and the intersection of the rays that come back."""
+"""Two cameras: pinhole projection, its possible faults, and the intersection of the rays."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from wingfit.records import Wing
 Array = npt.NDArray[np.float64]
 Tracks = Callable[[Array], Array]  # true positions [T, M, 3] at phases [T, M] in beats
 
-_SAME = 0.995  # the second camera is off by this part of what the first is: their mount is not quite stiff
-_ROUNDS = 4  # of the instant at which a row is read
-_SOFT = 0.02  # of the span: over this a ray goes from one pane to the other
-_GLARE = (0.08, 0.12, 0.05)  # of span, chord and beat over which glare falls off
+_SAME = 0.995  # error of the second camera relative to the first: their mount is slightly flexible
+_ROUNDS = 4  # iterations for the instant at which a row is read
+_SOFT = 0.02  # width of the joint between two panes, as a fraction of the span
+_GLARE = (0.08, 0.12, 0.05)  # extent of glare, as fractions of span, chord and beat
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Cameras:
 
     Attributes:
         centres: [2, 3] m, in the wing frame.
-        middle: [2, 2], where the middle of each image lies, in focal lengths from the camera's axis: the lenses are
-            shifted so that both images show the wing, and are true or false about this point.
+        middle: [2, 2], the middle of each image in focal lengths from the camera's axis. The lenses are shifted so that
+            both images show the wing; distortion is relative to this point.
         axes: [2, 3, 3]: rows are right, down and forward of each camera in the wing frame. Rows of an image run along
             the chord, columns along the span.
-        span: of the wing, m; height of an image is that of the span at the distance of the cameras.
+        span: of the wing, m; an image shows a height of one span at the distance of the wing.
     """
 
     centres: Array
@@ -45,7 +45,7 @@ class Cameras:
         return np.asarray(seen[..., :2] / seen[..., 2:] - self.middle[k])
 
     def points(self, images: tuple[Array, Array]) -> Array:
-        """Points [..., 3] half-way between both rays where they pass each other."""
+        """Points [..., 3] midway between the two rays at their closest approach."""
         whole = [image + middle for image, middle in zip(images, self.middle, strict=True)]
         rays = [np.concatenate([image, np.ones((*image.shape[:-1], 1))], axis=-1) for image in whole]
         one, two = (
@@ -60,12 +60,12 @@ class Cameras:
 
     @property
     def distance(self) -> float:
-        """Height over the wing, m."""
+        """Height above the wing, m."""
         return float(self.centres[:, 2].mean())
 
 
 def draw_cameras(wing: Wing, rng: np.random.Generator) -> Cameras:
-    """Two cameras above the wing, side by side along the span, that look down and a little towards each other."""
+    """Two cameras above the wing, side by side along the span, looking down and slightly towards each other."""
     aim = np.mean([marker.position for marker in wing.markers], axis=0) * [1.0, 1.0, 0.0]
     height, base, lean = (float(v) for v in rng.uniform([2.05, 0.3, 0.0], [2.8, 0.5, 0.1]))
     height *= wing.span
@@ -77,7 +77,7 @@ def draw_cameras(wing: Wing, rng: np.random.Generator) -> Cameras:
 
 
 def seen(tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, wing: Wing, hidden: Concealed) -> Array:
-    """What the pair makes [T, M, 3] of ``tracks`` at ``beats`` [T], with what is ``hidden`` in the images."""
+    """Positions [T, M, 3] that the pair measures of ``tracks`` at ``beats`` [T], with the faults ``hidden``."""
     images = [_image(tracks, beats, frequency, cameras, k, wing, hidden) for k in (0, 1)]
     return _assumed(cameras, wing, hidden).points((images[0], images[1]))
 
@@ -85,13 +85,13 @@ def seen(tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, wing:
 def _image(
     tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, k: int, wing: Wing, hidden: Concealed
 ) -> Array:
-    """Image [T, M, 2] of all markers in camera ``k``, as whoever reads it takes it."""
+    """Image [T, M, 2] of all markers in camera ``k``, as it is interpreted."""
     at = np.repeat(beats[:, None], len(wing.markers), axis=1)
     if k == 1:
         at = at + strength(hidden, "camera_desync") * frequency
     points = tracks(at)
     readout = strength(hidden, "rolling_shutter") * frequency
-    for _ in range(_ROUNDS if readout else 0):  # a marker is seen when the row is read in which it then is
+    for _ in range(_ROUNDS if readout else 0):  # a marker is imaged when the row in which it lies is read
         rows = cameras.image(points, k)[..., 1] * -cameras.distance / cameras.span
         points = tracks(at + readout * rows)
     image = cameras.image(points, k)
@@ -111,7 +111,7 @@ def divided(image: Array, amount: float) -> Array:
 
 
 def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
-    """The cameras as they are taken to stand; the origin of the frame is set anew at the hinge."""
+    """The cameras where they are assumed to be; the origin of the frame is placed at the hinge again."""
     hinge = np.array([0.0, wing.hinge.y, wing.hinge.z])
     centres, axes = cameras.centres - hinge, cameras.axes
     if strength(hidden, "camera_rotation"):
@@ -120,7 +120,7 @@ def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
         centres = np.array([turn.apply(centre) for turn, centre in zip(turns[:1] * 2, centres, strict=True)])
         axes = np.array([axis @ turn.as_matrix().T for turn, axis in zip(turns, axes, strict=True)])
     if strength(hidden, "scale_error"):
-        centres = centres * (1.0 + strength(hidden, "scale_error"))  # their distance is taken for longer
+        centres = centres * (1.0 + strength(hidden, "scale_error"))  # their distance is overestimated
     if strength(hidden, "camera_shift"):
         p = hidden["camera_shift"]
         centres = centres + p["strength"] * _direction(p) * np.array([[1.0], [_SAME]])
@@ -134,15 +134,15 @@ def _direction(p: Parameters) -> Array:
 
 
 def direction_values(name: str, p: Parameters) -> dict[str, float]:
-    """Genes x, y and z of a library's effect that is a vector."""
+    """Genes x, y and z of the library's effect that is a vector."""
     return {f"{name}.{axis}": float(p["strength"] * u) for axis, u in zip("xyz", _direction(p), strict=True)}
 
 
 def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """The window has two panes: what lies outboard of their joint is seen through a tilted one, and so displaced.
+    """Displacement of points outboard of a joint in the window, seen through a tilted second pane.
 
     A plate of thickness d shifts a ray by d sin(i) (1 - cos(i) / sqrt(n^2 - sin^2 i)) (Born and Wolf 1999, sect. 1.5),
-    nearly the same for all that come through it; ``strength`` is this shift at the wing, m.
+    nearly the same for all rays through it; ``strength`` is this shift at the wing, m.
     """
     joint = wing.stations[0].y + p["span"] * wing.span
     part = 0.5 * (1.0 + np.tanh((points[..., 1] - joint) / (_SOFT * wing.span)))
@@ -151,7 +151,7 @@ def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> 
 
 
 def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """A lamp's reflection runs over a part of the skin at one phase: the centroids of markers there go after it."""
+    """The reflection of a lamp crosses part of the skin at one phase and attracts the centroids of markers there."""
     span, chord = places(wing).T
     apart = (beats - p["phase"] + 0.5) % 1.0 - 0.5
     near = ((span - p["span"]) / _GLARE[0]) ** 2 + ((chord - p["chord"]) / _GLARE[1]) ** 2
@@ -160,7 +160,7 @@ def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
 
 
 def places(wing: Wing) -> Array:
-    """Place [M, 2] of every marker at rest, in parts of the span and of the chord there."""
+    """Place [M, 2] of every marker at rest, as fractions of the span and of the local chord."""
     rest = np.array([marker.position for marker in wing.markers])
     y, edge, chord = (np.array([getattr(s, name) for s in wing.stations]) for name in ("y", "leading_edge", "chord"))
     along = (rest[:, 0] - np.interp(rest[:, 1], y, edge)) / np.interp(rest[:, 1], y, chord)

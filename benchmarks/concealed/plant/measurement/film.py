@@ -21,11 +21,11 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Mode = Literal["strobe", "fast"]
 
-_KEPT_REFERENCES = 4  # reference markers that are never lost: without them no beat can be placed
+_KEPT_REFERENCES = 4  # reference markers that are never lost: the start of a beat is defined by them
 _DECIMALS = 5  # of positions in m
-_AROUND = 8  # markers that show how the skin about one of them is turned
+_AROUND = 8  # neighbours from which the rotation of the skin at a marker is computed
 _SWAP_FRAMES = 8.0  # mean length of a swap
-_WANDER = 0.15  # of a clock's error: part of it that grows, instead of being constant
+_WANDER = 0.15  # fraction of a clock error that grows with time; the rest is constant
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,12 @@ class Filming:
 
     Attributes:
         noise: of the tracks.
-        mode: "strobe": each frame is from another beat, a little earlier in it than the last; "fast": frames of one
-            beat after the other.
+        mode: "strobe": each frame is of another beat, at a slightly earlier phase than the last; "fast": consecutive
+            frames of each beat.
         beats: apparent beats of a strobe, real ones of a fast camera.
-        per_beat: frames in a beat; of a fast camera not quite a whole number.
-        lost: markers that are never seen.
-        gap_rate: probability in a frame that a marker is lost for a while.
+        per_beat: frames in a beat; not quite an integer for a fast camera.
+        lost: number of markers that are never visible.
+        gap_rate: probability per frame that a marker is lost for a while.
         gap_frames: mean length of such a gap.
     """
 
@@ -53,7 +53,7 @@ class Filming:
 
 
 class Filmed(NamedTuple):
-    """A recording, the same without noise [T, C] (m; with the same gaps), and the root mean square of its noise, m."""
+    """A recording, the same without noise [T, C] (m, with the same gaps), and the RMS of the noise, m."""
 
     recording: Recording
     clean: Array
@@ -61,7 +61,7 @@ class Filmed(NamedTuple):
 
 
 def draw_filming(rng: np.random.Generator, mode: Mode | None = None) -> Filming:
-    """Any way to film; mostly with a strobe."""
+    """Random settings; in three of four cases a strobe."""
     drawn: Mode = "strobe" if rng.uniform() < 0.75 else "fast"
     beats, per_beat, lost = (int(n) for n in rng.integers([2, 24, 5], [5, 37, 13]))
     rate, frames = (float(g) for g in rng.uniform([0.002, 3.0], [0.012, 8.0]))
@@ -83,13 +83,13 @@ def film(
 
     Args:
         tracks: all markers of ``wing`` over one beat, [n, M, 3] in m at n equal steps from drive phase 0.
-        wing: what was filmed.
-        condition: under which.
-        filming: how.
-        rng: of everything that is left to chance; the same draws whatever is hidden, and whatever the noise.
-        hidden: parameters of what is wrong, by names of :data:`FAULTS`.
+        wing: that is filmed.
+        condition: of the recording.
+        filming: settings.
+        rng: source of all random numbers; the draws depend neither on what is hidden nor on the noise.
+        hidden: parameters of the faults, by name as in :data:`FAULTS`.
         name: of the recording.
-        cameras: that look on; drawn if not given. A campaign is filmed by one pair.
+        cameras: drawn if not given; a campaign is filmed by one pair.
     """
     hidden = hidden or {}
     check_known(hidden, FAULTS)
@@ -115,7 +115,7 @@ def film(
 
 
 def _between(tracks: Array) -> Tracks:
-    """Positions [T, M, 3] of each marker at phases [T, M] of its own, by cubic splines through ``tracks`` [n, M, 3]."""
+    """Positions [T, M, 3] of each marker at its own phases [T, M], by cubic splines through ``tracks`` [n, M, 3]."""
     steps, columns = len(tracks), np.arange(tracks.shape[1])
     motion = CubicSpline(np.arange(steps + 1) / steps, np.concatenate([tracks, tracks[:1]]), 0, "periodic")
 
@@ -130,7 +130,7 @@ def _between(tracks: Array) -> Tracks:
 
 
 def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Array:
-    """Instants of the frames, s. The frames of a fast camera fall between those of the beat before."""
+    """Times of the frames, s. The frames of a fast camera fall between those of the beat before."""
     odd = rng.uniform(0.2, 0.8)
     if filming.mode == "strobe":
         rate, frames = frequency * (filming.per_beat + 1) / filming.per_beat, (filming.per_beat + 1) * filming.beats
@@ -140,14 +140,14 @@ def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Arra
 
 
 def _beats(times: Array, frequency: float, hidden: Concealed) -> Array:
-    """True phase at ``times`` in beats: what runs too fast by ``strength`` does so more and more, a little."""
+    """True phase at ``times`` in beats, with a clock that is fast by ``strength`` and drifts slightly."""
     late = times - times.mean()
     fast = strength(hidden, "strobe_rate") * (1.0 + _WANDER * late / (np.ptp(times) + 1e-12))
     return np.asarray(frequency * (times + fast * late))
 
 
 def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) -> list[int]:
-    """Markers that are seen: those that a fault concerns are among them, and some of reference."""
+    """Visible markers; they include those that a fault concerns and some reference markers."""
     order = [int(k) for k in rng.permutation(len(wing.markers))]
     references = [k for k in order if wing.markers[k].name in wing.reference_markers][:_KEPT_REFERENCES]
     concerned = [k for name in ("marker_slip", "marker_swap") if name in hidden for k in _pair(wing, hidden[name])]
@@ -156,7 +156,7 @@ def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) ->
 
 
 def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
-    """The marker next to a place, and its next neighbour."""
+    """The marker nearest to a place, and its nearest neighbour."""
     rest = np.array([marker.position for marker in wing.markers])
     part = places(wing)
     one = int(np.hypot(part[:, 0] - p["span"], (part[:, 1] - p["chord"]) * 0.4).argmin())
@@ -164,7 +164,7 @@ def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
 
 
 def _slipped(tracks: Array, wing: Wing, hidden: Concealed) -> Array:
-    """One marker moved along the skin, which turns as those around it show (Kabsch 1976)."""
+    """One marker displaced along the skin, whose rotation follows from the neighbouring markers (Kabsch 1976)."""
     if not strength(hidden, "marker_slip"):
         return tracks
     p = hidden["marker_slip"]
@@ -179,7 +179,7 @@ def _slipped(tracks: Array, wing: Wing, hidden: Concealed) -> Array:
 
 
 def _swaps(frames: int, part: float, rng: np.random.Generator) -> Bools:
-    """Frames [T] in which two names are exchanged: bursts that make up the ``part`` of all."""
+    """Frames [T] in which two names are exchanged: bursts that make up the fraction ``part`` of all."""
     wanted = round(min(part, 1.0) * frames)
     changed = np.zeros(frames, bool)
     dice = rng.spawn(1)[0]
@@ -190,7 +190,7 @@ def _swaps(frames: int, part: float, rng: np.random.Generator) -> Bools:
 
 
 def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> Array:
-    """Two neighbours have each other's name in some ``frames`` [T]."""
+    """Exchange the names of two neighbouring markers in ``frames`` [T]."""
     if not frames.any():
         return tracks
     one, other = _pair(wing, hidden["marker_swap"])
@@ -200,7 +200,7 @@ def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> A
 
 
 def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
-    """The mount of the cameras warms up under the lamps and bends, over and over as they are put on (Fraser 1997)."""
+    """The mount of the cameras bends as the lamps warm it, each time they are switched on (Fraser 1997)."""
     if not strength(hidden, "thermal_creep"):
         return tracks
     p = hidden["thermal_creep"]
@@ -210,13 +210,14 @@ def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
 
 
 def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
-    """A Kalman filter run over the frames: position, velocity and acceleration, the jerk being white noise.
+    """A Kalman filter over the frames: position, velocity and acceleration, with white noise as jerk.
 
-    Its covariance is the continuous one of Bar-Shalom, Li and Kirubarajan (2001, sect. 6.2.3), with the deviation of
-    the jerk one over ``strength`` in deviations of the measurement and frames. Through a gap it goes straight on.
+    Its covariance is the continuous one of Bar-Shalom, Li and Kirubarajan (2001, sect. 6.2.3); the standard deviation
+    of the jerk is 1 / ``strength`` in units of the measurement's standard deviation and of frames. In a gap it
+    extrapolates.
     """
     if not strength(hidden, "tracker_lag"):
-        return tracks.copy()  # and with a jerk that may be anything it follows every frame
+        return tracks.copy()  # with unlimited jerk the filter follows every frame
     F = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
     Q = (
         np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
@@ -234,7 +235,7 @@ def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
 
 
 def _started(tracks: Array) -> Array:
-    """Position, velocity and acceleration [3, M, 3] one frame before the first, by what the first few show."""
+    """Position, velocity and acceleration [3, M, 3] one frame before the first, from the first few frames."""
     first = np.polyfit(np.arange(1, 6), tracks[:5].reshape(5, -1), 2)[::-1] * np.array([[1.0], [1.0], [2.0]])
     return np.asarray(first.reshape(3, *tracks.shape[1:]))
 
@@ -289,7 +290,7 @@ FAULTS = {
         _listed(
             "strobe_rate",
             typical=1e-4,
-            source="a clock that is off and drifts (Allan 1966)",
+            source="a clock with offset and drift (Allan 1966)",
             both_signs=True,
             values=lambda p: {"strobe_rate.part": p["strength"]},
         ),
@@ -308,5 +309,5 @@ FAULTS = {
 
 
 def with_noise(filming: Filming, level: float) -> Filming:
-    """The same with another root mean square of the noise, m."""
+    """The same settings with another RMS noise, m."""
     return replace(filming, noise=replace(filming.noise, level=level))

@@ -1,4 +1,4 @@
-"""Noise of trackers and balances, of several colours: none of them is told to whoever reads the recording."""
+"""Noise of trackers and balances, of several colours. The reader of a recording does not know the colour."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Bools = npt.NDArray[np.bool_]
 
 Colour = Literal["first_order", "wavy", "pink", "heavy", "shake"]
 COLOURS: tuple[Colour, ...] = get_args(Colour)
-_SETTLE = 400  # samples before the first, in which a filter forgets its start
+_SETTLE = 400  # samples before the first, for the filter's transient
 _TAILS = 5.0  # degrees of freedom of Student's t: a kurtosis of 9
-_TURN, _MOVING_AVERAGE = 0.7, 0.4  # rad a sample of the pair of poles, and the zero, of wavy noise
-_DEPTH = 1.5  # noise along z, away from the cameras, in parts of that along x and y
+_TURN, _MOVING_AVERAGE = 0.7, 0.4  # of wavy noise: angle of the poles in rad per sample, and the zero
+_DEPTH = 1.5  # noise along z, away from the cameras, relative to that along x and y
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,13 @@ class Noise:
     """Noise of tracks.
 
     Attributes:
-        colour: "first_order" autoregressive; "wavy" ARMA(2, 1), with a pair of complex poles; "pink", its power falling
-            as the frequency; "heavy", first order with Student's t for its source; "shake", first order, of which a
-            part is of the cameras and common to all markers.
-        level: root mean square over all coordinates, m.
-        memory: size of the pole or poles, 0 to 0.9; of pink noise nothing.
-        common: part of the variance that all markers share, of "shake".
+        colour: "first_order" autoregressive; "wavy" ARMA(2, 1), with a pair of complex poles; "pink", power inversely
+            proportional to frequency; "heavy", first order with innovations from Student's t; "shake", first order,
+                partly
+            common to all markers because the cameras move.
+        level: RMS over all coordinates, m.
+        memory: modulus of the pole or poles, 0 to 0.9; not used by pink noise.
+        common: fraction of the variance that all markers share, in "shake".
     """
 
     colour: Colour
@@ -41,14 +42,14 @@ class Noise:
 
 
 def draw_noise(rng: np.random.Generator) -> Noise:
-    """Of any colour, 0.2 to 0.8 mm."""
+    """Random colour, 0.2 to 0.8 mm."""
     colour = COLOURS[int(rng.integers(len(COLOURS)))]
     level, memory, common = rng.uniform([2e-4, 0.0, 0.3], [8e-4, 0.8, 0.7])
     return Noise(colour, float(level), float(memory), float(common))
 
 
 def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generator) -> Array:
-    """Noise of tracks [frames, markers, 3] in m: depth is the worst, and some markers are worse than others."""
+    """Noise of tracks [frames, markers, 3] in m, largest in depth, and larger for some markers than for others."""
     each = coloured(noise.colour, noise.memory, (frames, markers, 3), rng)
     if noise.colour == "shake":
         shared = coloured("first_order", noise.memory, (frames, 1, 3), rng)
@@ -58,7 +59,10 @@ def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generato
 
 
 def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Noise along the first axis of ``shape``, of expected variance one; shaken noise is what is not common."""
+    """Noise along the first axis of ``shape``, with expected variance one.
+
+    For "shake" only the part that is not common.
+    """
     if colour == "pink":
         return _pink(shape, rng)
     longer = (shape[0] + _SETTLE, *shape[1:])
@@ -76,7 +80,7 @@ def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.rand
 
 
 def _pink(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Power as one over frequency, down to one wave in four times the recording; it is level below."""
+    """Noise with power 1 / f, constant below one period in four times the recording."""
     longer = 4 * shape[0]
     k = np.arange(longer // 2 + 1)
     gain = 1.0 / np.sqrt(np.maximum(k, 1))
@@ -88,7 +92,7 @@ def _pink(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 
 
 def bursts(shape: tuple[int, int], rate: float, length: float, rng: np.random.Generator) -> Bools:
-    """True in bursts along the first axis: they begin with probability ``rate``, and last ``length`` on average."""
+    """True in bursts along the first axis; they begin with probability ``rate`` and last ``length`` on average."""
     starts = rng.uniform(size=shape) < rate
     lasting = rng.geometric(1.0 / length, shape)
     left = np.zeros(shape[1], int)

@@ -1,4 +1,4 @@
-"""What may be hidden in the flapping vehicle: laws from their sources, in another form than the library has them."""
+"""Effects that can be hidden in the flapping vehicle, with laws of another form than the library's."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _NONE = np.zeros((0, 0), complex)
-_LAG_STEPS = 120  # of a beat, at which the late part of circulation is integrated
+_LAG_STEPS = 120  # steps per beat of the integral over past circulation
 
 
 @dataclass(frozen=True)
 class Flow:
-    """How the elements of one side move through the air over a beat, [n] instants by [E] elements.
+    """Motion of the blade elements of one side through the air over a beat, [n] instants by [E] elements.
 
     Attributes:
         t: beats from the start of the beat.
@@ -35,8 +35,8 @@ class Flow:
         zeta, rate, acceleration: flap angle and its derivatives [n].
         level: cosine of the wing's angle to the horizontal [n].
         theta, turn, turn_rate: pitch and its derivatives [n, E].
-        own, own_rate: velocity, in axes of the stroke, by what is prescribed, and its rate [n, E].
-        peel, peeled: part of each instant in which the wings peel, and of the chord that has come apart [n].
+        own, own_rate: prescribed velocity in axes of the stroke, and its rate [n, E].
+        peel, peeled: fraction of each instant in which the wings peel, and of the chord that has separated [n].
         met: velocity through the air in axes of the chord, with all inflow and gusts [n, E].
     """
 
@@ -60,16 +60,19 @@ class Flow:
     met: Complex = field(default_factory=lambda: _NONE)
 
     def turned(self, q: Complex) -> Complex:
-        """``q`` [n, E] from axes of the stroke to those of the chord, or back."""
+        """Transform ``q`` [n, E] from axes of the stroke to those of the chord, or back."""
         return np.asarray(1j * np.exp(-1j * self.theta) * np.conj(q))
 
     @property
     def speed(self) -> Array:
-        """Of the air that an element meets, m/s [n, E]; never zero."""
+        """Airspeed of each element, m/s [n, E]; never zero."""
         return np.abs(self.met) + 1e-12
 
     def travelled(self, speed: Array) -> Array:
-        """Half chords from the start of the beat [n + 1, E] at ``speed`` [n, E]; the last row is a whole beat."""
+        """Distance in half chords from the start of the beat [n + 1, E] at ``speed`` [n, E].
+
+        The last row is a whole beat.
+        """
         step = 1.0 / (self.frequency * len(self.t))
         closed = np.concatenate([speed, speed[:1]])
         way = np.cumsum(0.5 * (closed[1:] + closed[:-1]), axis=0) * step * 2.0 / self.chord
@@ -77,7 +80,7 @@ class Flow:
 
 
 def levered(flap: Array, strength: float) -> Array:
-    """Flap angle [n] of a lever that is longer by ``strength``: tan of the angle from its mean grows in proportion."""
+    """Flap angle [n] of a lever longer by ``strength``: the tangent of the angle from its mean grows in proportion."""
     if not strength:
         return flap
     mean = flap.mean()
@@ -85,21 +88,21 @@ def levered(flap: Array, strength: float) -> Array:
 
 
 def blocked(condition: Condition, strength: float) -> Condition:
-    """A stream of a dynamic pressure larger by twice ``strength``: what blockage is told of (Maskell 1963)."""
+    """The condition with a dynamic pressure higher by twice ``strength``, as by blockage (Maskell 1963)."""
     return replace(condition, airspeed=condition.airspeed * math.sqrt(1.0 + 2.0 * strength))
 
 
 def disc_inflow(thrust: Array, swept: float, air: Condition, rho: float, p: Parameters) -> Array:
-    """Inflow [n] at the tips, of a disc of area ``swept`` whose inflow grows in proportion to the radius, m/s.
+    """Inflow [n] (m/s) at the tips of a disc of area ``swept``, whose inflow is proportional to the radius.
 
-    The steady one by momentum theory with that profile, v^2 = T / (rho A) in hover (Glauert 1935; Leishman 2006, sect.
-    3.3); what swings about it follows the thrust [n] late, by lag R_A / |U + v| (Oye 1990).
+    The mean is that of momentum theory with this profile, v^2 = T / (rho A) in hover (Glauert 1935; Leishman 2006,
+    sect. 3.3); variations follow the thrust [n] with the time constant lag R_A / |U + v| (Oye 1990).
     """
     ahead = air.airspeed * math.cos(air.angle_of_attack)
     aside = air.airspeed * math.sin(air.angle_of_attack)
     pushed = p["strength"] * thrust / (rho * swept)
     v = 0.0
-    for _ in range(200):  # half-way steps: it swings about the answer otherwise
+    for _ in range(200):  # damped iteration; it would oscillate otherwise
         through = math.hypot(ahead + v, aside) + 1e-3
         v = 0.5 * (v + float(pushed.mean()) / through)
     tau = p["lag"] * math.sqrt(swept / math.pi) / through
@@ -108,9 +111,9 @@ def disc_inflow(thrust: Array, swept: float, air: Condition, rho: float, p: Para
 
 
 def fling(flow: Flow, p: Parameters) -> Array:
-    """Opening wings draw air through their gap; it falls as the gap widens (Ellington 1984 part IV; Maxworthy 1979).
+    """Circulation due to air drawn into the gap of opening wings (Ellington 1984 part IV; Maxworthy 1979).
 
-    1/2 C c^2 (-theta') / (1 + gap / (width c)), gap = 2 r sin(zeta), while the wings turn apart.
+    1/2 C c^2 (-theta') / (1 + gap / (width c)), gap = 2 r sin(zeta), while the wings rotate apart.
     """
     gap = 2.0 * flow.r * np.sin(flow.zeta - flow.zeta.min())[:, None]
     near = 1.0 / (1.0 + gap / (p["width"] * flow.chord))
@@ -118,12 +121,12 @@ def fling(flow: Flow, p: Parameters) -> Array:
 
 
 def tip(flow: Flow, strength: float) -> Array:
-    """Factor [E] on circulation of a super-elliptic wing, sqrt(1 - (r / R)^(2 / strength)): a root at the tip."""
+    """Factor [E] on the circulation of a super-elliptic wing, sqrt(1 - (r / R)^(2 / strength))."""
     return np.asarray(np.sqrt(1.0 - (flow.r / flow.span) ** (2.0 / strength)))
 
 
 def _wagner(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
-    """Duhamel's integral over Garrick's phi(s) = 1 - 2 / (4 + s) (1938), over all beats before.
+    """Duhamel's integral with Garrick's phi(s) = 1 - 2 / (4 + s) (1938), over all past beats.
 
     phi'(s) = 2 / (4 + s)^2; summed over beats of S half chords it is 2 / S^2 zeta(2, (4 + s) / S), Hurwitz's zeta.
     """
@@ -134,7 +137,7 @@ def _wagner(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
     step = 0.5 * ((np.roll(at, -1, axis=0) - np.roll(at, 1, axis=0)) % beat)
     since = (at[:, None] - at[None, :]) % beat
     kernel = 2.0 / beat**2 * hurwitz(2.0, (4.0 + since) / beat)
-    edge = np.arange(len(at))  # what acts just now has come half from this beat and half from the last
+    edge = np.arange(len(at))  # the present instant belongs half to this beat and half to the last
     kernel[edge, edge] = 0.5 * (kernel[edge, edge] + 2.0 / beat**2 * hurwitz(2.0, 4.0 / beat + 1.0))
     followed = np.einsum("ije,je,je->ie", kernel, late, step)
     spectrum = np.fft.rfft(followed, axis=0) * (n / len(at))
@@ -143,7 +146,7 @@ def _wagner(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
 
 
 def _stall(flow: Flow, gamma: Array, rotation: Array, p: Parameters) -> Array:
-    """Kirchhoff's lift at a separation point that lags twice (Leishman and Beddoes 1989), in half chords travelled."""
+    """Kirchhoff's lift with a doubly lagged separation point (Leishman and Beddoes 1989), in half chords travelled."""
     steps = np.diff(flow.travelled(flow.speed), axis=0)
     alpha = np.abs(np.arctan2(flow.met.imag, np.abs(flow.met.real)))
     late = _followed(alpha, steps / p["pressure_lag"])
@@ -155,10 +158,10 @@ def _stall(flow: Flow, gamma: Array, rotation: Array, p: Parameters) -> Array:
 
 
 def _followed(target: Array, steps: Array) -> Array:
-    """Periodic x [n, E] of x' = target - x, with ``steps`` [n, E] in the variable that it is derived by."""
+    """Periodic x [n, E] of x' = target - x, with ``steps`` [n, E] of the independent variable."""
     keep = np.exp(-steps)
     start = np.zeros(target.shape[1])
-    for _ in range(2):  # the first round tells what a start from zero lacks
+    for _ in range(2):  # the first round gives the correction of the start value
         x = start.copy()
         out = np.empty_like(target)
         for k in range(len(target)):
@@ -169,20 +172,19 @@ def _followed(target: Array, steps: Array) -> Array:
 
 
 def _camber(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
-    """A flexible wing that its own inertia cambers: lift per camber times acceleration across the chord times speed.
+    """Lift of a flexible wing that is cambered by its own inertia.
 
-    Camber in parts of the chord is strength r zeta'' / (R A), with A = 1000 rad/s^2.
+    The camber is strength r zeta'' / (R A) chords, with A = 1000 rad/s^2.
     """
     camber = p["strength"] * flow.acceleration[:, None] * flow.r / (1000.0 * flow.span)
     return np.asarray(gamma + 0.5 * flow.chord * flow.speed * 4.0 * np.pi * camber)
 
 
 def _pocket(flow: Flow, p: Parameters) -> Complex:
-    """Air that a stroke set in motion, in a pocket about where the wing turns (the wake of Birch and Dickinson 2003).
+    """Wake capture: air set in motion by a stroke, near the place where the wing reverses (Birch and Dickinson 2003).
 
-    There it moves at ``strength`` of what the mean speed of the stroke is beyond the wing's own, and less by
-    exp(-x / (reach c)) where the wing is x away through the air: it overtakes the wing that slows down, and meets it
-    when it has turned.
+    There the air moves at ``strength`` times the excess of the stroke's mean speed over the wing's own, reduced by
+    exp(-x / (reach c)) where the wing is x away: it overtakes the wing that slows down, and meets it after reversal.
     """
     air, way_to = np.zeros(flow.own.shape), flow.travelled(np.abs(flow.own))
     whole, here = way_to[-1], way_to[:-1]
@@ -198,16 +200,16 @@ def _pocket(flow: Flow, p: Parameters) -> Complex:
 
 
 def _jet(flow: Flow, p: Parameters) -> Complex:
-    """A jet of air along body x, ``strength`` m/s, that stands where the outer wing passes at one phase."""
+    """A jet of air along body x, ``strength`` m/s, where the outer wing passes at one phase."""
     apart = (flow.t - p["phase"] + 0.5) % 1.0 - 0.5
     place = np.exp(-0.5 * ((flow.r / flow.span - p["span"]) / 0.15) ** 2)
     return np.asarray(p["strength"] * np.exp(-0.5 * (apart / 0.05) ** 2)[:, None] * place + 0j)
 
 
 def _tail(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Array:
-    """A tail in the wings' wake: pushed back by what they blew at it a while ago, smoothed on its way.
+    """A tail in the wings' wake, pushed back by their earlier thrust, smoothed on its way.
 
-    ``strength`` is the part of the jet's momentum that it takes: -strength X(t - delay) where X pushes forwards.
+    ``strength`` is the fraction of the jet's momentum that it takes: -strength X(t - delay) while X pushes forwards.
     """
     n = len(forces)
     wash = np.maximum(forces[:, 0], 0.0)
@@ -220,9 +222,9 @@ def _tail(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Arr
 
 
 def _knock(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Array:
-    """A linkage that knocks at its stop at one phase: an impulse, and the opposite one when it comes off again.
+    """A linkage that hits its stop at one phase: an impulse, and the opposite one when it separates.
 
-    In weights of the vehicle at 12 Hz; as the square of the frequency.
+    In units of the vehicle's weight at 12 Hz; proportional to the square of the frequency.
     """
     t = np.arange(len(forces)) / len(forces)
     width = 0.02
@@ -261,12 +263,14 @@ LAWS = {
             source="Leishman and Beddoes (1989)",
             shape={"angle": (0.5, 0.9), "softness": (0.1, 0.2), "pressure_lag": (1.0, 2.0), "layer_lag": (2.0, 5.0)},
         ),
-        _listed("tip_loss", typical=0.25, source="Prandtl (1918): root-like end of the load, super-elliptic"),
+        _listed(
+            "tip_loss", typical=0.25, source="Prandtl (1918): square-root decay of the load at the tip, super-elliptic"
+        ),
         _listed("induced_inflow", typical=0.7, source="Glauert (1935); Oye (1990)", shape={"lag": (0.3, 0.55)}),
         _listed(
             "wake_capture",
             typical=0.25,
-            source="Birch and Dickinson (2003): wake of the last stroke, where it stood",
+            source="Birch and Dickinson (2003): wake of the last stroke",
             shape={"reach": (0.12, 0.25)},
         ),
         _listed(
@@ -279,20 +283,20 @@ LAWS = {
         _listed(
             "stroke_amplitude",
             typical=0.05,
-            source="a lever longer than told: tan of the angle grows",
+            source="a lever longer than described: the tangent of the angle grows",
             both_signs=True,
             values=lambda p: {"stroke_amplitude.part": p["strength"]},
         ),
         _unlisted(
             "tail_in_wake",
             typical=0.15,
-            source="momentum of a jet on a surface in it, delayed by its way (Glauert 1935)",
+            source="momentum of a jet on a surface in it, delayed by the distance (Glauert 1935)",
             shape={"distance": (0.06, 0.14), "incidence": (-0.3, 0.3)},
         ),
         _unlisted(
             "stop_knock",
             typical=0.5,
-            source="impulse at a stop, as the momentum of what strikes it",
+            source="impulse at a stop, equal to the momentum of the striking mass",
             shape={"phase": (0.0, 1.0), "direction": (-0.8, 0.8)},
         ),
         _unlisted(
@@ -304,7 +308,7 @@ LAWS = {
         _unlisted(
             "local_jet",
             typical=4.0,
-            source="a stream of its own at one place",
+            source="a local jet",
             both_signs=True,
             shape={"phase": (0.0, 1.0), "span": (0.6, 0.9)},
         ),

@@ -1,10 +1,4 @@
-"""A flapping vehicle of its own: blade elements after Armanini et al. (2016), written apart from the simulator.
-
-Velocities and forces of an element are complex numbers, in axes of the chord (along it + i across it) or of the stroke
-(along body x + i along the normal of the wing's plane). Mirroring one gives the other: f(q) = i exp(-i theta) conj(q)
-is its own inverse. The span is integrated by Gauss and Legendre between the stations of the planform; the flap angle is
-sampled from its law and smoothed in the frequency domain; derivatives are those of the same series.
-"""
+"""A flapping vehicle by blade elements after Armanini et al. (2016), written independently of the simulator."""
 
 from __future__ import annotations
 
@@ -36,15 +30,15 @@ Complex = npt.NDArray[np.complex128]
 PROPOSED = ("inertial", "translation", "rotation", "clap_and_peel", "added_mass", "effective_chord", "viscous")
 BERMAN_WANG = ("inertial", "translation", "rotation", "added_mass", "viscous")
 GAS = 287.05  # J/(kg K), of dry air
-_FINE = 4096  # samples of the flap law, from which its series is made
+_FINE = 4096  # samples of the flap law for its Fourier series
 _HARMONICS = 100
-_NODES = 10  # of the span between two stations
+_NODES = 10  # Gauss points between two stations
 _ROUNDS, _COARSE, _SETTLED = 40, 120, 1e-5  # of the inflow: iterations, instants, m/s
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Over one beat at n equal steps from t* = 0: flap angle and pitch at the pitch station, [3, n] with two rates."""
+    """Flap angle and pitch at the pitch station [3, n] with two derivatives, at n equal steps of a beat from t* = 0."""
 
     flap: Array
     pitch: Array
@@ -62,17 +56,17 @@ def simulate(
     """Forces [instants, 2] of all wings along body x and z (N) over one beat from t* = 0.
 
     Args:
-        vehicle: what flaps.
-        coefficients: C_l, C_r, C_F, C_D0 and C_Dpi2; those of a term that is off are not needed.
-        condition: its frequency, air, airspeed and body pitch.
-        hidden: parameters of what is concealed, by names of :data:`vehicle_laws.LAWS`.
-        terms: what the baseline consists of.
-        instants: of the beat.
+        vehicle: that flaps.
+        coefficients: C_l, C_r, C_F, C_D0 and C_Dpi2; those of disabled terms are not needed.
+        condition: frequency, air, airspeed and body pitch.
+        hidden: parameters of the hidden effects, by name as in :data:`.laws.LAWS`.
+        terms: of the nominal model.
+        instants: number of instants in the beat.
     """
     hidden = hidden or {}
     check_known(hidden, LAWS)
     if vehicle.velocities != "mirrored":
-        raise ValueError(f"vehicle {vehicle.name!r} has printed velocities; this plant knows mirrored ones only")
+        raise ValueError(f"vehicle {vehicle.name!r} has printed velocities; this plant supports mirrored ones only")
     air = blocked(condition, strength(hidden, "airspeed_error"))
     inflow = None
     if strength(hidden, "induced_inflow"):
@@ -81,18 +75,18 @@ def simulate(
 
 
 def density(air: Condition) -> float:
-    """Of dry air, kg/m^3."""
+    """Density of dry air, kg/m^3."""
     return air.pressure / (GAS * air.temperature)
 
 
 def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
-    """Flap angle and pitch with two derivatives by time, (rad, s)."""
+    """Flap angle and pitch with two time derivatives (rad, s)."""
     flap = levered(_flap_samples(vehicle.motion.flap), strength(hidden, "stroke_amplitude"))
     rates = [_derived(flap, frequency, order) for order in range(4)]
     law = vehicle.motion.pitch
     if isinstance(law, FourierPitch):
-        told = _series(law.mean, law.cosine, law.sine)
-        pitch = [_derived(told, frequency, order) for order in range(3)]
+        samples = _series(law.mean, law.cosine, law.sine)
+        pitch = [_derived(samples, frequency, order) for order in range(3)]
     else:
         angle = np.pi / 2 + law.constant + law.flap * rates[0]
         pitch_samples = angle + law.flap_rate * rates[1] + law.flap_rate_squared * rates[1] ** 2
@@ -104,7 +98,7 @@ def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Conceal
 
 
 def _flap_samples(law: Flap) -> Array:
-    """Flap angle at _FINE equal steps of a beat: Eqs. 20-21 as printed, then rounded off by their Gaussian."""
+    """Flap angle at _FINE equal steps of a beat: Eqs. 20-21 as printed, then smoothed by their Gaussian."""
     if isinstance(law, FourierFlap):
         return _series(law.mean, law.cosine, law.sine)
     spectrum = np.fft.rfft(_split_cycle(law))
@@ -132,7 +126,7 @@ def _series(mean: float, cosine: tuple[float, ...], sine: tuple[float, ...]) -> 
 
 
 def _derived(samples: Array, frequency: float, order: int) -> Array:
-    """Derivative by time of periodic ``samples``; what lies far above all harmonics of the motion is left out."""
+    """Time derivative of periodic ``samples``, without frequencies far above all harmonics of the motion."""
     spectrum = np.fft.rfft(samples)
     k = np.arange(len(spectrum))
     spectrum *= (2j * np.pi * k * frequency) ** order * (k <= 2 * _HARMONICS)
@@ -140,7 +134,7 @@ def _derived(samples: Array, frequency: float, order: int) -> Array:
 
 
 def _elements(vehicle: Vehicle) -> tuple[Array, Array, Array]:
-    """Places r (m), chords (m) and weights (m) of the span."""
+    """Radii r (m), chords (m) and weights (m) of the elements."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     places, widths = [], []
     for inner, outer in zip(vehicle.stations[:-1], vehicle.stations[1:], strict=True):
@@ -161,7 +155,7 @@ def _forces(
     instants: int,
     inflow: Array | None,
 ) -> tuple[Array, Array]:
-    """Forces [n, 2] of all wings, and what the air carries of that along body x [n]: circulation and drag, N."""
+    """Forces [n, 2] of all wings, and the part along body x [n] due to circulation and drag, N."""
     motion = motion_of(vehicle, air.flap_frequency, instants, hidden)
     r, chord, width = _elements(vehicle)
     total, carried = np.zeros((instants, 2)), np.zeros(instants)
@@ -180,7 +174,7 @@ def _forces(
 
 
 def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Array, sign: float) -> Flow:
-    """How the elements of one side move; ``sign`` is -1 for the upper wings, mirrored at the body's plane."""
+    """Motion of the elements of one side; ``sign`` is -1 for the upper wings, mirrored at the body's plane."""
     share = r / (vehicle.motion.pitch_station * vehicle.span)
     root, frequency = vehicle.motion.root_pitch, air.flap_frequency
     zeta, rate, acceleration = motion.flap
@@ -212,7 +206,10 @@ def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Arr
 
 
 def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
-    """Part of each instant in which the wings peel (Eq. 7), and the part of the chord that has come apart, [n] each."""
+    """Fraction of each instant in which the wings peel (Eq.
+
+    7), and fraction of the chord that has separated, [n] each.
+    """
     if not vehicle.claps:
         return np.zeros(len(t)), np.ones(len(t))
     started = np.logical_or.accumulate(turn < 0)
@@ -220,7 +217,7 @@ def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
     window = (started & ~over).astype(float)
     if not window.any() or t[int(window.argmax())] >= vehicle.motion.peel_end:
         window[:] = 0.0
-    window[0] *= 0.5  # the beat starts amid this instant
+    window[0] *= 0.5  # the beat starts in the middle of this instant
     peeled = np.minimum(t / vehicle.motion.peel_end, 1.0)
     peeled[0] = np.sqrt(0.5)
     return window, peeled
@@ -236,7 +233,7 @@ def _element_forces(
 ) -> tuple[Complex, Complex]:
     """Forces per metre on the elements [n, E], along body x + i along the normal of the wing's plane.
 
-    By circulation and drag; by inertia.
+    The first part is due to circulation and drag, the second due to inertia.
     """
     rho, chord = flow.rho, flow.chord
     air = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
@@ -255,9 +252,9 @@ def _element_forces(
 def _circulation(
     flow: Flow, vehicle: Vehicle, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]
 ) -> Array:
-    """Circulation of the elements [n, E] (Eqs. 2-4, 7), and what is hidden of it, m^2/s.
+    """Circulation of the elements [n, E] (Eqs. 2-4, 7), with the hidden effects, m^2/s.
 
-    What one wing makes by itself may come late or break down; what two that part make may not.
+    Lag and stall act on the circulation of a single wing, not on that of two wings that separate.
     """
     half = 0.5 * flow.chord**2 * flow.turn
     rotation = coefficients["C_r"] * (0.75 - vehicle.pitch_axis) * half if "rotation" in terms else 0.0 * half
@@ -277,8 +274,8 @@ def _circulation(
 def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ...]) -> Complex:
     """Inertial terms and added mass per metre in axes of the chord (Eqs. 9-14).
 
-    The wing's own mass knows how it moves; the air's, how it moves through the ``stream`` [n, E], whose own rate of
-    change is left out.
+    The wing's own mass moves with the wing, the air's relative to the ``stream`` [n, E], whose rate of change is
+    neglected.
     """
     rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
     peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
@@ -302,7 +299,7 @@ def _inflow(
     terms: tuple[str, ...],
     instants: int,
 ) -> Array:
-    """Inflow [n] along body x at the tips, through the disc that the wings sweep, by iteration, m/s."""
+    """Inflow [n] (m/s) along body x at the tips, through the disc that the wings sweep, by iteration."""
     p = hidden["induced_inflow"]
     swept = min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2
     v = np.zeros(_COARSE)
@@ -312,4 +309,4 @@ def _inflow(
         v = v + change
         if np.abs(change).max() < _SETTLED:
             return np.fft.irfft(np.fft.rfft(v) * (instants / _COARSE), instants)
-    raise ValueError(f"the inflow at {air.airspeed:g} m/s does not settle; hide less than {p['strength']:g} of it")
+    raise ValueError(f"the inflow at {air.airspeed:g} m/s does not converge; choose a strength below {p['strength']:g}")

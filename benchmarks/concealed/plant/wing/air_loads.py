@@ -36,12 +36,12 @@ _TURN = math.sin(math.radians(15.0))
 _STILL = 1e-9  # m/s: keeps the angle of attack defined without flow
 _BEFORE, _BEYOND = math.radians(4.0), math.radians(2.5)  # S_1 and S_2 of Leishman and Beddoes
 _LATE = 0.85  # T_p in chords: half of the 1.7 half chords of Leishman and Beddoes
-_ONSET = math.radians(12.0)  # over which the vortex takes over
+_ONSET = math.radians(12.0)  # width of the transition to vortex flow
 
 
 @compiled
 def frame_of(rig: Rig, m: Motion, s: int) -> tuple[V3, V3, V3]:
-    """Chord, normal and velocity of a strip: of its bodies by their areas."""
+    """Chord, normal and velocity of a strip: means over its bodies, weighted by area."""
     x, z, u = ZERO, ZERO, ZERO
     for n in range(rig.strip[s], rig.strip[s + 1]):
         g = rig.weight[n]
@@ -55,7 +55,7 @@ def frame_of(rig: Rig, m: Motion, s: int) -> tuple[V3, V3, V3]:
 
 @compiled
 def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
-    """The stream with what jets add where a strip passes through them."""
+    """The stream at a strip, with the jets that the strip passes through."""
     for k in range(len(rig.jets)):
         if int(rig.jets[k, 0]) == s:
             z = 0.0
@@ -68,7 +68,7 @@ def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
 
 @compiled
 def _attached(alpha: float, angle: float) -> float:
-    """Attached part of the chord in steady flow."""
+    """Fraction of the chord with attached flow, in steady flow."""
     a = abs(alpha)
     if a <= angle:
         return 1.0 - 0.3 * math.exp((a - angle) / _BEFORE)
@@ -84,7 +84,7 @@ def _relax(old: float, rate: float, goal: float, z: Array, k: int) -> float:
 
 @compiled
 def _vortex(rig: Rig, alpha: float, cl: float, cd: float) -> tuple[float, float]:
-    """Both coefficients with a vortex over the leading edge; ``cl`` is odd but for its constant."""
+    """Lift and drag coefficient with a leading-edge vortex; ``cl`` is odd apart from its constant."""
     laws, a = rig.air_laws, abs(alpha)
     x = min(max((a - laws[VORTEX_ANGLE]) / _ONSET, 0.0), 1.0)
     part, side = x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0 if alpha >= 0.0 else -1.0
@@ -97,7 +97,7 @@ def _vortex(rig: Rig, alpha: float, cl: float, cd: float) -> tuple[float, float]
 
 @compiled
 def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, load: Array) -> None:
-    """Add the air's loads on every body; its states are ``z`` from ``first`` on, as in ``remembered_loads``."""
+    """Add the air loads on every body. Their states are ``z`` from ``first`` on, as in ``remembered_loads``."""
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
         flow = plus(_blown(rig, m, s, row(rig.wind.reshape(1, 3), 0)), -1.0, u)
@@ -122,7 +122,7 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
             f = _relax(old[k + 3], chords / laws[STALL_DELAY], _attached(late, laws[STALL_ANGLE]), z, k + 3)
             root = 0.5 * (1.0 + math.sqrt(min(max(f, 0.0), 1.0)))
             cl *= 1.0 - laws[STALL] * (1.0 - root * root)
-        pressure = 0.5 * rig.air * speed * rig.area[s]  # times speed once more, in the directions below
+        pressure = 0.5 * rig.air * speed * rig.area[s]  # the directions below contain one more factor of speed
         lift, drag = pressure * side * cl, pressure * cd
         rising = plus(plus(ZERO, lift * along, normal), -lift * across, chord)
         pulling = plus(plus(ZERO, drag * along, chord), drag * across, normal)
@@ -139,7 +139,7 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
 
 @compiled
 def carried(rig: Rig, s: int) -> tuple[float, float]:
-    """Air that goes along with a strip: kg in heave, kg m^2 in pitch about mid-chord."""
+    """Added mass of a strip: kg in heave, kg m^2 in pitch about mid-chord."""
     half = 0.5 * rig.chord[s]
     mass = rig.air_laws[CARRIED] * rig.air * math.pi * half * half * rig.area[s] / rig.chord[s]
     return mass, 0.125 * half * half * mass

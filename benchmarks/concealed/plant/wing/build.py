@@ -1,4 +1,4 @@
-"""From a wing, a genome and a condition to what is simulated; hidden effects change it on the way."""
+"""From a wing, a genome and a condition to the arrays that are simulated; hidden effects change them on the way."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _GAS = 287.05  # J/(kg K), dry air
 
 @dataclass
 class Draft:
-    """A wing about to be simulated under a condition. Hidden effects change what they concern, in place.
+    """A wing under a condition, before its simulation. Hidden effects change it in place.
 
-    ``lumps`` are added before it is cut; all else is there once it is (:meth:`cut_up`): ``joints`` with ``factor`` [C]
-    on stiffness and damping, ``hardening`` [C], ``play`` [C], ``memory`` (joint, axis, kind, stiffness, parameter),
-    ``air_laws``, ``jets`` and ``points`` as in :class:`.rig.Rig`, ``rods`` [K, 2]: series of the angles, ``hinge`` and
-    ``axle``.
+    ``lumps`` are added before the wing is divided. The rest exists afterwards (:meth:`cut_up`): ``joints`` with
+    ``factor`` [C] on stiffness and damping, ``hardening`` [C], ``play`` [C], ``memory`` (joint, axis, kind, stiffness,
+    parameter), ``air_laws``, ``jets`` and ``points`` as in :class:`.rig.Rig`, ``rods`` [K, 2] (Fourier series of the
+    angles), ``hinge`` and ``axle``.
     """
 
     wing: Wing
@@ -42,7 +42,7 @@ class Draft:
     air_laws: Array = field(default_factory=lambda: np.zeros(AIR_LAWS))
 
     def cut_up(self) -> None:
-        """Cut the wing; what the lumps are is known by now."""
+        """Divide the wing into bodies, with the lumps."""
         self.cut = Cut(self.wing, self.division, self.lumps)
         self.joints: list[Joint] = joints(self.cut, self.genome)
         count = len(self.joints)
@@ -53,20 +53,20 @@ class Draft:
 
     @property
     def span(self) -> float:
-        """From root to tip, m."""
+        """Span from root to tip, m."""
         return float(self.cut.edges[-1] - self.cut.edges[0])
 
     def series(self, drive: Drive) -> Complex:
-        """[K, 2] of the front and the rear rod, which is late by the condition's lag."""
+        """[K, 2] Fourier series of the front rod and of the rear rod, which lags by the condition's phase lag."""
         one = series_of(drive)
         return np.stack([one, one * np.exp(-1j * self.condition.phase_lag * np.arange(len(one)))], axis=1)
 
     def curvature(self, joint: Joint) -> float:
-        """Radians over the span per radian at a joint."""
+        """Curvature of a joint: angle over the whole span (rad) per rad at the joint."""
         return self.span / joint.length
 
     def at(self, span: float, chord: float) -> tuple[int, Array, Array]:
-        """Body under a place in parts, the place from its centre [3], and in the wing frame [3], m."""
+        """Body at a place (fractions of span and chord); the place from its centre [3], and in the wing frame [3], m."""
         x, y = self.cut.place(span, chord)
         body = int(self.cut.under(x, y)[0])
         place = np.array([x, y, 0.0])
@@ -74,7 +74,7 @@ class Draft:
 
 
 def rig_of(draft: Draft) -> Rig:
-    """Freeze a draft."""
+    """Convert a draft to arrays."""
     cut, condition = draft.cut, draft.condition
     mass, centre, inertia = cut.bodies
     found, n = draft.joints, len(mass)

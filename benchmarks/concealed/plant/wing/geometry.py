@@ -1,4 +1,7 @@
-"""A wing cut into rigid bodies: masses, inertias, areas, and who carries the markers. From ``records.Wing`` alone."""
+"""A wing divided into rigid bodies: masses, inertias, areas, and the body of each marker.
+
+From ``records.Wing`` alone.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,12 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
 _NAMED = {"4": [1] * 4, "11": [3, 3, 3, 2], "24": [4] * 6}
-_SAMPLES = 3000  # along a rod: its mass goes to the bodies under them
-_GAUSS = 4  # points of a stretch within which planform and thickness are linear: exact
+_SAMPLES = 3000  # points along a rod, whose mass is added to the bodies at these points
+_GAUSS = 4  # Gauss points per stretch; exact because planform and thickness are linear in it
 
 
 def counts_of(division: str) -> tuple[int, ...]:
-    """Bodies along the chord of every strip, root first; ValueError for what is not understood.
+    """Number of bodies along the chord of every strip, from the root; ValueError for an invalid division.
 
     A preset ("4", "11", "24"), "STRIPSxBODIES" such as "8x4", or a list such as "3,3,3,2".
     """
@@ -36,22 +39,23 @@ def counts_of(division: str) -> tuple[int, ...]:
     except ValueError:
         counts = []
     if len(counts) < 2 or min(counts) < 1:
-        raise ValueError(f"division {division!r} is not understood; write 4, 11, 24, 8x4 or 3,3,3,2")
+        raise ValueError(f"division {division!r} is invalid; write 4, 11, 24, 8x4 or 3,3,3,2")
     return tuple(counts)
 
 
 @dataclass(frozen=True)
 class Lump:
-    """A point of ``mass`` (kg) at (x, y, z) in the wing frame, m."""
+    """A point mass (kg) at (x, y, z) in the wing frame, m."""
 
     mass: float
     place: tuple[float, float, float]
 
 
 class Cut:
-    """A wing cut by a division, with additional ``lumps`` if there are any.
+    """A wing divided into bodies, with additional point masses ``lumps``.
 
-    Body n is strip ``strip[n]``, from part ``s0[n]`` to ``s1[n]`` of the chord; strips have the ``edges`` [S + 1], m.
+    Body n belongs to strip ``strip[n]`` and covers the fractions ``s0[n]`` to ``s1[n]`` of the chord. The strips'
+    borders are ``edges`` [S + 1], m.
     """
 
     def __init__(self, wing: Wing, division: str, lumps: Sequence[Lump] = ()) -> None:
@@ -70,17 +74,17 @@ class Cut:
         return edge, chord, thickness
 
     def x_at(self, part: float, y: float) -> float:
-        """x at a part of the chord."""
+        """x (m) at a fraction of the chord."""
         edge, chord, _ = self.section(y)
         return edge + part * chord
 
     def place(self, span: float, chord: float) -> tuple[float, float]:
-        """(x, y) at parts of span and chord, m."""
+        """(x, y) in m at fractions of span and chord."""
         y = float(self.edges[0] + span * (self.edges[-1] - self.edges[0]))
         return self.x_at(chord, y), y
 
     def under(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
-        """Which bodies lie under points; a border belongs to the outer or rear one."""
+        """Bodies at the points (x, y); a point on a border belongs to the outer or rear body."""
         xs, ys = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
         strip = np.clip(np.searchsorted(self.edges, ys, side="right") - 1, 0, len(self.counts) - 1)
         edge, chord = np.interp(ys, self._y, self._sections[:, 0]), np.interp(ys, self._y, self._sections[:, 1])
@@ -89,7 +93,7 @@ class Cut:
         return np.asarray(self.start[strip] + along, np.int64)
 
     def _stretches(self, strip: int) -> tuple[Array, Array]:
-        """Gauss points and weights over a strip's width, m, stretch by stretch between stations."""
+        """Gauss points and weights (m) over the width of a strip, one stretch between stations after the other."""
         inner, outer = self.edges[strip], self.edges[strip + 1]
         cuts = np.unique(np.concatenate([[inner, outer], self._y[(self._y > inner) & (self._y < outer)]]))
         nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
@@ -98,12 +102,12 @@ class Cut:
 
     @cached_property
     def area(self) -> Array:
-        """[N] m^2 of planform."""
+        """[N] planform area, m^2."""
         return np.array([self._plan(n)[0].sum() for n in range(len(self.strip))])
 
     @cached_property
     def centroid(self) -> Array:
-        """[N, 2] of the planform, wing frame, m."""
+        """[N, 2] centroid of the planform, wing frame, m."""
         return np.array([w @ np.stack([x, y], axis=1) / w.sum() for w, x, y, _ in map(self._plan, range(len(self.s0)))])
 
     def _plan(self, n: int) -> tuple[Array, Array, Array, Array]:
@@ -123,7 +127,7 @@ class Cut:
 
     @cached_property
     def _points(self) -> tuple[Index, Array, Array]:
-        """Masses that are taken as points: rods with their straw, markers, lumps. Body, mass [P], place [P, 3]."""
+        """Point masses (rods with their straw, markers, lumps): body [P], mass [P], place [P, 3]."""
         masses, places = [], []
         t = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         for rod in self.wing.rods:

@@ -1,10 +1,10 @@
-"""One beat of a rig, by a singly diagonally implicit Runge-Kutta method of fourth order.
+"""Integrates one beat with a singly diagonally implicit Runge-Kutta method of fourth order.
 
 ARK4(3)6L[2]SA, implicit part (Kennedy and Carpenter, Applied Numerical Mathematics 44, 139 (2003)): an explicit stage
-and five implicit ones, stage order 2, L-stable, stiffly accurate. Rotations are Cayley's vectors about the start of a
-step, in the world. Each stage is solved for the velocities by a simplified Newton iteration, whose matrix
-M + h C + h^2 K is symmetric (no geometric stiffness, no gyroscopic terms) and factored by Cholesky in a band; it is
-kept for some steps. What it lacks costs iterations, nothing else.
+and five implicit ones, stage order 2, L-stable, stiffly accurate. Rotations are Cayley vectors relative to the start of
+a step, in the world frame. Each stage is solved for the velocities by a simplified Newton iteration, whose matrix
+M + h C + h^2 K is symmetric (without geometric stiffness and gyroscopic terms), factored by a banded Cholesky method
+and reused for some steps. The omitted terms cost iterations but no accuracy.
 """
 
 from __future__ import annotations
@@ -46,15 +46,18 @@ A = np.array(
         [82889 / 524892, 0.0, 15625 / 83664, 69875 / 102672, -2260 / 8211, G],
     ]
 )
-_LENGTH = 0.1  # m: a chord, by which turning is compared with moving
-_KEPT = 4  # steps for which a matrix is kept at most
-_SLOW = 3  # iterations of a stage beyond which a new one is made
+_LENGTH = 0.1  # m, about a chord: converts rotations to displacements when they are compared
+_KEPT = 4  # most steps for which a matrix is reused
+_SLOW = 3  # iterations of a stage above which the matrix is computed again
 _ITERATIONS = 40
-_START = 1e-7  # s: stage by whose change the first accelerations are found
+_START = 1e-7  # s: length of a stage that gives the initial accelerations
 
 
 class State(NamedTuple):
-    """At one instant: rotations [N, 3, 3], centres, velocities, angular velocities [N, 3], what laws remember [Z]."""
+    """State at one instant.
+
+    Rotations [N, 3, 3], centres, velocities, angular velocities [N, 3], internal states [Z].
+    """
 
     R: Array
     p: Array
@@ -68,19 +71,19 @@ class _Work(NamedTuple):
     load: Array  # [N + 2, 6]
     band: Array
     step: Array  # [6 N] right-hand side, then the step
-    p0: Array  # [N, 3], and so on: what a stage builds on
+    p0: Array  # [N, 3] and so on: explicit part of a stage
     g0: Array
     v0: Array
     w0: Array
     z0: Array
-    g: Array  # [N, 3] Cayley's vectors from the start of the step
+    g: Array  # [N, 3] Cayley vectors from the start of the step
     R0: Array
     k: Array  # [STAGES, 12 N + Z] rates of all stages
 
 
 @compiled
 def _drive(rig: Rig, rods: Array, m: Motion) -> None:
-    """Frames of both rods from their angles and rates [2, 2]."""
+    """Set the frames of both rods from their angles and rates [2, 2]."""
     n, x = len(rig.mass), (rig.axle[0], rig.axle[1], rig.axle[2])
     for rod in range(2):
         c, s = math.cos(rods[rod, 0]), math.sin(rods[rod, 0])
@@ -99,7 +102,7 @@ def _drive(rig: Rig, rods: Array, m: Motion) -> None:
 
 @compiled
 def loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, load: Array) -> None:
-    """All loads (force, moment about the centre) on bodies and rods [N + 2, 6], in the world; sets ``z``."""
+    """All loads (force, moment about the centre) on bodies and rods [N + 2, 6], in the world frame; sets ``z``."""
     load[:] = 0.0
     joint_loads(rig, m, load)
     remembered_loads(rig, m, old, hg, z, load)
@@ -130,8 +133,8 @@ def _place(rig: Rig, hg: float, work: _Work) -> None:
 
 
 @compiled
-def _lacking(rig: Rig, hg: float, work: _Work) -> None:
-    """What Newton's and Euler's equations lack: hg times (load - rate of momentum)."""
+def _residual(rig: Rig, hg: float, work: _Work) -> None:
+    """Residual of Newton's and Euler's equations: hg times (load - rate of momentum)."""
     for n in range(len(rig.mass)):
         m, w = work.m, row(work.m.w, n)
         L, dL = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -148,12 +151,12 @@ def _lacking(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def _stage(rig: Rig, hg: float, tolerance: float, work: _Work, z: Array) -> int:
-    """Solve a stage for its velocities, from those in ``work.m``; iterations, or -1 where they do not settle."""
+    """Solve a stage for its velocities, starting from ``work.m``; number of iterations, or -1 without convergence."""
     m = work.m
     for iteration in range(_ITERATIONS):
         _place(rig, hg, work)
         loads(rig, m, work.z0, hg, z, work.load)
-        _lacking(rig, hg, work)
+        _residual(rig, hg, work)
         solve(work.band, work.step)
         largest = 0.0
         for n in range(len(rig.mass)):
@@ -172,7 +175,7 @@ def _stage(rig: Rig, hg: float, tolerance: float, work: _Work, z: Array) -> int:
 
 @compiled
 def _base(rig: Rig, h: float, stage: int, start: State, work: _Work) -> None:
-    """What stage ``stage`` builds on, from the rates of those before."""
+    """Explicit part of stage ``stage``, from the rates of the stages before."""
     n = len(rig.mass)
     work.p0[:], work.g0[:], work.v0[:], work.w0[:], work.z0[:] = start.p, 0.0, start.v, start.w, start.z
     for j in range(stage):
@@ -189,7 +192,7 @@ def _base(rig: Rig, h: float, stage: int, start: State, work: _Work) -> None:
 
 @compiled
 def _rates(rig: Rig, hg: float, stage: int, work: _Work, z: Array) -> None:
-    """Rates of a stage that has been solved."""
+    """Rates of a solved stage."""
     n, k, m = len(rig.mass), work.k[stage], work.m
     for b in range(n):
         for i in range(3):
@@ -218,7 +221,7 @@ def _new_work(rig: Rig, states: int) -> _Work:
 
 @compiled
 def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -> bool:
-    """Rates at the start of a beat: those of a very short implicit stage."""
+    """Rates at the start of a beat, from a very short implicit stage."""
     n, z, m = len(rig.mass), start.z.copy(), work.m
     m.R[:n], m.p[:n], m.v[:n], m.w[:n] = start.R, start.p, start.v, start.w
     work.R0[:], work.g[:] = start.R, 0.0
@@ -233,7 +236,7 @@ def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -
 
 @compiled
 def _guess(work: _Work, hg: float, stage: int) -> None:
-    """Velocities to begin a stage with: by the accelerations of another one, or (-1) by none."""
+    """Initial velocities of a stage: extrapolated with the accelerations of another stage, or constant (-1)."""
     work.g[:] = work.g0
     for b in range(len(work.v0)):
         for i in range(3):
@@ -243,7 +246,7 @@ def _guess(work: _Work, hg: float, stage: int) -> None:
 
 @compiled
 def _renew(rig: Rig, hg: float, work: _Work) -> None:
-    """A new matrix, about the velocities at hand."""
+    """Compute the matrix again, at the present velocities."""
     _place(rig, hg, work)
     assemble(rig, work.m, hg, work.band)
     factor(work.band)
@@ -251,10 +254,11 @@ def _renew(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def beat(rig: Rig, rods: Array, start: State, tolerance: float, R: Array, p: Array, z: Array) -> State:
-    """March through a beat of len(``rods``) equal steps; where that fails, the end is NaN.
+    """Integrate a beat of len(``rods``) equal steps; NaN at the end if that fails.
 
-    ``rods`` [n + 1, STAGES, 2, 2]: angle and rate of both rods at all stages, rad and rad/s. ``tolerance`` (m): of a
-    stage. Out: rotations ``R`` [n, N, 3, 3], centres ``p`` [n, N, 3] and memories ``z`` [n, Z] at each step's start.
+    ``rods`` [n + 1, STAGES, 2, 2]: angle and rate of both rods at all stages, rad and rad/s. ``tolerance`` (m) of a
+    stage. Written: rotations ``R`` [n, N, 3, 3], centres ``p`` [n, N, 3] and internal states ``z`` [n, Z] at the start
+    of each step.
     """
     n, steps = len(rig.mass), len(rods) - 1
     h = rig.period / steps
@@ -268,13 +272,13 @@ def beat(rig: Rig, rods: Array, start: State, tolerance: float, R: Array, p: Arr
         for stage in range(1, STAGES):
             _drive(rig, rods[step, stage], work.m)
             _base(rig, h, stage, now, work)
-            # the accelerations at the start of a beat may be those of a leap: nothing to go on with
+            # a beat may start from an extrapolated state, whose accelerations are not useful
             _guess(work, hg, stage - 1 if step + stage > 1 else -1)
             if age >= _KEPT:
                 _renew(rig, hg, work)
                 age = 0
             took = _stage(rig, hg, tolerance, work, end)
-            if took < 0:  # once more, from the velocities at the start of the step
+            if took < 0:  # try again, from the velocities at the start of the step
                 _guess(work, hg, -1)
                 _renew(rig, hg, work)
                 took = _stage(rig, hg, tolerance, work, end)
@@ -287,7 +291,7 @@ def beat(rig: Rig, rods: Array, start: State, tolerance: float, R: Array, p: Arr
         now.R[:], now.p[:], now.v[:], now.w[:] = work.m.R[:n], work.m.p[:n], work.m.v[:n], work.m.w[:n]
         now.z[:] = end
         work.k[0] = work.k[STAGES - 1]
-        for b in range(n):  # the next step's vectors begin anew
+        for b in range(n):  # the Cayley vectors of the next step start at zero
             for i in range(3):
                 work.k[0, 12 * b + 3 + i] = now.w[b, i]
     if not fine:

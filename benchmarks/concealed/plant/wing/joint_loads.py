@@ -1,4 +1,4 @@
-"""What joints do: springs and dampers (thesis Eqs. 4-7), and what may be hidden in them.
+"""Loads of joints: springs and dampers (thesis Eqs. 4-7), and the effects that can be hidden in them.
 
 With axes a_k, b_k of both frames and the gap s between their origins, all in the world, the spring's energy is
 sum_k g_k (1 - a_k . b_k) + (s . A s + s . B s) / 4, g = tr(K_o) / 2 - K_o, A = sum_k k_k a_k a_k^T and B alike.
@@ -17,12 +17,12 @@ from benchmarks.concealed.plant.wing.vectors import ZERO, act, axis, cross, dot,
 
 Array = npt.NDArray[np.float64]
 
-_SOFT = 0.08  # part of a play over which its stops set in
+_SOFT = 0.08  # width of the soft stops, as a fraction of the play
 
 
 @compiled
 def joint_loads(rig: Rig, m: Motion, load: Array) -> None:
-    """Add to ``load`` [N + 2, 6] what springs and dampers do."""
+    """Add the loads of springs and dampers to ``load`` [N + 2, 6]."""
     for c in range(len(rig.first)):
         i, j = rig.first[c], rig.second[c]
         arm_a, arm_b = turned(m.R, i, row(rig.a, c)), turned(m.R, j, row(rig.b, c))
@@ -51,7 +51,7 @@ def joint_loads(rig: Rig, m: Motion, load: Array) -> None:
 
 @compiled
 def angle_between(m: Motion, i: int, j: int, k: int) -> float:
-    """Angle (rad) about axis k (0 or 1) by which frame j is turned from frame i."""
+    """Angle (rad) of frame j relative to frame i, about axis k (0 or 1)."""
     u, v = (1, 2) if k == 0 else (2, 0)
     sine = dot(axis(m.R, i, v), axis(m.R, j, u)) - dot(axis(m.R, i, u), axis(m.R, j, v))
     return math.atan2(sine, dot(axis(m.R, i, u), axis(m.R, j, u)) + dot(axis(m.R, i, v), axis(m.R, j, v)))
@@ -59,7 +59,7 @@ def angle_between(m: Motion, i: int, j: int, k: int) -> float:
 
 @compiled
 def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
-    """A bending moment beyond k phi: hardening as k sinh(x) / x of x = h phi, or a play at the root."""
+    """Add the bending moment in excess of k phi: hardening k sinh(x) / x with x = h phi, or play at the root."""
     i, j, k = rig.first[c], rig.second[c], rig.bends[c]
     phi = angle_between(m, i, j, k)
     more = 0.0
@@ -75,7 +75,7 @@ def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
 
 @compiled
 def dead_zone(phi: float, half: float) -> float:
-    """What of an angle lies beyond -half to half, with soft edges: log(1 + exp) in the place of max(., 0)."""
+    """The part of an angle outside -half to half, with soft edges: log(1 + exp) instead of max(., 0)."""
     soft = _SOFT * half
     up, down = (phi - half) / soft, (-phi - half) / soft
     above = up if up > 30.0 else math.log1p(math.exp(up))
@@ -85,7 +85,7 @@ def dead_zone(phi: float, half: float) -> float:
 
 @compiled
 def remembered_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, load: Array) -> None:
-    """Moments -k z of what joints remember, with z = old + hg z' at the end of a stage solved in closed form.
+    """Add the moments -k z of joints with an internal state; z = old + hg z' at the end of a stage, in closed form.
 
     Maxwell (1867): z' = r - z / T. Dahl (1968): z' = r - |r| z / y. Slider (Prandtl 1928): z' = r within -y to y.
     """

@@ -1,4 +1,4 @@
-"""Springs and dampers between the bodies of a cut wing (thesis Eqs. 15-17), and what the air shares among them."""
+"""Springs and dampers between the bodies of a divided wing (thesis Eqs. 15-17), and the bodies' shares of air loads."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from wingfit.records import Rod
 
 Array = npt.NDArray[np.float64]
 
-_REACH = 0.02  # m: a driven rod may begin so far outboard of the root
+_REACH = 0.02  # m: largest distance of the start of a driven rod from the root
 _SERIES = 15  # terms of the torsion constant
 
 
 @dataclass(frozen=True)
 class Joint:
-    """Between body ``first`` (-1: front driving rod, -2: rear one) and body ``second`` at ``point`` (wing frame, m).
+    """Joint of body ``first`` (-1: front driving rod, -2: rear one) and body ``second`` at ``point`` (wing frame, m).
 
-    ``stiffness`` and ``damping`` [6] about x, y, z (N m/rad) and along x, y, z (N/m); ``of_rods``: what rods add to
-    the bending stiffness, N m/rad. ``along_span``: whether it joins along the span, else along the chord. ``from_y``,
-    ``to_y``: the wing that it stands for, m; ``length``: the distance between the bodies' centroids, m.
+    ``stiffness`` and ``damping`` [6] about x, y, z (N m/rad) and along x, y, z (N/m). ``of_rods``: the rods' part of
+    the bending stiffness, N m/rad. ``along_span``: whether the bodies are neighbours along the span or along the chord.
+    ``from_y``, ``to_y``: the stretch of wing that the joint represents, m; ``length``: distance of the bodies'
+    centroids, m.
     """
 
     first: int
@@ -41,7 +42,7 @@ class Joint:
 
 
 def torsion_constant(width: float, thickness: float) -> float:
-    """Of a rectangle, m^4 (Saint-Venant; Roark's Formulas, table 10.1, by the full series)."""
+    """Torsion constant of a rectangle, m^4 (Saint-Venant; Roark's Formulas, table 10.1, full series)."""
     a, b = max(width, thickness), min(width, thickness)
     n = np.arange(1, 2 * _SERIES, 2)
     return float(a * b**3 * (1 / 3 - 64 / math.pi**5 * b / a * np.sum(np.tanh(n * math.pi * a / (2 * b)) / n**5)))
@@ -51,7 +52,7 @@ class _Maker:
     def __init__(self, cut: Cut, genome: Mapping[str, float]) -> None:
         self.cut, self.genome = cut, genome
         young, shear = (genome["E_f"], genome["D_E"]), (genome["G_f"], genome["D_G"])
-        # which modulus and which damping goes with each of the six directions
+        # modulus and damping of each of the six directions
         self.spanwise = np.array([young, shear, young, shear, young, shear])
         self.chordwise = np.array([shear, young, young, young, shear, shear])
 
@@ -59,7 +60,10 @@ class _Maker:
         self, pair: tuple[int, int], point: tuple[float, float], section: Array, along_span: bool,
         length: float, over: tuple[float, float], rods: list[Rod],
     ) -> Joint:  # fmt: skip
-        """``section`` [6]: second moments and areas of the foam; ``over``: which wing it stands for."""
+        """A joint.
+
+        ``section`` [6]: second moments and areas of the foam, ``over``: the stretch of wing that it represents.
+        """
         foam = section[:, None] * (self.spanwise if along_span else self.chordwise)
         plain = foam[:, 0] / length
         stiffness = self._with_rods(foam[:, 0], rods, *over) / length if rods else plain
@@ -69,7 +73,7 @@ class _Maker:
         )  # fmt: skip
 
     def _with_rods(self, foam: Array, rods: list[Rod], y0: float, y1: float) -> Array:
-        """Mean rigidity [6] between y0 and y1: rods lie beside the foam, stretches of wing one after the other."""
+        """Mean rigidity [6] between y0 and y1: rods in parallel with the foam, stretches in series."""
         cuts = np.unique(np.clip([y0, y1] + [end for rod in rods for end in (rod.y_root, rod.y_tip)], y0, y1))
         flexibility = np.zeros(6)
         for a, b in pairwise(cuts):
@@ -84,7 +88,7 @@ class _Maker:
         return np.asarray((y1 - y0) / flexibility)
 
     def twisting(self, y: float) -> float:
-        """Torsion constant per width of the whole chord, m^3."""
+        """Torsion constant per width of the chord, m^3."""
         _, chord, thickness = self.cut.section(y)
         return torsion_constant(chord, thickness) / chord
 
@@ -101,8 +105,8 @@ class _Maker:
         inner, outer = cut.counts[strip], cut.counts[strip + 1]
         y, y0, y1 = float(cut.edges[strip + 1]), float(cut.centroid[a, 1]), float(cut.centroid[b, 1])
         _, chord, h = cut.section(y)
-        # shear along and across the section bear half of a torque each; joints along the chord bear the latter at
-        # (n - 1) of n places, so that these are left with half of 1 + 1 / n
+        # shear along and across the section carry half of a torque each; joints along the chord carry the latter at
+        # (n - 1) of n places, so that half of 1 + 1 / n remains for these joints
         share = 0.5 * (0.5 + 0.5 / inner + 0.5 + 0.5 / outer)
         rods, found = self._rods(strip, y0, y1), []
         for i in range(inner):
@@ -115,13 +119,16 @@ class _Maker:
                 section = np.array([w * h**3 / 12, self.twisting(y) * w * share, h * w**3 / 12, A, A, A])
                 point = (cut.x_at(0.5 * (s0 + s1), y), y)
                 found.append(self.joint(pair, point, section, True, y1 - y0, (y0, y1), rods.pop(pair, [])))
-        for pair, lonely in rods.items():  # rods that go from one piece of the chord to another
+        for pair, lonely in rods.items():  # rods that pass from one part of the chord to another
             x = float(np.mean([_x_of(rod, y) for rod in lonely]))
             found.append(self.joint(pair, (x, y), np.zeros(6), True, y1 - y0, (y0, y1), lonely))
         return found
 
     def _rods(self, strip: int, y0: float, y1: float) -> dict[tuple[int, int], list[Rod]]:
-        """By the bodies that hold them on either side of a border; a rod that ends stays in its piece of the chord."""
+        """Rods by the two bodies that they join across a border.
+
+        A rod that ends there stays in its part of the chord.
+        """
         found: dict[tuple[int, int], list[Rod]] = {}
         for rod in self.cut.wing.rods:
             begin, end = max(rod.y_root, y0), min(rod.y_tip, y1)
@@ -132,7 +139,7 @@ class _Maker:
         return found
 
     def _piece(self, strip: int, rod: Rod, y: float) -> int:
-        """Body of a strip in whose piece of the chord the rod is at y."""
+        """Body of a strip that contains the rod at y."""
         edge, chord, _ = self.cut.section(y)
         count = self.cut.counts[strip]
         part = min(max((_x_of(rod, y) - edge) / chord, 0.0), 1.0)
@@ -152,7 +159,10 @@ class _Maker:
         return found
 
     def at_root(self) -> list[Joint]:
-        """Driven rods hold the root through the foam of the bodies they enter; before its start a rod is a rod."""
+        """Joints of the driven rods to the root, through the foam of the bodies they enter.
+
+        Inboard of it a rod is bare.
+        """
         cut, wing = self.cut, self.cut.wing
         y, y1 = float(cut.edges[0]), float(cut.centroid[0, 1])
         rods = [next(rod for rod in wing.rods if rod.name == name) for name in wing.driven_rods]
@@ -186,9 +196,11 @@ def joints(cut: Cut, genome: Mapping[str, float]) -> list[Joint]:
 
 
 def shares(cut: Cut, genome: Mapping[str, float], prefix: str) -> Array:
-    """[N, 2]: part of its strip's force on each body (thesis Eqs. 12-13), and x where it acts from the body's centre.
+    """[N, 2].
 
-    The four weights ``prefix``_1 to _4 belong to the quarters of the chord, each spread evenly.
+    Share of its strip's force on each body (thesis Eqs. 12-13), and x of its point of attack from the centre.
+
+    The four weights ``prefix``_1 to _4 belong to the quarters of the chord; each is spread evenly.
     """
     weights = np.array([genome[f"{prefix}_{k}"] for k in range(1, 5)])
     weights = weights / weights.sum()

@@ -1,4 +1,4 @@
-"""The drive: angle of the driving rods over a turn of the motor, from the linkage or as a series."""
+"""The drive: angles of the driving rods over a turn of the motor, from a four-bar linkage or a Fourier series."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ HARMONICS = 40
 
 
 def rocker(link: FourBarDrive, psi: Array) -> Array:
-    """Angle (rad, in -pi to pi) of a four-bar's rocker for crank angles ``psi`` [n], continuous over a turn.
+    """Angle (rad, -pi to pi) of a four-bar linkage's rocker at crank angles ``psi`` [n], continuous over a turn.
 
-    Freudenstein's equation (1955): a cos(theta) + b sin(theta) = k, by the tangent of theta / 2. Of the two ways to
-    put the linkage together it is the one whose rocker lies clockwise of the line from its pivot to the crank pin.
+    Freudenstein's equation (1955): a cos(theta) + b sin(theta) = k, solved by the tangent of theta / 2. Of the two
+    assemblies it is the one whose rocker lies clockwise of the line from its pivot to the crank pin.
     """
     a, b = link.crank * np.cos(psi) - link.ground, link.crank * np.sin(psi)
     k = (link.rocker**2 - link.coupler**2 + a**2 + b**2) / (2 * link.rocker)
@@ -26,7 +26,7 @@ def rocker(link: FourBarDrive, psi: Array) -> Array:
     if np.any(square < 0):
         raise ValueError(
             f"linkage of ground {link.ground:g}, crank {link.crank:g}, coupler {link.coupler:g} and rocker "
-            f"{link.rocker:g} m does not turn round: shorten the crank"
+            f"{link.rocker:g} m cannot make a full turn; shorten the crank"
         )
     theta = np.unwrap(2 * np.arctan2(b - np.sqrt(square), a + k)) + link.offset
     return np.asarray(theta - 2 * np.pi * np.round(theta.mean() / (2 * np.pi)))

@@ -1,4 +1,4 @@
-"""The way to the periodic motion: Anderson's method on the map from the start of a beat to its end."""
+"""Finds the periodic motion by Anderson acceleration of the map from the start of a beat to its end."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from benchmarks.concealed.plant.wing.rig import Rig
 
 Array = npt.NDArray[np.float64]
 
-_LENGTH = 0.1  # m, by which turning is compared with moving
-_WINDOW = 10  # beats that are combined
-_ROUGH = 2e-4  # m: so near before steps are made finer
-_FAR = 0.3  # m: a leap beyond this is no leap to take
-_STAGE = 1e-3  # of the distance that is aimed at: what stages of a beat are solved to
-_FIRST = 1e-5  # m, of the stages of the first beat
-_WORSE = 5.0  # times the change of the best beat: a leap that led there is taken back
+_LENGTH = 0.1  # m: converts rotations to displacements when they are compared
+_WINDOW = 10  # beats that are combined in an extrapolation
+_ROUGH = 2e-4  # m: distance from periodicity below which the steps are refined
+_FAR = 0.3  # m: extrapolations that go farther are rejected
+_STAGE = 1e-3  # tolerance of a stage, relative to the tolerance of periodicity
+_FIRST = 1e-5  # m: tolerance of the stages of the first beat
+_WORSE = 5.0  # ratio to the smallest change so far above which an extrapolation is undone
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """``rough`` steps a beat on the way, ``steps`` for the beat that is kept; periodic to ``periodic`` m.
+    """``rough`` steps a beat during the search, ``steps`` in the final beat; periodic to ``periodic`` m.
 
-    As they are here the steps' error stays below 0.02 mm for the thesis's wings at up to 4 Hz.
+    With these values the error of the steps is below 0.02 mm for the thesis's wings at up to 4 Hz.
     """
 
     rough: int = 48
@@ -37,9 +37,9 @@ class Accuracy:
 
 
 def settle(rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accuracy) -> tuple[Array, Array, float, int]:
-    """Rotations [n, N, 3, 3] and centres [n, N, 3] over a periodic beat, distance from it (m), beats it took.
+    """A periodic beat: rotations [n, N, 3, 3], centres [n, N, 3], distance from periodicity (m), number of beats.
 
-    ``rods``: table of :func:`.build.rod_table` for a number of steps. ArithmeticError where none is found.
+    ``rods``: table of :func:`.build.rod_table` for a number of steps. ArithmeticError if there is no periodic motion.
     """
     state, spent = _let_in(rig, rods(accuracy.rough), start), 1
     for steps, near in ((accuracy.rough, _ROUGH), (accuracy.steps, accuracy.periodic)):
@@ -50,7 +50,7 @@ def settle(rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accur
 
 
 def _let_in(rig: Rig, table: Array, start: State) -> State:
-    """The end of a beat over which the drive grows from rest."""
+    """The state after a beat over which the drive's amplitude grows from zero."""
     n = len(table) - 1
     x = np.minimum((np.arange(n + 1)[:, None] + C) / n, 1.0)[..., None]
     share, growth = x**3 * (10 + x * (6 * x - 15)), 30 * (x * (1 - x)) ** 2 / rig.period
@@ -60,12 +60,12 @@ def _let_in(rig: Rig, table: Array, start: State) -> State:
         np.empty((n, len(rig.mass), 3, 3)), np.empty((n, len(rig.mass), 3)), np.empty((n, len(start.z))),
     )  # fmt: skip
     if not np.isfinite(end.p).all():
-        raise ArithmeticError("the wing does not follow its drive from rest: check genome and condition")
+        raise ArithmeticError("the integration fails while the drive starts from rest; check genome and condition")
     return end
 
 
 class _Search:
-    """The search with one number of steps; ``R``, ``p`` and ``error`` are of the last beat."""
+    """The search with one number of steps; ``R``, ``p`` and ``error`` belong to the last beat."""
 
     def __init__(self, rig: Rig, table: Array, near: float) -> None:
         self.rig, self.table, self.near = rig, table, near
@@ -74,7 +74,7 @@ class _Search:
         self.error = np.inf
 
     def run(self, state: State, most: int) -> tuple[State, int]:
-        """From ``state`` to the periodic one; beats it took. ArithmeticError."""
+        """Search from ``state``; the periodic state and the number of beats. ArithmeticError without convergence."""
         omega = 2 * np.pi / self.rig.period
         memories = np.empty((len(self.table) - 1, len(state.z)))
         xs: list[Array] = []
@@ -86,9 +86,9 @@ class _Search:
             size = _largest(f, len(self.rig.mass)) if f is not None else np.inf
             if f is None or (size > _WORSE * best and len(xs) > 1):
                 if not xs:
-                    raise ArithmeticError("the first beat cannot be marched through: check genome and condition")
+                    raise ArithmeticError("the first beat cannot be integrated; check genome and condition")
                 k = int(np.argmin([_largest(g, len(self.rig.mass)) for g in fs]))
-                x, xs, fs, best = xs[k] + fs[k], [], [], np.inf  # from the best, without leaping
+                x, xs, fs, best = xs[k] + fs[k], [], [], np.inf  # restart from the best state, without extrapolation
                 continue
             best = min(best, size)
             xs, fs = [*xs[-_WINDOW:], x], [*fs[-_WINDOW:], f]
@@ -99,12 +99,12 @@ class _Search:
                 return end, count
             x = leap if way < _FAR else x + f
         raise ArithmeticError(
-            f"no periodic motion within {most} beats: {1e3 * self.error:.3g} mm are left; check genome and strength"
+            f"no periodic motion within {most} beats: {1e3 * self.error:.3g} mm remain; check genome and strength"
         )
 
 
 def _leap(xs: list[Array], fs: list[Array]) -> Array:
-    """Anderson's next guess (1965)."""
+    """The next state by Anderson's extrapolation (1965)."""
     if len(xs) == 1:
         return xs[0] + fs[0]
     dx, df = np.diff(np.array(xs), axis=0).T, np.diff(np.array(fs), axis=0).T
@@ -113,12 +113,15 @@ def _leap(xs: list[Array], fs: list[Array]) -> Array:
 
 
 def _largest(f: Array, bodies: int) -> float:
-    """Largest change of any body's place or attitude, m."""
+    """Largest change of a body's place or attitude, m."""
     return float(np.abs(f[: 6 * bodies]).max())
 
 
 def _packed(state: State, omega: float) -> Array:
-    """All in metres: places, attitudes and rates by a chord, memories by their moment's worth of turning."""
+    """All states in metres.
+
+    Attitudes and rates times a chord, internal states by the rotation that their moment causes.
+    """
     turn = _LENGTH * Rotation.from_matrix(state.R).as_rotvec()
     parts = (state.p, turn, state.v / omega, _LENGTH / omega * state.w, 0.02 * state.z)
     return np.concatenate([part.ravel() for part in parts])

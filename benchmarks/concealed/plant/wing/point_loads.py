@@ -1,4 +1,4 @@
-"""Things that hold, hit, brake or hang on the wing at one point; no library of effects has them."""
+"""Loads at one point of the wing: a band, a stop, a brake, an appendage. The library has none of them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from benchmarks.concealed.plant.wing.vectors import V3, ZERO, act, axis, cross, 
 
 Array = npt.NDArray[np.float64]
 
-_SLACK = 5e-4  # m over which a band comes tight
+_SLACK = 5e-4  # m: range over which a band becomes tight
 
 
 @compiled
 def _held(q: Array, place: V3, velocity: V3) -> V3:
-    """Force on the wing at ``place``, by the row ``q`` of Rig.points; nothing of it remembers."""
+    """Force on the wing at ``place``, for a row ``q`` of Rig.points without an internal state."""
     if q[0] == BAND:  # from a fixed point, elastic beyond its length: x, y, z, N/m, m
         away = plus((q[4], q[5], q[6]), -1.0, place)
         length = math.sqrt(dot(away, away))
@@ -40,8 +40,8 @@ def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int
     """Add the loads of all points.
 
     An appendage of mass q4 (kg) moves along the body's normal n on a spring of angular frequency q5 (rad/s) with
-    damping ratio q6. Its states are the way s on the spring and its velocity u along n: s' = u - n.v,
-    u' = -(w^2 s + 2 d w s') + (omega x n).v - g n_z; they are solved for in closed form, as in ``remembered_loads``.
+    damping ratio q6. Its states are the spring's displacement s and its velocity u along n: s' = u - n.v,
+    u' = -(w^2 s + 2 d w s') + (omega x n).v - g n_z; they are solved in closed form, as in ``remembered_loads``.
     """
     for k in range(len(rig.points)):
         q, n = rig.points[k], rig.point_body[k]

@@ -10,16 +10,16 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
-# Columns of Rig.memory, of what a joint keeps beside its spring; kinds of it
+# Columns of Rig.memory (internal states of joints), and its kinds
 KEEPS, STIFF, PARAMETER = range(3)
 MAXWELL, DAHL, SLIDER = range(3)
-# Numbers of Rig.air_laws
+# Indices of Rig.air_laws
 LAG, LAG_RATE, STALL, STALL_ANGLE, STALL_DELAY, VORTEX, VORTEX_ANGLE, CARRIED = range(8)
 AIR_LAWS = 8
-AIR_STATES = 4  # per strip: two late downwashes, late angle of attack, attached part
+AIR_STATES = 4  # per strip: two lagged downwashes, lagged angle of attack, attached fraction
 # Columns of Rig.jets: strip, velocity of the air, height and half height of the stream
 JETS = 6
-# Columns of Rig.points: kind, place from the body's centre, then what the law needs; kinds of them
+# Columns of Rig.points: kind, place from the body's centre, parameters of the law; and its kinds
 POINTS = 11
 BAND, STOP, BRAKE, APPENDAGE = range(4)
 
@@ -34,15 +34,15 @@ class Rig(NamedTuple):
             the hinge), m.
         stiffness, damping: [C, 6] about x, y, z, then along x, y, z, of the first body's axes.
         bends: [C] axis about which it bends; ``curvature`` [C]: rad over the span per rad.
-        hardening: [C] growth of the bending moment; ``play`` [C] rad to either side about x; 0 where there is none.
-        memory_of: [E] joint, ``memory_axis`` [E] axis, ``memory`` [E, 3] kind, stiffness (N m/rad), and its time (s) or
-            the angle at which it gives way (rad).
+        hardening: [C] growth of the bending moment; ``play`` [C] rad to either side about x; 0 without them.
+        memory_of: [E] joint, ``memory_axis`` [E] axis, ``memory`` [E, 3] kind, stiffness (N m/rad), and relaxation time
+            (s) or yield angle (rad).
         strip: [S + 1] first body of each strip; ``weight`` [N] part of the strip's area; ``centroid`` [N, 2] from the
             body's centre, m.
         area, chord: [S] m^2 and m.
         coefficients: [4] L_a, L_b, ID_a, ID_b (thesis Eqs. 10-11); ``lift``, ``drag`` [N, 2]: shares and places.
         air: density, kg/m^3; ``wind`` [3] m/s; ``gravity`` m/s^2.
-        air_laws: [AIR_LAWS]; ``remembers`` whether the air does.
+        air_laws: [AIR_LAWS]; ``remembers``: whether they have internal states.
         jets: [J, JETS]; ``points`` [P, POINTS] with ``point_body`` [P].
         hinge: [3] m on the axis of the rods; ``axle`` [3] its direction.
         period: of a beat, s.
@@ -99,5 +99,5 @@ class Motion(NamedTuple):
 
 
 def states_of(rig: Rig) -> int:
-    """How many numbers the laws remember."""
+    """Number of internal states."""
     return len(rig.memory) + AIR_STATES * len(rig.area) * rig.remembers + 2 * len(rig.points)

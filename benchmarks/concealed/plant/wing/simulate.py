@@ -1,4 +1,4 @@
-"""One periodic beat of a wing that may have something to hide: what ideal cameras would see."""
+"""Simulates one periodic beat of a wing with hidden effects: the motion that ideal cameras would see."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from wingfit.records import Condition, Wing
 
 Array = npt.NDArray[np.float64]
 
-SAMPLES = 192  # instants of a beat that are given, at least
+SAMPLES = 192  # least number of instants in a beat
 
 
 @dataclass(frozen=True, eq=False)
 class Beat:
-    """One beat in the periodic motion.
+    """One beat of the periodic motion.
 
     Attributes:
-        tracks: [n, M, 3] of all markers in the order of the wing's, at n equal steps of the drive phase from 0, m.
-        hidden: what is hidden in it; ``turns``: drive phases (rad) about which those act that do so at the top of their
-            way.
+        tracks: [n, M, 3] of all markers in the wing's order, at n equal steps of the drive phase from 0, m.
+        hidden: effects that are hidden in it; ``turns``: drive phases (rad) of those that act near the top of the
+            stroke.
         error: estimated distance from the periodic motion, m.
-        beats: beats that were marched through on the way.
+        beats: number of beats that were integrated.
         crossing: drive phase (rad) at which the reference markers rise through the height of the hinge: the start of
-            the beat as a dataset has it.
+            the beat as a dataset defines it.
     """
 
     wing: Wing
@@ -45,24 +45,27 @@ class Beat:
 
     @property
     def truths(self) -> tuple[Truth, ...]:
-        """The answers; their ``turn`` in beats is what :meth:`phase` makes of it."""
+        """The answers; their phase in beats is :meth:`phase` of ``turn``."""
         return self.hidden.truths(self.wing, self.turns)
 
     @cached_property
     def crossing(self) -> float:
-        """As above; ValueError where they never do."""
+        """Drive phase (rad) at the start of a dataset's beat.
+
+        ValueError if the markers never cross the hinge's height.
+        """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in self.wing.reference_markers]
         height = self.tracks[:, columns, 2].mean(axis=1) - self.wing.hinge.z
         rising = np.flatnonzero((height <= 0) & (np.roll(height, -1) > 0))
         if len(rising) == 0:
-            raise ValueError("the reference markers never rise through the height of the hinge: name others")
+            raise ValueError("the reference markers never rise through the height of the hinge; choose others")
         slope = np.roll(height, -1) - height
         k = int(rising[np.argmax(slope[rising])])
         return float(2 * np.pi * (k - height[k] / slope[k]) / len(height))
 
     def phase(self, psi: float) -> float:
-        """Drive phase (rad) in beats from the start of the beat, 0 to 1."""
+        """Drive phase (rad) as a phase from the start of the dataset's beat, in beats from 0 to 1."""
         return float((psi - self.crossing) / (2 * np.pi) % 1.0)
 
 
@@ -74,9 +77,11 @@ def simulate(
     hidden: Hidden | None = None,
     accuracy: Accuracy | None = None,
 ) -> Beat:
-    """Simulate ``wing`` cut by ``division`` (:func:`.geometry.counts_of`) with a genome (thesis Eqs. 18-19, SI units).
+    """Simulate ``wing`` divided by ``division`` (:func:`.geometry.counts_of`) with a genome (thesis Eqs.
 
-    ArithmeticError where no periodic motion is found.
+    18-19, SI units).
+
+    ArithmeticError if there is no periodic motion.
     """
     draft = Draft(wing, division, genome, condition)
     concealed = hidden or Hidden()
@@ -95,9 +100,9 @@ def simulate(
 
 
 def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
-    """Drive phase (rad) about which an effect acts: the middle of what is larger than half of its most."""
+    """Drive phase (rad) at which an effect acts: the middle of the interval in which it exceeds half its maximum."""
     if effect.kind.acting is None:
-        raise ValueError(f"of {effect.name} the motion does not tell when it acts")
+        raise ValueError(f"{effect.name} has no phase that the motion determines")
     body, arm, _ = draft.at(effect.values["span"], effect.values.get("chord", 0.5))
     height = p[:, body, 2] + R[:, body, 2] @ arm
     rate = np.gradient(np.concatenate([height[-1:], height, height[:1]]))[1:-1] * len(height)
@@ -107,7 +112,7 @@ def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
 
 
 def at_rest(rig: Rig) -> State:
-    """The undeformed wing, not moving."""
+    """The undeformed wing at rest."""
     n = len(rig.mass)
     return State(
         np.tile(np.eye(3), (n, 1, 1)), rig.rest.copy(), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(states_of(rig))

@@ -1,4 +1,4 @@
-"""The matrix of Newton's iteration, M + h C + h^2 K: symmetric, its lower half in a band (:mod:`.banded`)."""
+"""The matrix of Newton's iteration, M + h C + h^2 K: symmetric, lower half as a band matrix (:mod:`.banded`)."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from benchmarks.concealed.plant.wing.vectors import V3, ZERO, axis, cross, dot, 
 
 Array = npt.NDArray[np.float64]
 
-_SLOPE = 1e-5  # rad, of a difference
+_SLOPE = 1e-5  # rad: step of a finite difference
 
 
 @compiled
 def assemble(rig: Rig, m: Motion, hg: float, band: Array) -> None:
-    """Fill ``band`` [6 N, 6 (reach + 1)] for a stage of length ``hg`` (s) about a motion."""
+    """Fill ``band`` [6 N, 6 (reach + 1)] for a stage of length ``hg`` (s) at a given motion."""
     band[:] = 0.0
     last = band.shape[1] - 1
     for n in range(len(rig.mass)):
@@ -76,7 +76,7 @@ def _joint(rig: Rig, m: Motion, c: int, hg: float, band: Array) -> None:
 
 @compiled
 def _stiffness(rig: Rig, m: Motion, c: int, k: int) -> float:
-    """About axis k, with what hardening and play make of it here."""
+    """Tangent stiffness about axis k, with hardening and play."""
     stiff = rig.stiffness[c, k]
     if k != rig.bends[c] or (rig.hardening[c] == 0.0 and rig.play[c] == 0.0):
         return float(stiff)
@@ -91,7 +91,7 @@ def _stiffness(rig: Rig, m: Motion, c: int, k: int) -> float:
 
 @compiled
 def _couple(rig: Rig, c: int, a: V3, size: float, band: Array) -> None:
-    """A joint's moment about the axis ``a``."""
+    """Add the moment of a joint about the axis ``a``."""
     i, j = rig.first[c], rig.second[c]
     x, y = np.zeros(6), np.zeros(6)
     _fill(x, ZERO, a)
@@ -130,7 +130,7 @@ def _product(n: int, x: Array, k: int, y: Array, size: float, band: Array) -> No
 
 @compiled
 def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
-    """Loss along the normal by the affine laws, and air that goes along; of a strip as a whole."""
+    """Damping along the normal by the affine laws, and added mass, of a strip as a whole."""
     x, y = np.zeros(6), np.zeros(6)
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
@@ -158,7 +158,7 @@ def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
 
 @compiled
 def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
-    """What holds the wing at a point, as if it did so in all directions alike."""
+    """Stiffness and damping of a point load, taken as equal in all directions."""
     q, n = rig.points[k], rig.point_body[k]
     arm = turned(m.R, n, (q[1], q[2], q[3]))
     v = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))

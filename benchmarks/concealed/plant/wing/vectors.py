@@ -1,4 +1,4 @@
-"""Vectors of space as triples of numbers, for compiled code."""
+"""Vectors in space as triples of numbers, for compiled code."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def turned(R: Array, n: int, x: V3) -> V3:
 
 @compiled
 def act(load: Array, n: int, force: V3, moment: V3) -> None:
-    """Add to ``load`` [n, 6] (force, moment)."""
+    """Add a force and a moment to row n of ``load`` [., 6]."""
     for i in range(3):
         load[n, i] += force[i]
         load[n, 3 + i] += moment[i]

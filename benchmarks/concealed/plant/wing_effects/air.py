@@ -1,4 +1,4 @@
-"""Aerodynamics that the tool's library has as well, in other forms; the laws are in ``wing/air_loads.py``."""
+"""Aerodynamic effects that the library has too, in another form; their laws are in ``wing/air_loads.py``."""
 
 from __future__ import annotations
 
@@ -40,22 +40,22 @@ def _stall(draft: Draft, strength: float, at: Values) -> None:
 LISTED_AIR = (
     Kind(
         "added_mass", "aerodynamics", True, "1", 1.0, 3.0,
-        "elliptic sections by strips (Munk 1924), each as a whole, where the library adds chordwise modes", _carried,
+        "elliptic sections by strips (Munk 1924), each rigid; the library adds chordwise modes", _carried,
         genes=_carried_genes,
     ),
     Kind(
         "leading_edge_vortex", "aerodynamics", True, "1", 0.7, 1.0,
-        "lift and drag as fitted by Dickinson, Lehmann and Sane (1999), where the library has C_l sin 2 alpha", _vortex,
+        "lift and drag as fitted by Dickinson, Lehmann and Sane (1999); the library has C_l sin 2 alpha", _vortex,
         shape={"angle": (0.2, 0.1, 0.35)},
     ),
     Kind(
         "circulation_lag", "aerodynamics", True, "1", 1.0, 1.9,
-        "Wagner's deficit of the downwash, by W. P. Jones (1945), where the library delays the circulation", _late,
+        "Wagner's deficit of the downwash, by W. P. Jones (1945); the library delays the circulation", _late,
         shape={"rate": (1.0, 0.6, 1.6)},
     ),
     Kind(
         "dynamic_stall", "aerodynamics", True, "1", 0.8, 1.0,
-        "Leishman and Beddoes (1989): two lags before Kirchhoff's law, where the library has Goman and Khrabrov",
+        "Leishman and Beddoes (1989): two lags before Kirchhoff's law; the library has Goman and Khrabrov",
         _stall, shape={"angle": (0.35, 0.25, 0.5), "delay": (1.0, 0.5, 2.5)},
     ),
 )  # fmt: skip

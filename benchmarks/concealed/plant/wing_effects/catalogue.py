@@ -1,4 +1,4 @@
-"""All kinds of effect that the plant can hide in a wing, in the order in which they act."""
+"""All effects that the plant can hide in a wing, in the order in which they are applied."""
 
 from __future__ import annotations
 

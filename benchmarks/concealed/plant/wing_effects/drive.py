@@ -1,4 +1,4 @@
-"""Errors of the actuation that the tool's library has as well, in other forms."""
+"""Errors of the drive that the library has too, in another form."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def _linkage(wing: Wing) -> FourBarDrive:
 
 
 def _further(wing: Wing, strength: float) -> Complex:
-    """By how much the series changes with a crank longer by a part, about the same mean."""
+    """Change of the series for a crank longer by a fraction, with the same mean."""
     link = _linkage(wing)
     change = series_of(replace(link, crank=link.crank * (1 + strength))) - series_of(link)
     change[0] = 0.0
@@ -31,17 +31,17 @@ def _further(wing: Wing, strength: float) -> Complex:
 
 
 def _otherwise(wing: Wing, strength: float) -> Complex:
-    """The same with a frame longer by a part; mean, and size and phase of the first harmonic, are put right again."""
+    """Change of the series for a frame longer by a fraction, with the same mean and first harmonic."""
     link = _linkage(wing)
-    told, found = series_of(link), series_of(replace(link, ground=link.ground * (1 + strength)))
-    shift, size = np.angle(told[1] / found[1]), abs(told[1] / found[1])
-    change = size * found * np.exp(1j * shift * np.arange(len(found))) - told
+    nominal, changed = series_of(link), series_of(replace(link, ground=link.ground * (1 + strength)))
+    shift, size = np.angle(nominal[1] / changed[1]), abs(nominal[1] / changed[1])
+    change = size * changed * np.exp(1j * shift * np.arange(len(changed))) - nominal
     change[:2] = 0.0
     return np.asarray(change)
 
 
 def _add(draft: Draft, change: Complex) -> None:
-    """To both rods, to the rear one as late as it is."""
+    """Add to both rods; the change of the rear rod lags like the rod itself."""
     late = np.exp(-1j * draft.condition.phase_lag * np.arange(len(change)))
     draft.rods += np.stack([change, change * late], axis=1)
 
@@ -51,8 +51,8 @@ def _stroke(draft: Draft, strength: float, _: Values) -> None:
 
 
 def _stroke_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
-    told = series_of(wing.drive)[1]
-    return {"stroke_amplitude.part": float(abs(told + _further(wing, strength)[1]) / abs(told) - 1)}
+    first = series_of(wing.drive)[1]
+    return {"stroke_amplitude.part": float(abs(first + _further(wing, strength)[1]) / abs(first) - 1)}
 
 
 def _shape(draft: Draft, strength: float, _: Values) -> None:
@@ -74,7 +74,10 @@ def _late_genes(_: Wing, strength: float, __: Values) -> dict[str, float]:
 
 
 def _tilted(draft: Draft, strength: float, at: Values) -> None:
-    """The rear bearing, a root chord behind the front one, lies off by ``strength`` in a direction from y to z."""
+    """The rear bearing, a root chord behind the front one, is displaced by ``strength``.
+
+    The direction is from y to z.
+    """
     chord = draft.cut.section(float(draft.cut.edges[0]))[1]
     axle = np.array([chord, strength * math.cos(at["direction"]), strength * math.sin(at["direction"])])
     draft.axle = axle / np.linalg.norm(axle)
@@ -114,21 +117,21 @@ _ROUND = {"direction": (0.6, -math.pi, math.pi)}
 LISTED_DRIVE = (
     Kind(
         "stroke_amplitude", "actuation", True, "1", 0.05, 0.3,
-        "a crank longer by a part: Freudenstein's equation (1955), where the library multiplies the series", _stroke,
+        "a crank longer by a fraction: Freudenstein's equation (1955); the library multiplies the series", _stroke,
         genes=_stroke_genes,
     ),
     Kind(
         "drive_harmonics", "actuation", True, "1", 0.04, 0.13,
-        "a linkage with a longer frame but the same stroke: all harmonics change, where the library has two", _shape,
+        "a linkage with a longer frame but the same stroke: all harmonics change; the library has two", _shape,
         genes=_shape_genes,
     ),
     Kind(
         "phase_lag_error", "actuation", True, "rad", 0.03, 0.2,
-        "the rear rod later than told (van der Grinten, section III-F)", _late, genes=_late_genes,
+        "the rear rod lags more than described (van der Grinten, section III-F)", _late, genes=_late_genes,
     ),
     Kind(
         "hinge_tilt", "actuation", True, "m", 0.01, 0.05,
-        "axis through two bearings of which the rear one is displaced", _tilted, shape=_ROUND, genes=_tilt_genes,
+        "axis through two bearings, of which the rear one is displaced", _tilted, shape=_ROUND, genes=_tilt_genes,
     ),
     Kind(
         "hinge_offset", "actuation", True, "m", 0.006, 0.04,
@@ -137,7 +140,7 @@ LISTED_DRIVE = (
     ),
     Kind(
         "backlash", "actuation", True, "rad", 0.03, 0.12,
-        "dead zone with logarithmic edges about the chord (Dubowsky and Freudenstein 1971; soft stops), where the "
+        "dead zone with logarithmic edges about the chord (Dubowsky and Freudenstein 1971; soft stops); the "
         "library has a pin in series with the spring", _loose, genes=_loose_genes,
     ),
 )  # fmt: skip

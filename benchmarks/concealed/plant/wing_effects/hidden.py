@@ -1,4 +1,4 @@
-"""What is hidden in a simulated wing: any number of effects, each with a strength that goes down to nothing."""
+"""Effects hidden in a simulated wing: any number, each with a strength that can be zero."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wingfit.records import Wing
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of a kind with its ``strength`` (in the kind's unit) and those parameters that are not typical."""
+    """An effect with its ``strength`` (in the unit of its kind) and those parameters ``at`` that are not typical."""
 
     name: str
     strength: float
@@ -23,14 +23,14 @@ class Effect:
 
     @property
     def kind(self) -> Kind:
-        """Of it; ValueError where there is none of that name."""
+        """Its kind; ValueError for an unknown name."""
         if self.name not in KINDS:
             raise ValueError(f"the plant cannot hide {self.name!r}; it can hide {', '.join(KINDS)}")
         return KINDS[self.name]
 
     @property
     def values(self) -> dict[str, float]:
-        """All parameters by name; ValueError for one that the kind does not have."""
+        """All parameters by name; ValueError for an unknown parameter."""
         shape = self.kind.shape
         for name in self.at:
             if name not in shape:
@@ -40,14 +40,14 @@ class Effect:
 
 @dataclass(frozen=True)
 class Truth:
-    """The answer to be found.
+    """The answer for one effect.
 
     Attributes:
         name, family, listed, strength: of the effect.
         parameters: all of its parameters.
-        span, chord: place on the wing in parts; None where it has none.
-        turn: drive phase (rad) about which it acts; None where it acts all the time.
-        genes: true values of the library's genes, of those that mean the same.
+        span, chord: place on the wing, as fractions; None for an effect without a place.
+        turn: drive phase (rad) near which it acts; None if it always acts.
+        genes: true values of the library's genes with the same meaning.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Hidden:
-    """Effects that are hidden in a wing; none by default."""
+    """Effects hidden in a wing; none by default."""
 
     effects: tuple[Effect, ...] = ()
 
@@ -73,7 +73,7 @@ class Hidden:
         return cls((Effect(name, strength, at),))
 
     def put_into(self, draft: Draft) -> None:
-        """Cut the wing up and change it, kind after kind in the order of the catalogue."""
+        """Divide the wing and apply the effects, in the order of the catalogue."""
         order = list(KINDS)
         present = [e for e in sorted(self.effects, key=lambda e: order.index(e.kind.name)) if e.strength != 0.0]
         for effect in present:
@@ -85,7 +85,7 @@ class Hidden:
                 effect.kind.put(draft, effect.strength, effect.values)
 
     def truths(self, wing: Wing, turns: Mapping[str, float]) -> tuple[Truth, ...]:
-        """The answers; ``turns``: drive phases at which effects act that only the motion tells."""
+        """The answers; ``turns``: drive phases of the effects whose phase depends on the motion."""
         return tuple(_truth(effect, wing, turns.get(effect.name)) for effect in self.effects)
 
 
@@ -105,6 +105,6 @@ def _truth(effect: Effect, wing: Wing, turn: float | None) -> Truth:
 
 
 def drawn(name: str, strength: float, rng: np.random.Generator) -> Effect:
-    """An effect of a kind with all its other parameters drawn evenly from their ranges."""
+    """An effect with its other parameters drawn uniformly from their ranges."""
     shape = Effect(name, strength).kind.shape
     return Effect(name, strength, {key: float(rng.uniform(low, high)) for key, (_, low, high) in shape.items()})

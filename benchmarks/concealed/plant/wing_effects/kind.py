@@ -22,17 +22,17 @@ class Kind:
     """A kind of effect.
 
     Attributes:
-        name: as in the tool's library if ``listed``, else the plant's own.
-        family: what sort of thing it is.
+        name: as in the library if ``listed``, else the plant's own.
+        family: structure, inertia, actuation or aerodynamics.
         listed: whether the library has it.
-        unit: of its strength; ``typical``: a strength that is easily seen beside noise of half a millimetre.
-        largest: strength beyond which it makes no sense, or no periodic motion is sure to be found.
-        shape: other parameters by name, with typical value and range: (value, lower, upper).
-        source: where the law is from, and in which form.
-        put: changes a draft for a strength and the parameters; called once the wing is cut unless ``before`` is set.
-        genes: true values of the library's genes, of those that mean the same.
-        acting: how large it is [n] while its place is at heights [n] (m) and rises at rates [n] (m/s); only of effects
-            of which nothing but the motion tells when they act.
+        unit: of its strength; ``typical``: a strength that is easily detected with a noise of 0.5 mm.
+        largest: strength above which it is not physical, or above which a periodic motion may not exist.
+        shape: other parameters by name, as (typical value, lower bound, upper bound).
+        source: literature, and how the law differs from the library's.
+        put: applies it to a draft, after the wing was divided unless ``before`` is set.
+        genes: true values of the library's genes with the same meaning.
+        acting: magnitude [n] at heights [n] (m) and vertical speeds [n] (m/s) of its place; only for effects whose
+            phase depends on the motion.
     """
 
     name: str

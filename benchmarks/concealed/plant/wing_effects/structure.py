@@ -1,4 +1,4 @@
-"""Structure and inertia that the tool's library has as well, in other forms."""
+"""Effects of structure and inertia that the library has too, in another form."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, SLIDER
 from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import Wing
 
-_SPECTRUM = ((0.5, 1.0), (0.5, 6.0))  # parts of the stiffness that relaxes, and their times in parts of the first
-_YIELDS = (0.4, 1.0, 2.5)  # of Dahl's elements, in parts of the middle one's
-_STEEPEST = 12.0  # of the argument of sinh at one radian over the span
+_SPECTRUM = (
+    (0.5, 1.0),
+    (0.5, 6.0),
+)  # fractions of the stiffness that relaxes, and relaxation times relative to the first
+_YIELDS = (0.4, 1.0, 2.5)  # of Dahl's elements, relative to the middle one
+_STEEPEST = 12.0  # largest argument of sinh at one radian over the span
 
 
 def _lump(draft: Draft, strength: float, at: Values) -> None:
-    """A point mass, by cutting a wing that has it: masses, centres and inertias are those of the whole."""
+    """A point mass, added before the wing is divided, so that masses, centres and inertias include it."""
     x, y = Cut(draft.wing, draft.division).place(at["span"], at["chord"])
     draft.lumps.append(Lump(strength, (x, y, 0.0)))
 
@@ -32,7 +35,7 @@ def _lump_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
 
 
 def _damage(draft: Draft, strength: float, at: Values) -> None:
-    """1 - strength of the stiffness is left, evenly, over a stretch with sharp ends."""
+    """The stiffness is reduced by the fraction ``strength``, evenly, over a stretch with sharp ends."""
     root = float(draft.cut.edges[0])
     lower, upper = (root + draft.span * (at["span"] + side * 0.5 * at["width"]) for side in (-1, 1))
     for c, joint in enumerate(draft.joints):
@@ -48,7 +51,10 @@ def _damage_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
 
 
 def _hardening(draft: Draft, strength: float, _: Values) -> None:
-    """Moment k phi sinh(x) / x, x = h times the curvature; h such that it is 1 + strength at a radian over the span."""
+    """Moment k phi sinh(x) / x, x = h times curvature.
+
+    H such that the factor is 1 + strength at a radian over the span.
+    """
     steep = float(brentq(lambda h: math.sinh(h) / h - 1 - strength, 1e-6, _STEEPEST))
     for c, joint in enumerate(draft.joints):
         if joint.first >= 0:
@@ -56,7 +62,7 @@ def _hardening(draft: Draft, strength: float, _: Values) -> None:
 
 
 def _relaxing(draft: Draft, strength: float, at: Values) -> None:
-    """Two Maxwell branches beside each spring of bending and torsion."""
+    """Two Maxwell branches parallel to each spring of bending and torsion."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -66,7 +72,7 @@ def _relaxing(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _yielding(draft: Draft, strength: float, at: Values) -> None:
-    """Three of Dahl's elements that yield one after the other, as Iwan (1966) puts sliders side by side."""
+    """Three Dahl elements in parallel that yield one after the other, as the sliders of Iwan (1966)."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -76,7 +82,7 @@ def _yielding(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _slipping(draft: Draft, strength: float, at: Values) -> None:
-    """A spring behind a dry slider beside each joint with rods: it carries what bends it by ``strength`` at most."""
+    """A spring with a dry slider parallel to each joint with rods; it carries at most ``strength``."""
     for c, joint in enumerate(draft.joints):
         if joint.first >= 0 and joint.of_rods > 0:
             limit = strength / draft.curvature(joint)
@@ -93,27 +99,27 @@ LISTED_STRUCTURE = (
     ),
     Kind(
         "damage", "structure", True, "1", 0.6, 0.9,
-        "a beam with a notch of even depth: Cawley and Adams (1979); sharp ends, where the library has a bell", _damage,
+        "a beam with a notch of even depth: Cawley and Adams (1979); sharp ends; the library has a bell shape", _damage,
         shape={"span": (0.5, 0.2, 0.8), "width": (0.15, 0.1, 0.25)}, genes=_damage_genes,
     ),
     Kind(
         "cubic_stiffness", "structure", True, "1", 1.5, 200.0,
-        "hardening as a hyperbolic sine (as Ogden's and Fung's exponential laws), where the library is cubic",
+        "hardening as a hyperbolic sine (like Ogden's and Fung's exponential laws); the library is cubic",
         _hardening,
     ),
     Kind(
         "viscoelastic", "structure", True, "1", 0.2, 4.0,
-        "Prony series of two Maxwell branches (Ferry 1980, ch. 1), where the library has one", _relaxing,
+        "Prony series of two Maxwell branches (Ferry 1980, ch. 1); the library has one", _relaxing,
         shape={"time": (0.03, 0.015, 0.06)},
     ),
     Kind(
         "hysteresis", "structure", True, "1", 0.25, 4.0,
-        "three elements of Dahl (1968) side by side as in Iwan's model (1966), where the library has Bouc and Wen",
+        "three elements of Dahl (1968) in parallel as in Iwan's model (1966); the library has Bouc and Wen",
         _yielding, shape={"angle": (0.1, 0.05, 0.2)},
     ),
     Kind(
         "rod_slip", "structure", True, "rad", 0.04, 1.0,
-        "Prandtl's slider (1928) with a spring, sharp, where the library has Dahl's friction with play", _slipping,
+        "Prandtl's slider (1928) with a spring, sharp; the library has Dahl's friction with play", _slipping,
         shape={"stick": (0.4, 0.3, 0.6)},
     ),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Physics that no library has: what a builder did not think of."""
+"""Effects that the library does not have."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 Array = npt.NDArray[np.float64]
 
 _SEA_LEVEL = 101_325.0  # Pa
-_TOOTH = 60.0  # sharpness of a tooth: it lasts for about a fiftieth of a turn
-_LOSS = 0.5  # s/m, of a stop: by how much harder it pushes where the wing comes than where it is at rest
-_DROP = 0.12  # m from the wing at rest down to where a band is tied
+_TOOTH = 60.0  # sharpness of a tooth: its width is about a fiftieth of a turn
+_LOSS = 0.5  # s/m: relative increase of a stop's force per speed of the approaching wing
+_DROP = 0.12  # m: height of the wing at rest above the band's anchor
 
 
 def _point(draft: Draft, kind: int, at: Values, *law: float) -> None:
@@ -27,7 +27,7 @@ def _point(draft: Draft, kind: int, at: Values, *law: float) -> None:
 
 
 def _height(draft: Draft, at: Values) -> float:
-    """Height (m) of a place on a straight wing at part ``at['stroke']`` of the way up of its angle."""
+    """Height (m) of a place on a straight wing at the fraction ``at['stroke']`` of the range of the flap angle."""
     angle = angles(draft.rods[:, 0], 2 * np.pi * np.arange(256) / 256)[:, 0]
     there = angle.min() + at["stroke"] * (angle.max() - angle.min())
     _, y = draft.cut.place(at["span"], 0.5)
@@ -66,7 +66,7 @@ def _blowing(draft: Draft, at: Values, height: Array, _: Array) -> Array:
 
 
 def _tooth(draft: Draft, strength: float, at: Values) -> None:
-    """A tooth of the motor's gear, before the crank: both rods hurry on and fall back, once a turn."""
+    """A tooth of the motor's gear, before the crank: both rods are advanced briefly, once a turn."""
     n = 1024
     psi = 2 * np.pi * np.arange(n) / n
     bump = strength * np.exp(_TOOTH * (np.cos(psi - at["turn"]) - 1))
@@ -77,7 +77,7 @@ def _tooth(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _cells(draft: Draft, strength: float, _: Values) -> None:
-    """Foam whose closed cells the air outside presses together: stiffer with its pressure."""
+    """Closed-cell foam, stiffened in proportion to the pressure of the air outside."""
     draft.factor *= 1 + strength * draft.condition.pressure / _SEA_LEVEL
 
 
@@ -86,16 +86,16 @@ _PLACE = {"span": (0.7, 0.4, 0.9), "chord": (0.5, 0.2, 0.8)}
 UNLISTED = (
     Kind(
         "band", "structure", False, "N/m", 3.0, 200.0,
-        "Hooke's law of an elastic band from the ground, slack while shorter than it is", _band, shape=_PLACE,
+        "Hooke's law of an elastic band from the ground, slack below its natural length", _band, shape=_PLACE,
     ),
     Kind(
         "stop", "structure", False, "N/m^1.5", 60.0, 5e3,
-        "contact after Hunt and Crossley (1975) with something above the wing", _stop,
+        "contact after Hunt and Crossley (1975) with an obstacle above the wing", _stop,
         shape={**_PLACE, "stroke": (0.85, 0.75, 0.9)}, acting=_pressing,
     ),
     Kind(
         "brake", "structure", False, "N s^3/m^3", 0.005, 0.2,
-        "a resistance at one point by the third power of its speed", _brake, shape=_PLACE,
+        "a resistance at one point, proportional to the cube of its speed", _brake, shape=_PLACE,
     ),
     Kind(
         "appendage", "inertia", False, "kg", 0.0015, 0.02,
@@ -104,7 +104,7 @@ UNLISTED = (
     ),
     Kind(
         "jet", "aerodynamics", False, "m/s", 6.0, 30.0,
-        "a stream downwards through which one stretch of the wing passes at the top of its stroke", _jet,
+        "a downward jet through which a strip of the wing passes at the top of the stroke", _jet,
         shape={"span": (0.7, 0.4, 0.9), "stroke": (0.95, 0.9, 1.0), "half": (0.04, 0.03, 0.05)},
         acting=_blowing,
     ),
