@@ -66,7 +66,7 @@ class Draft:
         return self.span / joint.length
 
     def at(self, span: float, chord: float) -> tuple[int, Array, Array]:
-        """Body at a place (fractions of span and chord); the place from its centre [3], and in the wing frame [3], m."""
+        """Body at a place (fractions of span and chord); the place from its centre and in the wing frame, [3] m."""
         x, y = self.cut.place(span, chord)
         body = int(self.cut.under(x, y)[0])
         place = np.array([x, y, 0.0])

@@ -30,7 +30,7 @@ class Rig(NamedTuple):
     Attributes:
         mass: [N] kg; ``inertia`` [N, 3, 3] kg m^2 about the centre of mass, in the body's frame.
         rest: [N, 3] centres of mass at rest, m.
-        first, second: [C] bodies that a joint joins; ``a``, ``b`` [C, 3] its place from either's centre (of a rod: from
+        first, second: [C] bodies that a joint connects; ``a``, ``b`` [C, 3] its place from the body (for a rod: from
             the hinge), m.
         stiffness, damping: [C, 6] about x, y, z, then along x, y, z, of the first body's axes.
         bends: [C] axis about which it bends; ``curvature`` [C]: rad over the span per rad.
@@ -46,7 +46,7 @@ class Rig(NamedTuple):
         jets: [J, JETS]; ``points`` [P, POINTS] with ``point_body`` [P].
         hinge: [3] m on the axis of the rods; ``axle`` [3] its direction.
         period: of a beat, s.
-        reach: how far apart the numbers of joined bodies are at most.
+        reach: largest difference of the numbers of two joined bodies.
     """
 
     mass: Array
