@@ -11,13 +11,14 @@ import json
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from benchmarks.common.files import EXAMPLES
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.result import Result, judge
@@ -37,7 +38,7 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.workers import make_evaluator
 from wingfit.workers.factory import EvaluatorKind
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
+EXAMPLE = EXAMPLES / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")
 WITHIN = 0.15
 # Evaluators that must agree: kind, workers, and threads of linear algebra in this process (None: as it was started).
@@ -65,8 +66,8 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
     """Calibrate and judge, with progress on standard error."""
     start, last = time.perf_counter(), None
     for last in calibrate(spec, dataset, evaluator):
-        note = f"{label}: {last.stage} generation {last.index}, {last.distance * 1e3:.3f} mm"
-        print(f"\r{note}, {time.perf_counter() - start:.0f} s   ", end="", file=sys.stderr, flush=True)
+        note = f"{label}: {last.stage}, generation {last.index}, {last.distance * 1e3:.3f} mm"
+        show(f"{note}, {time.perf_counter() - start:.0f} s")
     print(file=sys.stderr)
     if last is None:
         raise RuntimeError("the calibration had no generation")

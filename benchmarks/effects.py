@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -25,6 +24,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show_count
 from benchmarks.physics.effect_rigs import RIGS, AnyModel, Rig, rig_of
 from wingfit.calibration.estimates.linearised import free_genes, linearise, residuals_of, unit_at, values_at
 from wingfit.calibration.problem import Problem, base_genome
@@ -199,14 +199,14 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
     total = len(tasks) * (2 if costs else 1)
     for done, (kind, name) in enumerate(tasks if costs else [], 1):  # alone: costs are ratios of processor time
         ratios[kind, name] = cost_ratio(rig_of(kind, quick), EFFECTS[name])
-        _say(done, total, f"cost of {name} on the {kind}", began)
+        show_count(f"cost of {name} on the {kind}", done, total, began)
     found: dict[str, dict[str, Moved]] = {kind: {} for kind in RIGS}
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         under_way = {pool.submit(_task, kind, name, quick): (kind, name) for kind, name in tasks}
         for done, future in enumerate(as_completed(under_way), total - len(tasks) + 1):
             kind, name = under_way[future]
             found[kind][name] = future.result()
-            _say(done, total, f"{name} on the {kind}", began)
+            show_count(f"{name} on the {kind}", done, total, began)
     rows = [row(name, found, ratios, quick=quick) for name in names]
     return {"effects": rows, "quick": quick, "commit": commit(), "cpu": cpu(), "seconds": time.monotonic() - began}
 
@@ -227,12 +227,6 @@ def row(
             f"{prefix}angle_deg": degrees,
         }
     return line
-
-
-def _say(done: int, total: int, label: str, began: float) -> None:
-    spent = time.monotonic() - began
-    text = f"[{done}/{total}] {label}, about {spent / done * (total - done):.0f} s left"
-    print(f"\r{text:<100}", end="" if done < total else "\n", file=sys.stderr, flush=True)
 
 
 def table(answer: dict[str, Any]) -> str:

@@ -12,12 +12,13 @@ import sys
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.common.files import EXAMPLES
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show
 from wingfit.calibration.estimates.likelihood import iterate
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
@@ -27,7 +28,7 @@ from wingfit.records import Dataset, load_dataset
 from wingfit.workers import make_evaluator
 from wingfit.workers.factory import EvaluatorKind
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
+EXAMPLE = EXAMPLES / "robird"
 AS_GOOD = 1.01  # of the floor
 SPEC = CalibrationSpec(division="11", mode="joint")
 SEARCHES = {
@@ -53,7 +54,7 @@ def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
     for evaluations, squares in states:
         best = min(best, squares)
         points.append(Point(evaluations, time.perf_counter() - start, best))
-        print(f"\r{label}: {evaluations} evaluations, {best:.6g} m2   ", end="", file=sys.stderr, flush=True)
+        show(f"{label}: {evaluations} evaluations, {best:.6g} m2")
     print(file=sys.stderr)
     return points
 

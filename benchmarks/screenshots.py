@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import machine
-from benchmarks.common.ray_nodes import REPOSITORY
+from benchmarks.common.files import REPOSITORY
 from benchmarks.common.server_process import Server
 from benchmarks.proof import robird
-from benchmarks.proof.told import saved
+from benchmarks.proof.story import saved
 from wingfit.cli.base.output import progress
 from wingfit.client.client import Client
 

@@ -26,8 +26,9 @@ import numpy as np
 
 from benchmarks import calibration
 from benchmarks.common.machine import commit, cpu
-from benchmarks.physics import flops, gene_box
-from benchmarks.physics.settling import (
+from benchmarks.common.progress import show
+from benchmarks.physics import flops, random_genomes
+from benchmarks.physics.convergence import (
     Subject,
     beats_to_periodic,
     by_default,
@@ -70,17 +71,15 @@ class Progress:
         self.stage, self.label, self.stage_began = self.stage + 1, label, time.monotonic()
         self._say("")
         yield
-        self._say(f", {time.monotonic() - self.stage_began:.0f} s")
-        print(file=sys.stderr)
+        self._say(f", {time.monotonic() - self.stage_began:.0f} s", last=True)
 
     def __call__(self, done: int, of: int) -> None:
         """``done`` of ``of`` parts of the stage."""
         left = (time.monotonic() - self.stage_began) / done * (of - done)
         self._say(f", {done}/{of}, about {left:.0f} s left")
 
-    def _say(self, rest: str) -> None:
-        text = f"[{self.stage}/{self.stages}, {time.monotonic() - self.began:.0f} s] {self.label}{rest}"
-        print(f"\r{text:<100}", end="", file=sys.stderr, flush=True)
+    def _say(self, rest: str, *, last: bool = False) -> None:
+        show(f"[{self.stage}/{self.stages}, {time.monotonic() - self.began:.0f} s] {self.label}{rest}", last=last)
 
 
 def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
@@ -228,11 +227,11 @@ def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, An
     return cases, {"peak_gflops": peak, "counted_differs_from_compiled": max(differences)}
 
 
-def random_genomes(every: int, progress: Progress) -> dict[str, Any]:
+def outcomes_of_random_genomes(every: int, progress: Progress) -> dict[str, Any]:
     """How the genomes end; with ``every`` more than 1, of so many genomes and conditions one only."""
-    genomes = gene_box.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
-    todo = gene_box.tasks(genomes, gene_box.CAMPAIGN[::every])
-    return gene_box.summary(todo, gene_box.run(todo, WORKERS, progress))
+    genomes = random_genomes.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
+    todo = random_genomes.tasks(genomes, random_genomes.CAMPAIGN[::every])
+    return random_genomes.summary(todo, random_genomes.run(todo, WORKERS, progress))
 
 
 def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
@@ -243,7 +242,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
     with progress.during("energy ledger, light damping"):
         energy, light = energy_errors(cases), light_damping()
     with progress.during("random genomes"):
-        box = random_genomes(9 if quick else 1, progress)
+        box = outcomes_of_random_genomes(9 if quick else 1, progress)
     if not quick:
         with progress.during("other engines"):
             compare(cases, peer_seconds, progress)

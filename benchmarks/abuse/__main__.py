@@ -19,9 +19,10 @@ from typing import Any
 
 import httpx
 
-from benchmarks.abuse import fuzz, good, hdf5, requests, uploads
+from benchmarks.abuse import fuzz, hdf5, requests, uploads, valid_inputs
 from benchmarks.abuse.cases import Case
 from benchmarks.common import machine
+from benchmarks.common.progress import show
 from benchmarks.common.server_process import Server
 
 Json = dict[str, Any]
@@ -63,7 +64,7 @@ def _asked() -> argparse.Namespace:
 
 def _told(server: Server, st: str | None, asked: argparse.Namespace, scratch: Path) -> Json:
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
-        names = good.names(http)
+        names = valid_inputs.names(http)
         told = abused(http, server.port, names, [*uploads.cases(asked.seed), *requests.cases()])
         files = hdf5.abused(http, server, names, asked.seed, asked.hdf5_files)
         told |= files | {"failures": told["failures"] + files["failures"]}
@@ -83,8 +84,7 @@ def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Cas
             failures.append(f"{case.method} {case.path[:80]}, {case.name}: {wrong}")
         if number % 100 == 0 or number + 1 == len(cases):
             _still_well(http, names, failures, case)
-            print(f"\rabused {number + 1} of {len(cases)}  ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+            show(f"hostile requests: {number + 1} of {len(cases)}", last=number + 1 == len(cases))
     errors = sum(count for status, count in statuses.items() if status >= 500)
     counted = {str(status): count for status, count in sorted(statuses.items())}
     return {"cases": len(cases), "server_errors": errors, "failures": failures, "statuses": counted}
@@ -136,7 +136,7 @@ def _still_well(http: httpx.Client, names: Json, failures: list[str], after: Cas
     answer = http.get(f"/v1/runs/{names['{run}']}")
     if answer.status_code != 200:
         failures.append(f"after {after.name}: a good request is answered with {answer.status_code}")
-    good.cancel_queued(http)
+    valid_inputs.cancel_queued(http)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ The check ``positive_data_acceptance`` is left out. It takes for a fault that a 
 422, as it must be where its content cannot be meant, such as a dataset that does not exist.
 
 Most made-up requests would end at the first name in them, so what is meant to be valid gets good values
-(:mod:`benchmarks.abuse.filling`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What the
+(:mod:`benchmarks.abuse.valid_values`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What the
 fuzzer submits is cancelled while it waits; a job that fails by a mistake of the server counts as a failure as well.
 """
 
@@ -23,9 +23,8 @@ from typing import Any
 
 import httpx
 
-from benchmarks.abuse import good, uploads
-from benchmarks.common.ray_nodes import REPOSITORY
-from benchmarks.durability.works import archive
+from benchmarks.abuse import uploads, valid_inputs
+from benchmarks.common.files import REPOSITORY, archive
 
 Json = dict[str, Any]
 MISSING = "the fuzzer is not installed; install it: pip install -e .[fuzz], or do without: --no-fuzz"
@@ -53,7 +52,7 @@ def program() -> str | None:
 
 def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed: int, scratch: Path) -> Json:
     """At least ``cases`` cases, and what failed; of one ``seed`` the same ones, but for ids."""
-    folder = _given(good.values(http, named), seed, scratch / "fuzz")
+    folder = _given(valid_inputs.values(http, named), seed, scratch / "fuzz")
     sent, failures = 0, list[str]()
     with _relieved(str(http.base_url)):
         for report in _rounds(st, http, cases, seed, folder):
@@ -147,7 +146,7 @@ def _relieved(url: str) -> Iterator[None]:
         with httpx.Client(base_url=url, timeout=ANSWER_SECONDS) as http:
             while not done.wait(RELIEF_SECONDS):
                 with suppress(httpx.TransportError):  # of a server that is gone the fuzzer will tell
-                    good.cancel_queued(http)
+                    valid_inputs.cancel_queued(http)
 
     thread = threading.Thread(target=relieve, daemon=True)
     thread.start()

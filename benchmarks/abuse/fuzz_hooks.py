@@ -10,7 +10,7 @@ from typing import Any
 import schemathesis
 from schemathesis import GenerationMode
 
-from benchmarks.abuse.filling import Filling
+from benchmarks.abuse.valid_values import Filling
 
 GIVEN = "WINGFIT_FUZZ_GOOD"
 FORM = "multipart/form-data"

@@ -24,6 +24,7 @@ import httpx
 import numpy as np
 
 from benchmarks.abuse import uploads
+from benchmarks.common.progress import show
 from benchmarks.common.server_process import Server, descendants
 
 Json = dict[str, Any]
@@ -270,7 +271,7 @@ class _Answers:
             if status not in (201, 422):
                 self.failures.append(f"{name}: {status} {text[:200]}")
             if self.done % 20 == 0 or self.done == self.total:
-                print(f"\rHDF5 files {self.done} of {self.total}  ", end="", file=sys.stderr, flush=True)
+                show(f"HDF5 files: {self.done} of {self.total}", last=self.done == self.total)
 
 
 def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:

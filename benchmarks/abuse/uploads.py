@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from benchmarks.abuse.cases import Case, upload
-from benchmarks.common.ray_nodes import REPOSITORY
+from benchmarks.common.files import EXAMPLES
 from wingfit.records import load_archive, save_dataset
 
-EXAMPLE = REPOSITORY / "examples" / "robird"
+EXAMPLE = EXAMPLES / "robird"
 TRACKS = "recordings/vac-0010mbar-lag0-2.0hz.csv"
 YAML = "dataset.yaml"
 FLIPS = 60

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import httpx
 
-from benchmarks.common.ray_nodes import REPOSITORY, environment, free_port
+from benchmarks.common.files import REPOSITORY
+from benchmarks.common.ray_node import environment, free_port
 
 START_SECONDS = 120.0
 DIE_SECONDS = 30.0

@@ -19,9 +19,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from benchmarks.concealed.answer import Answer
+from benchmarks.concealed.run_diagnosis import Task
 from benchmarks.concealed.score import WORSE, Mark, blank, side_of
 from benchmarks.concealed.strength import Refit, rms, stacked
-from benchmarks.concealed.tool import Task
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.diagnosis.subject import Suspect

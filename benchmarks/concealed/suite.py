@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from benchmarks.concealed import laboratory, seal
+from benchmarks.common.progress import show_count
+from benchmarks.concealed import record_trial, seal
 from benchmarks.concealed.answer import Answer
+from benchmarks.concealed.run_diagnosis import Outcome, Task, run
 from benchmarks.concealed.score import Mark, failed, mark
 from benchmarks.concealed.table import Advised, Table
-from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
 from wingfit.records import Condition, load_dataset
 from wingfit.report import finding_from_json, finding_json
@@ -102,21 +103,14 @@ def each(
 
     ``keep`` is called with each result as soon as it is there.
     """
-    start, running = time.perf_counter(), [executor.submit(work, item) for item in items]
+    start, running = time.monotonic(), [executor.submit(work, item) for item in items]
     done: set[Future[Out]] = set()
     for future in as_completed(running):
         done.add(future)
         if keep:
             keep(future.result())
-        _tell(label, len(done), len(running), time.perf_counter() - start)
+        show_count(label, len(done), len(running), start)
     return [future.result() for future in running]
-
-
-def _tell(label: str, done: int, total: int, seconds: float) -> None:
-    left = seconds / done * (total - done)
-    end = "\n" if done == total else ""
-    note = f"{label}: {done} of {total}, {seconds:.0f} s, about {left:.0f} s left"
-    print(f"\r{note:70}", end=end, file=sys.stderr, flush=True)
 
 
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
@@ -127,8 +121,8 @@ def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
     folders.datasets.mkdir(parents=True, exist_ok=True)
     missing = [trial for trial in trials if not _made(trial, folders)]
     with pool(jobs) as executor:
-        orders = [laboratory.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in missing]
-        each(executor, laboratory.make, orders, "recording and sealing")
+        orders = [record_trial.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in missing]
+        each(executor, record_trial.make, orders, "recording and sealing")
     hashes = {trial.name: seal.digest(folders.answer(trial.name).read_text(encoding="utf-8")) for trial in trials}
     return seal.close(hashes, folders.sealed)
 
@@ -268,10 +262,10 @@ def follow_up(
     ]
     with pool(jobs) as executor:
         orders = [
-            laboratory.Addition(trial, condition, folders.dataset(trial.name), folders.dataset(label), folders.sealed)
+            record_trial.Addition(trial, condition, folders.dataset(trial.name), folders.dataset(label), folders.sealed)
             for trial, label, condition in wanted
         ]
-        each(executor, laboratory.add, orders, "recording the advised conditions")
+        each(executor, record_trial.add, orders, "recording the advised conditions")
     again = diagnosed(tool, [(trial, label) for trial, label, _ in wanted], folders, "diagnosing again")
     return {outcome.trial: outcome for outcome in again}
 

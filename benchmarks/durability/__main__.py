@@ -25,11 +25,14 @@ import httpx
 import numpy as np
 
 from benchmarks.common import machine
+from benchmarks.common.files import archive
+from benchmarks.common.jobs import FINAL, succeeded
+from benchmarks.common.progress import show_count
 from benchmarks.common.server_process import WORKERS, Server
+from benchmarks.durability.clients import Visitor, finding, outcome, settle, settle_diagnosis
 from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
-from benchmarks.durability.visitors import FINAL, Visitor, finding, outcome, settle, settle_diagnosis
-from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, archive
+from benchmarks.durability.workloads import DIAGNOSED, DIAGNOSIS, WORKS
 from wingfit.service.storage.database import FILE_NAME
 
 Json = dict[str, Any]
@@ -96,22 +99,12 @@ def undisturbed(folder: Path) -> dict[str, Json]:
             for example in {work.example for work in WORKS}
         }
         for work in WORKS:
-            run = _ended(http, "runs", work.body | {"dataset_id": uploaded[work.example]})
+            run = succeeded(http, "runs", work.body | {"dataset_id": uploaded[work.example]})
             ends[work.name] = outcome(run, lambda path: http.get(path).json())
-        diagnosis = _ended(http, "diagnoses", DIAGNOSIS | {"dataset_id": uploaded[DIAGNOSED]})
+        diagnosis = succeeded(http, "diagnoses", DIAGNOSIS | {"dataset_id": uploaded[DIAGNOSED]})
         ends[OF_DIAGNOSES] = finding(diagnosis, lambda path: http.get(path).json())
     server.stop()
     return ends
-
-
-def _ended(http: httpx.Client, kind: str, body: Json) -> str:
-    """Id of a run or a diagnosis that was submitted and has succeeded."""
-    job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
-    while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:
-        time.sleep(0.05)
-    if now["state"] != "SUCCEEDED":
-        raise RuntimeError(f"{now['name']} {now['state']}: {now['error']}")
-    return job
 
 
 def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
@@ -131,7 +124,7 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
         failed = next((visitor.error for visitor in visitors if visitor.error), None)
         if failed:
             raise failed
-        _progress(kind, number + 1, kills, began)
+        show_count(f"killing: {kind}", number + 1, kills, began)
     for visitor in visitors:
         visitor.leave()
         visitor.join(60)
@@ -284,12 +277,6 @@ def _integrity(path: Path) -> str:
     finally:
         connection.close()
     return "ok" if found == "ok" and not broken else f"{found}, {len(broken)} broken references"
-
-
-def _progress(kind: str, done: int, total: int, began: float) -> None:
-    left = (time.monotonic() - began) / done * (total - done)
-    end = "\n" if done == total else ""
-    print(f"\rdeaths of {kind}: {done} of {total}, about {left:.0f} s left   ", end=end, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

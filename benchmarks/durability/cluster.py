@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.common.ray_nodes import Node, free_port
+from benchmarks.common.ray_node import Node, free_port
 
 START_SECONDS = 120.0
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks.common.machine import commit, cpu
 from benchmarks.proof import delfly, robird
-from benchmarks.proof.told import Story, opened
+from benchmarks.proof.story import Story, opened
 from wingfit.cli.base.output import note, say
 
 FOLDER = Path("build") / "proof"

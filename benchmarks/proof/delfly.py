@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.concealed.bench import VehicleBench
 from benchmarks.concealed.trials import Build
 from benchmarks.delfly import LIFT_CORRELATION, fit
-from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
+from benchmarks.proof.story import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import agreements
 from wingfit.calibration.plan import prepared

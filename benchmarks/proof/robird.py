@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.concealed.bench import WingBench
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
-from benchmarks.proof.told import (
+from benchmarks.proof.story import (
     Claim,
     Story,
     beside_truth,

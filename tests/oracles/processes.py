@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks.common.ray_nodes import IMPATIENT, MARK, REPOSITORY, Node, environment, free_port, marked
+from benchmarks.common.files import EXAMPLES, REPOSITORY
+from benchmarks.common.ray_node import IMPATIENT, MARK, Node, environment, free_port, marked
 from benchmarks.common.server_process import Server
-
-EXAMPLES = REPOSITORY / "examples"
 
 __all__ = ["EXAMPLES", "IMPATIENT", "MARK", "REPOSITORY", "Node", "Server", "environment", "free_port", "marked"]

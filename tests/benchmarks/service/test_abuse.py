@@ -13,7 +13,7 @@ from benchmarks.abuse import __main__ as abuse
 from benchmarks.abuse import fuzz, requests, uploads
 from benchmarks.abuse.__main__ import _wrong
 from benchmarks.abuse.cases import Case
-from benchmarks.abuse.filling import Filling
+from benchmarks.abuse.valid_values import Filling
 from tests.service import toy
 from tests.service.conftest import Api, serving
 from wingfit.records import load_archive

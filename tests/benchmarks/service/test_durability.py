@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from benchmarks.common.files import archive
+from benchmarks.durability.clients import outcome, settle
 from benchmarks.durability.ledger import KnownRun, Ledger
-from benchmarks.durability.visitors import outcome, settle
-from benchmarks.durability.works import WORKS, archive
+from benchmarks.durability.workloads import WORKS
 from wingfit.records import load_archive
 
 Json = dict[str, Any]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
-from benchmarks.concealed.laboratory import Addition, Order, add, make
 from benchmarks.concealed.plant.measurement import balance, film
 from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
+from benchmarks.concealed.record_trial import Addition, Order, add, make
 from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
 from benchmarks.concealed.strength import rms

@@ -13,7 +13,7 @@ from benchmarks.proof import delfly, robird
 from benchmarks.proof.__main__ import main
 from benchmarks.proof.delfly import FLING, Lift
 from benchmarks.proof.robird import HIDDEN, Campaign, Stall
-from benchmarks.proof.told import Claim, Story, beside_truth, families, leader, opened, over_floor, saved
+from benchmarks.proof.story import Claim, Story, beside_truth, families, leader, opened, over_floor, saved
 from tests.report.findings import force_finding, wing_finding
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.result import Result

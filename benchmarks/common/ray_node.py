@@ -14,7 +14,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-REPOSITORY = Path(__file__).parents[2]
+from benchmarks.common.files import REPOSITORY
+
 MARK = "WINGFIT_TEST_NODE"
 # A dead node is noticed after about three seconds instead of Ray's fifteen or so.
 IMPATIENT = {

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from typing import Any
 
 import httpx
 
 from benchmarks.abuse import uploads
-from benchmarks.abuse.filling import ID
-from benchmarks.durability.works import archive
+from benchmarks.abuse.valid_values import ID
+from benchmarks.common.files import archive
+from benchmarks.common.jobs import succeeded
 
 Json = dict[str, Any]
 SEARCH = {"division": "4", "population": 8, "max_generations": 1, "mode": "joint"}
 DIAGNOSIS = {"without": ["clap_and_peel"], "suspects": ["clap_and_peel"], "refits": 1}
-STILL = ("QUEUED", "RUNNING", "PAUSED")
 
 
 def names(http: httpx.Client) -> dict[str, str]:
@@ -26,15 +25,15 @@ def names(http: httpx.Client) -> dict[str, str]:
         "{dataset}": dataset["id"],
         "{forces}": forces["id"],
         "{recording}": dataset["recordings"][0]["name"],
-        "{run}": ended(http, "runs", {"dataset_id": dataset["id"]} | SEARCH),
-        "{run of forces}": ended(http, "runs", {"dataset_id": forces["id"]}),
+        "{run}": succeeded(http, "runs", {"dataset_id": dataset["id"]} | SEARCH),
+        "{run of forces}": succeeded(http, "runs", {"dataset_id": forces["id"]}),
     }
 
 
 def values(http: httpx.Client, named: dict[str, str]) -> Json:
-    """Good values of whatever a request names, for :mod:`benchmarks.abuse.filling`; by kind of dataset."""
+    """Good values of whatever a request names, for :mod:`benchmarks.abuse.valid_values`; by kind of dataset."""
     key = http.post("/v1/keys", json={"name": "fuzzed", "scopes": ["admin"]}).json()
-    diagnosis = ended(http, "diagnoses", {"dataset_id": named["{forces}"]} | DIAGNOSIS)
+    diagnosis = succeeded(http, "diagnoses", {"dataset_id": named["{forces}"]} | DIAGNOSIS)
     kinds = {"tracks": ("{dataset}", "{run}"), "forces": ("{forces}", "{run of forces}")}
     of_kind = {kind: _of(http, named[dataset], named[run]) for kind, (dataset, run) in kinds.items()}
     return of_kind | {
@@ -58,16 +57,6 @@ def _of(http: httpx.Client, dataset_id: str, run_id: str) -> Json:
         "effects": [one["name"] for one in http.get("/v1/effects").json()["effects"] if applies in one["applies_to"]],
         "terms": [one["name"] for one in http.get("/v1/models").json()["terms"]],
     }
-
-
-def ended(http: httpx.Client, kind: str, body: Json) -> str:
-    """The id of a job that has succeeded."""
-    job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
-    while (now := http.get(f"/v1/{kind}/{job}").json())["state"] != "SUCCEEDED":
-        if now["state"] not in STILL:
-            raise RuntimeError(f"{kind} {job} is {now['state']}: {now['error']}")
-        time.sleep(0.05)
-    return job
 
 
 def cancel_queued(http: httpx.Client) -> None:

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-from benchmarks.common.ray_nodes import REPOSITORY
-
 Json = dict[str, Any]
-EXAMPLES = REPOSITORY / "examples"
 
 
 @dataclass(frozen=True)
@@ -43,16 +37,3 @@ WORKS = (
 DIAGNOSIS: Json = {"axes": ["x", "z"], "seed": 1}
 """Of what a balance recorded; begun again after every death of the server, it ends when there is peace."""
 DIAGNOSED = "delfly"
-
-
-def archive(example: str) -> bytes:
-    """An example's folder as a zip, the same bytes every time."""
-    packed, folder = io.BytesIO(), EXAMPLES / example
-    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as zipped:
-        for file in sorted(path for path in _files(folder)):
-            zipped.writestr(zipfile.ZipInfo(file.relative_to(folder).as_posix()), file.read_bytes())
-    return packed.getvalue()
-
-
-def _files(folder: Path) -> list[Path]:
-    return [folder / "dataset.yaml", *(folder / "recordings").iterdir()]

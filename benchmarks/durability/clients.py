@@ -11,11 +11,12 @@ from typing import Any
 import httpx
 import numpy as np
 
+from benchmarks.common.files import archive
+from benchmarks.common.jobs import FINAL
 from benchmarks.durability.ledger import KnownRun, Ledger, without_times
-from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, Work, archive
+from benchmarks.durability.workloads import DIAGNOSED, DIAGNOSIS, WORKS, Work
 
 Json = dict[str, Any]
-FINAL = ("SUCCEEDED", "FAILED", "CANCELLED")
 ACTIVE = 3  # runs of one visitor at a time
 MOST_DATASETS = 3
 MOST_DIAGNOSES = 2  # of all visitors

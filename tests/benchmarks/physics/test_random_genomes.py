@@ -5,7 +5,18 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.physics.gene_box import CAMPAIGN, CHECKED, DIVISIONS, Ended, Task, draw, run, simulate, summary, tasks
+from benchmarks.physics.random_genomes import (
+    CAMPAIGN,
+    CHECKED,
+    DIVISIONS,
+    Ended,
+    Task,
+    draw,
+    run,
+    simulate,
+    summary,
+    tasks,
+)
 from wingfit.records import Condition
 from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.flexible_wing import FlexibleWing

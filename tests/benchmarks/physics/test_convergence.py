@@ -6,7 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from benchmarks.physics.settling import (
+from benchmarks.physics.convergence import (
     Passed,
     Subject,
     at_steps,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.physics.settling import largest_distance
+from benchmarks.physics.convergence import largest_distance
 from wingfit.records import Condition, Gene
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.virtual_rigs.campaign import VACUUM, WIND_TUNNEL, blank_recording, name_of, robird_wing

@@ -31,7 +31,7 @@ LARGEST: Mapping[str, int] = {"population": 8, "max_generations": 2, "stall": 2,
 
 
 class Filling:
-    """Fills the parts of a request with the ``good`` values that :func:`benchmarks.abuse.good.values` found."""
+    """Fills the parts of a request with the ``good`` values that :func:`benchmarks.abuse.valid_inputs.values` found."""
 
     def __init__(self, good: Json, archives: Sequence[bytes], seed: int) -> None:
         self._good, self._archives, self._seed = good, archives, seed
