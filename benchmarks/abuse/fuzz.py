@@ -4,8 +4,8 @@ The check ``positive_data_acceptance`` is left out. It takes for a fault that a 
 422, as it must be where its content cannot be meant, such as a dataset that does not exist.
 
 Most made-up requests would end at the first name in them, so what is meant to be valid gets good values
-(:mod:`benchmarks.abuse.valid_values`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What the
-fuzzer submits is cancelled while it waits; a job that fails by a mistake of the server counts as a failure as well.
+(:mod:`benchmarks.abuse.valid_values`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What
+the fuzzer submits is cancelled while it waits; a job that fails by a mistake of the server counts as a failure as well.
 """
 
 from __future__ import annotations

@@ -12,7 +12,10 @@ POLL_SECONDS = 0.05
 
 
 def succeeded(http: httpx.Client, kind: str, body: dict[str, Any]) -> str:
-    """Submit a job (``kind`` is "runs" or "diagnoses") and wait; returns its id, RuntimeError if it does not succeed."""
+    """Submit a job (``kind`` is "runs" or "diagnoses") and wait.
+
+    Returns its id, RuntimeError if it does not succeed.
+    """
     job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
     while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:
         time.sleep(POLL_SECONDS)

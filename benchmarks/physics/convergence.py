@@ -1,4 +1,7 @@
-"""One nominal wing, beat after beat, seen from inside: its converged motion, the steps it needs, the beats it takes."""
+"""Convergence of one nominal wing.
+
+Its converged periodic motion, the steps a beat needs, the beats until it is periodic.
+"""
 
 from __future__ import annotations
 
@@ -29,15 +32,15 @@ from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-CONVERGED = 1024  # steps of the reference; half as many must agree
-SETTLED = 1e-7  # m to the periodic motion: no transient is left that matters to 0.1 mm
+CONVERGED = 1024  # steps of the reference, which is compared with half as many
+SETTLED = 1e-7  # m from the periodic motion: negligible compared with 0.1 mm
 MOST_BEATS = 400
-_AGREEMENT = 0.02  # of the tolerance, between the reference and the one with half as many steps
+_AGREEMENT = 0.02  # largest change from half as many steps to the reference, relative to the tolerance
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The Robird's wing with nominal genes, in a division, under a condition; the same in all lanes.
+    """The Robird's wing with nominal genes, a division and a condition; all lanes are equal.
 
     ``damping`` multiplies the nominal damping genes.
     """
@@ -48,7 +51,7 @@ class Subject:
 
     @cached_property
     def model(self) -> FlexibleWing:
-        """As a user has it."""
+        """With default settings."""
         return FlexibleWing(robird_wing(), self.division)
 
     @property
@@ -58,7 +61,7 @@ class Subject:
 
     @cached_property
     def genome(self) -> Array:
-        """One, [1, G]."""
+        """The genome, [1, G]."""
         factors = {"D_E": self.damping, "D_G": self.damping}
         return np.array([[gene.nominal * factors.get(gene.name, 1.0) for gene in self.model.genes]])
 
@@ -68,13 +71,13 @@ class Subject:
         return WingScene.of(self.structure, self.condition, lanes(self.structure, self.model.genes, self.genome))
 
     def drive(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """Of a beat, as :func:`wingfit.sim.solver.scene.drive_table` has it."""
+        """Drive of a beat, see :func:`wingfit.sim.solver.scene.drive_table`."""
         return drive_table(self.scene.rods, self.condition.flap_frequency, numerics, steps, beat)
 
 
 @dataclass(frozen=True)
 class Passed:
-    """One beat that has passed: its trace in the first lane, where it started, and how far (m) from periodic."""
+    """One integrated beat: trace of the first lane, start state, and distance (m) from periodic."""
 
     trace: Trace
     start: State
@@ -82,9 +85,9 @@ class Passed:
 
 
 def beats(subject: Subject, steps: int, *, window: int, start: State | None = None) -> Iterator[Passed]:
-    """Beats of ``steps`` from rest, or from ``start`` on, without end; ArithmeticError when a lane diverges.
+    """Beats of ``steps`` steps from rest or from ``start``, without end; ArithmeticError if a lane diverges.
 
-    What :func:`wingfit.sim.solver.settle.settle` does, but every beat is shown. ``window`` as in Numerics.
+    As :func:`wingfit.sim.solver.settle.settle`, but every beat is yielded. ``window`` as in Numerics.
     """
     structure, numerics = subject.structure, Numerics(steps=steps, window=window)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
@@ -119,7 +122,7 @@ def _put(into: State, state: State) -> None:
 
 
 def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed:
-    """The periodic beat with ``steps``, to SETTLED."""
+    """The periodic beat with ``steps``, to within SETTLED."""
     window = Numerics().window
     for passed in islice(beats(subject, steps, window=window, start=start), MOST_BEATS):
         if passed.distance <= SETTLED:
@@ -129,7 +132,10 @@ def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed
 
 @dataclass(frozen=True)
 class Reference:
-    """The converged periodic motion: ``tracks`` [CONVERGED, M, 3], what half the steps change (m), a state to start."""
+    """The converged periodic motion.
+
+    ``tracks`` [CONVERGED, M, 3], ``change`` (m) compared with half as many steps, and a ``start`` state.
+    """
 
     tracks: Array
     change: float
@@ -137,20 +143,20 @@ class Reference:
 
 
 def reference(subject: Subject, tolerance: float) -> Reference:
-    """Converged tracks; ArithmeticError when half the steps change them by what counts beside ``tolerance`` (m)."""
+    """The converged motion; ArithmeticError if half as many steps differ too much compared with ``tolerance`` (m)."""
     half = periodic(subject, CONVERGED // 2)
     whole = periodic(subject, CONVERGED, half.start)
     change = largest_distance(half.trace.tracks, whole.trace.tracks)
     if not change <= _AGREEMENT * tolerance:
         raise ArithmeticError(
             f"{CONVERGED} and {CONVERGED // 2} steps differ by {change * 1e3:.3g} mm, more than "
-            f"{_AGREEMENT * tolerance * 1e3:.3g} mm: no reference; raise CONVERGED"
+            f"{_AGREEMENT * tolerance * 1e3:.3g} mm; raise CONVERGED"
         )
     return Reference(whole.trace.tracks, change, whole.start)
 
 
 def largest_distance(tracks: Array, converged: Array) -> float:
-    """Largest distance (m) of a marker at an instant of ``tracks`` [n, M, 3] from the periodic [m, M, 3]."""
+    """Largest distance (m) of a marker of ``tracks`` [n, M, 3] from the periodic ``converged`` [m, M, 3]."""
     return float(np.sqrt(((tracks - at_steps(converged, len(tracks))) ** 2).sum(axis=-1)).max())
 
 
@@ -165,9 +171,9 @@ def at_steps(tracks: Array, count: int) -> Array:
 
 
 def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least: int = 16) -> tuple[int, float]:
-    """Fewest steps (even) of a beat whose markers stay within ``tolerance`` (m), and the error (m) with them.
+    """Smallest even number of steps a beat that keeps markers within ``tolerance`` (m), and the error (m) with them.
 
-    The next finer must do as well, so that a lucky crossing of the error through zero does not count.
+    The next larger number must suffice too, so that a zero crossing of the error does not count.
     """
     found: tuple[int, float] | None = None
     for steps in range(least, CONVERGED // 2, 2):
@@ -182,7 +188,7 @@ def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least
 
 
 def _error(subject: Subject, converged: Reference, steps: int) -> float:
-    """Largest error (m) of the periodic tracks with ``steps``; infinite where there are none."""
+    """Largest error (m) of the periodic tracks with ``steps``; infinite if there are none."""
     try:
         return largest_distance(periodic(subject, steps, converged.start).trace.tracks, converged.tracks)
     except ArithmeticError:
@@ -190,9 +196,9 @@ def _error(subject: Subject, converged: Reference, steps: int) -> float:
 
 
 def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: float) -> int | None:
-    """Beats from rest, the ramp's included, to the first from which on all tracks are within ``tolerance`` (m).
+    """Number of beats from rest, with the ramp, until all tracks stay within ``tolerance`` (m) of the periodic ones.
 
-    Of the converged periodic tracks of as many steps; None when that takes more than MOST_BEATS.
+    Compared with the periodic tracks of as many steps; None if it takes more than MOST_BEATS.
     """
     final = periodic(subject, steps).trace.tracks
     errors = []
@@ -204,7 +210,7 @@ def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: floa
 
 
 def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6) -> float:
-    """Processor time of one beat of the integrator, per individual of a full group: median of repeats, warm."""
+    """Processor time of one beat per individual of a full group, without compilation: median of repeats."""
     structure, numerics = subject.structure, Numerics(steps=steps)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
     work = new_work(structure.wiring, here, group)
@@ -223,7 +229,7 @@ def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6
 
 @dataclass(frozen=True)
 class ByDefault:
-    """What a user gets who states an accuracy and no step: ``ms`` for one individual of a full group, to the end."""
+    """A simulation with default settings: ``ms`` for one individual of a full group until the periodic beat."""
 
     beat: Beat
     ms: float
@@ -244,9 +250,9 @@ def by_default(subject: Subject) -> ByDefault:
 
 
 def energy_error(subject: Subject, steps: int, count: int = 20) -> float:
-    """How far the ledger is from closing over ``count`` beats from rest, relative to the largest work of a port.
+    """Energy error over ``count`` beats from rest, relative to the largest work through a port.
 
-    Stored energy (kinetic, elastic, gravitational) against the work through the ports: dampers, two motors, air.
+    Change of stored energy (kinetic, elastic, gravitational) minus the work of dampers, two motors and air.
     """
     passed = [one.trace for one in islice(beats(subject, steps, window=0), count)]
     stored = np.concatenate([trace.energy for trace in passed]).sum(axis=1)

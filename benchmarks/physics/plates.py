@@ -19,7 +19,10 @@ Array = npt.NDArray[np.float64]
 
 
 def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], markers: tuple[Marker, ...] = ()) -> Wing:
-    """A rectangle from the origin, massless until given :class:`Materials`, both rods driven but at rest."""
+    """A rectangle with a corner at the origin, massless without :class:`Materials`.
+
+    Both rods are driven, but at rest.
+    """
     stations = tuple(Station(y, 0.0, chord, thickness) for y in (0.0, span))
     tip = Marker("tip", (chord / 2, span - 1e-9, 0.0), 0.0)
     marks = (*markers, tip)
@@ -36,7 +39,7 @@ def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
 
 
 def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array:
-    """[6 n, 6 n] of the bodies about the rest pose, the driving rods held; rotations first in each body."""
+    """[6 n, 6 n] stiffness of the bodies at rest, with fixed driving rods; rotations come first in each body."""
     w, n = structure.wiring, len(structure.bodies)
     group, state = loaded(structure, genome), at_rest(structure)
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
@@ -51,7 +54,7 @@ def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array
 
 
 def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) -> Array:
-    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], nothing moving."""
+    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], without motion."""
     w = structure.wiring
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
     relative_pose(w.first, w.second, w.a, w.b, R, p, Q, d)

@@ -1,4 +1,4 @@
-"""Random genomes from the whole gene box under the thesis's campaign: whether they end, how, and how right they are."""
+"""Simulations of random genomes from the whole search box: whether they succeed, and how accurate they are."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Array = npt.NDArray[np.float64]
 
 DIVISIONS = ("11", "24")
 CAMPAIGN = (*VACUUM, *WIND_TUNNEL)
-LIMIT = 300.0  # s without any group ending, after which those under way hang
+LIMIT = 300.0  # s without any result after which the remaining tasks count as hung
 KINDS = ("not periodic", "diverged", "not accurate")
-CHECKED = 7  # one group in so many is repeated with REFERENCE; shares no factor with the campaign
+CHECKED = 7  # every seventh task is repeated with REFERENCE; coprime to the campaign's size
 REFERENCE = Numerics(steps=1024, periodic=1e-6, max_beats=120)
 
 
 class Task(NamedTuple):
-    """Genomes [B, G] of one division under one condition; ``checked`` against converged motions or not."""
+    """Genomes [B, G] of one division under one condition; ``checked``: also compared with converged motions."""
 
     division: str
     condition: Condition
@@ -39,9 +39,9 @@ class Task(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """How the genomes of a task ended: reasons or None, beats of each, and the processor time (s) of all.
+    """Results of a task: reasons (None: success), beats of each genome, and processor time (s) of all.
 
-    ``errors``: largest error (m) of each; NaN where it was not checked, or it or its converged motion did not finish.
+    ``errors``: largest error (m) of each; NaN if it was not checked, or if either simulation failed.
     """
 
     task: Task
@@ -58,7 +58,7 @@ def draw(genes: tuple[Gene, ...], count: int, seed: int) -> Array:
 
 
 def tasks(genomes: Array, campaign: tuple[Condition, ...] = CAMPAIGN) -> list[Task]:
-    """Genome after genome under the next condition; divisions take turns each time round the campaign."""
+    """Genomes are distributed over the conditions in turn, and over the divisions in turn."""
     found = []
     for c, condition in enumerate(campaign):
         rounds = genomes[c :: len(campaign)]
@@ -68,7 +68,7 @@ def tasks(genomes: Array, campaign: tuple[Condition, ...] = CAMPAIGN) -> list[Ta
 
 
 def simulate(task: Task) -> Ended:
-    """At the default accuracy."""
+    """Simulate at the default accuracy."""
     model = FlexibleWing(robird_wing(), task.division)
     blank = blank_recording(model.wing, task.condition)
     start = time.thread_time()
@@ -89,7 +89,7 @@ def run(
     limit: float = LIMIT,
     work: Callable[[Task], Ended] = simulate,
 ) -> list[Ended]:
-    """What ended of ``todo``, in any order; processes that hang are ended after ``limit`` seconds of silence."""
+    """Finished tasks of ``todo``, in any order; processes that give no result for ``limit`` seconds are killed."""
     done: list[Ended] = []
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
         results = pool.imap_unordered(work, todo)
@@ -103,10 +103,10 @@ def run(
 
 
 def summary(todo: list[Task], done: list[Ended]) -> dict[str, Any]:
-    """Shares of the genomes in per cent, which were given up and why, and how right the checked ones are."""
+    """Percentage of genomes that finished, reasons of the others, and accuracy of the checked ones."""
     total, ended = sum(len(task.genomes) for task in todo), sum(len(one.reasons) for one in done)
     if total == 0:
-        raise ValueError("no genomes were asked for; give at least 1")
+        raise ValueError("the number of genomes is 0; give at least 1")
     accuracy = Numerics().accuracy
     given_up = [_case(one, k) for one in done for k, reason in enumerate(one.reasons) if reason is not None]
     wrong = [_case(one, k) for one in done for k, error in enumerate(one.errors) if error > accuracy]
@@ -131,7 +131,7 @@ def summary(todo: list[Task], done: list[Ended]) -> dict[str, Any]:
 
 
 def _case(one: Ended, k: int) -> dict[str, Any]:
-    """What is needed to look at the k-th genome of a task again."""
+    """All that is needed to repeat the k-th genome of a task."""
     nominal = np.array([gene.nominal for gene in FlexibleWing(robird_wing()).genes])
     return {
         "division": one.task.division,
@@ -143,7 +143,7 @@ def _case(one: Ended, k: int) -> dict[str, Any]:
 
 
 def _shares(done: list[Ended]) -> dict[str, float]:
-    """Per cent that finished by division, medium, and airspeed or pressure."""
+    """Percentage that finished by division, medium, and airspeed or pressure."""
     finished: Counter[str] = Counter()
     ended: Counter[str] = Counter()
     for one in done:
@@ -154,7 +154,7 @@ def _shares(done: list[Ended]) -> dict[str, float]:
 
 
 def kind(reason: str) -> str:
-    """Which of KINDS a reason is; its first words where it is none of them."""
+    """The kind of a reason, one of KINDS, or its first words."""
     return next((known for known in KINDS if reason.startswith(known)), re.split(r"[:;]", reason)[0])
 
 

@@ -1,4 +1,4 @@
-"""What both stories share: a dataset on disk, the tool as its user runs it, the report, and claims that may fail."""
+"""Common parts of both case studies: dataset on disk, diagnosis as a user runs it, report, and claims."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from wingfit.service.diagnoses.local import diagnose
 Numbers = Mapping[str, Any]
 
 IN_A_TERMINAL = ("www-browser", "links", "elinks", "lynx", "w3m")
-"""Browsers that would take the terminal away, and draw no figure."""
+"""Browsers that run in the terminal and draw no figures."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One sentence of a story, and whether it came true."""
+    """One statement of a study, and whether it holds."""
 
     words: str
     holds: bool
@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Story:
-    """A story that was played: ``figures`` for programs, ``lines`` for people, and the page that tells it."""
+    """A finished study: ``figures`` for JSON, ``lines`` of text, and the report."""
 
     figures: Numbers
     lines: tuple[str, ...]
@@ -39,12 +39,12 @@ class Story:
     report: Path
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values for JSON."""
         return {**self.figures, "claims": [asdict(claim) for claim in self.claims], "report": str(self.report)}
 
 
 def saved(dataset: Dataset, folder: Path) -> Path:
-    """Write ``dataset`` into ``folder``, in the place of one of an earlier run."""
+    """Write ``dataset`` into ``folder``, replacing the dataset of an earlier run."""
     path = folder / dataset.name
     if (path / "dataset.yaml").is_file():
         shutil.rmtree(path)
@@ -52,37 +52,37 @@ def saved(dataset: Dataset, folder: Path) -> Path:
     return path
 
 
-def diagnosed(path: Path, asked: Mapping[str, Any], workers: int) -> tuple[Finding, Path]:
+def diagnosed(path: Path, options: Mapping[str, Any], workers: int) -> tuple[Finding, Path]:
     """Diagnose the dataset at ``path`` as ``wingfit diagnose --local`` does, and write the report beside it.
 
-    Nothing but its files and ``asked`` (the options of that command) reaches the tool.
+    The diagnosis receives only the files and ``options`` (those of that command).
     """
     with progress(f"{path.name}: diagnosing") as tell:
-        finding = diagnose(path, dict(asked), workers, tell)
+        finding = diagnose(path, dict(options), workers, tell)
     page = path.with_name(f"{path.name}.html")
     page.write_text(html(finding), encoding="utf-8")
     return finding, page
 
 
 def leader(finding: Finding) -> Hypothesis:
-    """The explanation that is named; else the most probable one."""
+    """The hypothesis that the verdict names, else the most probable one."""
     named = set(finding.named)
     return next((one for one in finding.hypotheses if set(one.effects) == named), finding.hypotheses[0])
 
 
 def nominal_misfit(finding: Finding) -> float:
-    """What the nominal model leaves after its best refit, root mean square, m or N."""
+    """RMS residual of the refitted nominal model, m or N."""
     return next(one.misfit for one in finding.hypotheses if not one.effects)
 
 
 def families(finding: Finding) -> tuple[str, ...]:
-    """Family of each effect that is named."""
+    """Family of each named effect."""
     known = {one.effects[0]: one.family for one in finding.hypotheses if len(one.effects) == 1}
     return tuple(known.get(name, "") for name in finding.named)
 
 
 def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Each true value beside what was found, with its 90 % interval; None where no such effect was named."""
+    """Each true value with its estimate and 90 % interval; None if the effect was not named."""
     rows = []
     for name, true in truth.items():
         found = genes[name].value if name in genes else None
@@ -101,7 +101,7 @@ def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> 
 
 
 def over_floor(finding: Finding) -> dict[str, float | None]:
-    """Misfit to the held-out recordings in parts of the floor, before and after."""
+    """Held-out misfit / floor, before and after the diagnosis."""
     proof = finding.proof
     return {
         "heldout_before_over_floor": None if proof is None else proof.before.value,
@@ -112,7 +112,7 @@ def over_floor(finding: Finding) -> dict[str, float | None]:
 
 
 def opened(page: Path) -> bool:
-    """Open a page in a browser with a screen, if there is one; whether there was."""
+    """Open a page in a graphical browser; False if there is none."""
     try:
         browser = webbrowser.get()
     except webbrowser.Error:

@@ -112,22 +112,22 @@ def test_the_robirds_claims_fail_where_the_tool_is_wrong(filmed: Campaign) -> No
     search = Stall(Result((), (), 0.03, 0.02, 0.031, 0.021, 3e-4), 0.01, 30, 1500, 60.0, stalled=True)
     found, proof = wing_finding(), Proof(Interval(4.4, 4.1, 4.7), Interval(1.04, 1.0, 1.1), 1e-3, True, "")
     found = replace(found, proof=proof)
-    story = robird.told(made, search, found, PAGE)
+    story = robird.story_of(made, search, found, PAGE)
     assert held(story) == [True] * 5
     assert [row["covered"] for row in story.figures["genes"]] == [True, False]
     assert story.figures["stall_mm"] == pytest.approx(20.0)
     wrong = replace(found, named=("camera_rotation",), verdict="measurement fault")
-    assert held(robird.told(made, search, wrong, PAGE)) == [True, False, False, True, True]
-    assert held(robird.told(made, search, replace(found, named=()), PAGE)) == [True, False, False, True, True]
+    assert held(robird.story_of(made, search, wrong, PAGE)) == [True, False, False, True, True]
+    assert held(robird.story_of(made, search, replace(found, named=()), PAGE)) == [True, False, False, True, True]
     worse = replace(found, proof=replace(proof, after=Interval(1.2, 1.1, 1.3)))
-    assert held(robird.told(made, search, worse, PAGE))[3:] == [False, True]
+    assert held(robird.story_of(made, search, worse, PAGE))[3:] == [False, True]
     far = replace(found, proof=replace(proof, floor=1.3 * made.left_by_truth()))
-    assert held(robird.told(made, search, far, PAGE))[3:] == [True, False]
-    assert held(robird.told(made, search, replace(found, proof=None), PAGE))[3:] == [False, False]
+    assert held(robird.story_of(made, search, far, PAGE))[3:] == [True, False]
+    assert held(robird.story_of(made, search, replace(found, proof=None), PAGE))[3:] == [False, False]
     moving = replace(search, stalled=False, gain=0.1)
-    assert held(robird.told(made, moving, found, PAGE))[0] is False
+    assert held(robird.story_of(made, moving, found, PAGE))[0] is False
     near = replace(search, result=replace(search.result, after=0.004))
-    assert held(robird.told(made, near, found, PAGE))[0] is False
+    assert held(robird.story_of(made, near, found, PAGE))[0] is False
 
 
 def test_what_is_not_named_has_no_value_beside_the_truth() -> None:
@@ -178,21 +178,21 @@ def test_the_delflys_claims_fail_where_the_tool_is_wrong() -> None:
         Lift("test-5", held_out=True, before=0.9, after=0.98),
     )
     found = force_finding()
-    story = delfly.told(found, PLACES, lift, PAGE)
+    story = delfly.story_of(found, PLACES, lift, PAGE)
     assert held(story) == [True] * 6
     assert story.figures["misfit_tstar_range"] == (0.06, 0.32)
     assert story.figures["lift_correlation_after"] == pytest.approx(0.985)
     assert found.where is not None
     late = replace(found, where=replace(found.where, phase=Interval(0.3, 0.1, 0.45)))
-    assert held(delfly.told(late, PLACES, lift, PAGE))[0] is False
+    assert held(delfly.story_of(late, PLACES, lift, PAGE))[0] is False
     spread = replace(found, where=replace(found.where, phase=None))
-    assert held(delfly.told(spread, PLACES, lift, PAGE))[0] is False
-    assert held(delfly.told(found, PLACES | {"test-5": None}, lift, PAGE))[1] is False
-    assert held(delfly.told(replace(found, named=("wake_capture",)), PLACES, lift, PAGE))[2:4] == [False, False]
+    assert held(delfly.story_of(spread, PLACES, lift, PAGE))[0] is False
+    assert held(delfly.story_of(found, PLACES | {"test-5": None}, lift, PAGE))[1] is False
+    assert held(delfly.story_of(replace(found, named=("wake_capture",)), PLACES, lift, PAGE))[2:4] == [False, False]
     more = replace(found, named=(FLING, "wake_capture"))
-    assert held(delfly.told(more, PLACES, lift, PAGE))[2:4] == [True, False]
+    assert held(delfly.story_of(more, PLACES, lift, PAGE))[2:4] == [True, False]
     low = (replace(lift[0], after=0.91), replace(lift[1], after=0.89))
-    assert held(delfly.told(found, PLACES, low, PAGE))[4:] == [False, False]
+    assert held(delfly.story_of(found, PLACES, low, PAGE))[4:] == [False, False]
 
 
 def test_a_page_is_opened_only_where_it_can_be_seen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
