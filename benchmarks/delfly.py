@@ -1,7 +1,7 @@
-"""The quasi-steady model with clap-and-peel against a virtual balance whose coefficients are known.
+"""The quasi-steady model with clap-and-peel, fitted to a virtual balance with known coefficients.
 
-``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]`` measures; with ``--json`` the last line is one
-JSON object. ``--example FOLDER`` only writes the example campaign.
+``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]``; with ``--json`` the last line is one JSON object.
+``--example FOLDER`` only writes the example campaign.
 """
 
 from __future__ import annotations

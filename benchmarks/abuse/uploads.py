@@ -1,4 +1,4 @@
-"""Hostile archives, and good ones that were damaged."""
+"""Hostile archives, and damaged copies of valid ones."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ TEXTS = (
 
 
 def cases(seed: int) -> Iterator[Case]:
-    """All of them; the same seed, the same bytes."""
+    """All uploads; the same seed gives the same bytes."""
     good = example_files()
     yield from _archives(good)
     yield from _damaged("zip", zipped(good), np.random.default_rng([seed, 1]))
@@ -71,7 +71,7 @@ def cases(seed: int) -> Iterator[Case]:
 
 
 def small_archive() -> bytes:
-    """A good dataset with one recording, as a zip."""
+    """A valid dataset with one recording, as a zip archive."""
     return zipped(example_files())
 
 
@@ -81,7 +81,7 @@ def netcdf_example() -> bytes:
 
 
 def example_files() -> dict[str, bytes]:
-    """The example, with its first recording only."""
+    """The files of the example dataset with its first recording only."""
     import yaml
 
     description = yaml.safe_load((EXAMPLE / YAML).read_text(encoding="utf-8"))
@@ -123,7 +123,7 @@ def _archives(good: Mapping[str, bytes]) -> Iterator[Case]:
         "con",
     )
     for name in names:
-        # a name that leads nowhere may stand in an archive: what matters is that it is never followed
+        # unusual names may be accepted, but no file may be written under them
         yield upload(f"entry called {name[:20]!r}", zipped_with(good, name), answer="any")
     yield upload("symbolic link", zipped_with(good, "l", b"/etc/passwd", stat.S_IFLNK | 0o777))
     yield upload("device", zipped_with(good, "d", b"", stat.S_IFCHR | 0o666), answer="any")
@@ -132,8 +132,8 @@ def _archives(good: Mapping[str, bytes]) -> Iterator[Case]:
     yield upload("many entries", zipped({f"{k}.txt": b"" for k in range(6000)}))
     yield upload("archive in an archive", zipped({"inner.zip": zipped(good)}))
     yield upload("two of one name", zipped_with(good, YAML, good[YAML]))
-    yield upload("names apart in case only", zipped_with(good, YAML.upper(), good[YAML]), answer="any")
-    yield upload("nothing", b"")
+    yield upload("names that differ in case only", zipped_with(good, YAML.upper(), good[YAML]), answer="any")
+    yield upload("empty file", b"")
     yield upload("a text", b"hello")
     yield upload(
         "a pickle", b"\x80\x04\x95\x1f\x00\x00\x00\x00\x00\x00\x00\x8c\x05posix\x94\x8c\x06system\x94\x93\x94."
@@ -146,7 +146,7 @@ def _archives(good: Mapping[str, bytes]) -> Iterator[Case]:
     for offset, value, what in (
         (8, b"\1\0", "encrypted"),
         (10, b"\x0e\0", "lzma"),
-        (24, b"\xff\xff\xff\x7f", "size that lies"),
+        (24, b"\xff\xff\xff\x7f", "wrong size"),
     ):
         yield upload(f"zip entry: {what}", _patched(zipped(good), offset, value))
     lie = bytearray(zipped(good))

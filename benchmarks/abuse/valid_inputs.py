@@ -1,4 +1,4 @@
-"""What is good on a server: datasets of either kind, runs and a diagnosis that have ended, and a key."""
+"""Valid objects on the server: datasets of both kinds, finished runs and a diagnosis, and a key."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ DIAGNOSIS = {"without": ["clap_and_peel"], "suspects": ["clap_and_peel"], "refit
 
 
 def names(http: httpx.Client) -> dict[str, str]:
-    """Good datasets of either kind, and a run on each that has ended."""
-    dataset = http.post("/v1/datasets", files={"file": ("good.zip", uploads.small_archive())}).json()
-    forces = http.post("/v1/datasets", files={"file": ("good.zip", archive("delfly"))}).json()
+    """Ids of a dataset of each kind, and of a finished run on each."""
+    dataset = http.post("/v1/datasets", files={"file": ("valid.zip", uploads.small_archive())}).json()
+    forces = http.post("/v1/datasets", files={"file": ("valid.zip", archive("delfly"))}).json()
     return {
         "{dataset}": dataset["id"],
         "{forces}": forces["id"],
@@ -31,7 +31,7 @@ def names(http: httpx.Client) -> dict[str, str]:
 
 
 def values(http: httpx.Client, named: dict[str, str]) -> Json:
-    """Good values of whatever a request names, for :mod:`benchmarks.abuse.valid_values`; by kind of dataset."""
+    """Valid values of request fields for :mod:`benchmarks.abuse.valid_values`, by kind of dataset."""
     key = http.post("/v1/keys", json={"name": "fuzzed", "scopes": ["admin"]}).json()
     diagnosis = succeeded(http, "diagnoses", {"dataset_id": named["{forces}"]} | DIAGNOSIS)
     kinds = {"tracks": ("{dataset}", "{run}"), "forces": ("{forces}", "{run of forces}")}
@@ -60,7 +60,7 @@ def _of(http: httpx.Client, dataset_id: str, run_id: str) -> Json:
 
 
 def cancel_queued(http: httpx.Client) -> None:
-    """What was accepted need not be computed."""
+    """Cancel accepted jobs, which need not be computed."""
     for kind in ("runs", "diagnoses"):
         _cancel(http, (one["id"] for one in http.get(f"/v1/{kind}?state=QUEUED&limit=200").json()["items"]), kind)
 

@@ -1,4 +1,4 @@
-"""Jobs of a server that a benchmark submits and waits for."""
+"""Jobs that a benchmark submits to a server and waits for."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ POLL_SECONDS = 0.05
 
 
 def succeeded(http: httpx.Client, kind: str, body: dict[str, Any]) -> str:
-    """Submit a job (``kind`` is "runs" or "diagnoses") and wait.
+    """Submit a job (``kind`` is "runs" or "diagnoses"), wait for it, and return its id.
 
-    Returns its id, RuntimeError if it does not succeed.
+    RuntimeError if it does not succeed.
     """
     job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
     while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:

@@ -1,4 +1,4 @@
-"""Ray nodes as processes on this machine, each found again and ended by its own mark, whatever it spawned."""
+"""Ray nodes as processes on this machine. Each is found and ended by its own mark, with all that it spawned."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import NamedTuple
 from benchmarks.common.files import REPOSITORY
 
 MARK = "WINGFIT_TEST_NODE"
-# A dead node is noticed after about three seconds instead of Ray's fifteen or so.
+# Ray detects a dead node after about three seconds instead of its default of about fifteen.
 IMPATIENT = {
     "RAY_health_check_initial_delay_ms": "2000",
     "RAY_health_check_period_ms": "1000",
@@ -27,7 +27,7 @@ IMPATIENT = {
 
 
 def environment(token: Path, **more: str) -> dict[str, str]:
-    """What a container of the deployment would see, and nothing of another Ray on this machine."""
+    """Environment variables as in a container of the deployment, without those of another Ray on this machine."""
     clean = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
     return clean | {
         "RAY_AUTH_MODE": "token",
@@ -39,7 +39,7 @@ def environment(token: Path, **more: str) -> dict[str, str]:
 
 
 class Process(NamedTuple):
-    """One of this machine."""
+    """A process of this machine."""
 
     name: str
     state: str
@@ -66,9 +66,9 @@ def free_port() -> int:
 
 
 def marked(mark: str) -> dict[int, str]:
-    """Living processes that bear ``mark`` in their environment, and their descendants, with their names.
+    """Living processes with ``mark`` in their environment, and their descendants, with their names.
 
-    The mark alone would miss the processes that Ray renames, which writes over their environment.
+    The mark alone would miss the processes that Ray renames, because renaming overwrites their environment.
     """
     wanted = f"{MARK}={mark}".encode()
     everyone = _processes()
@@ -79,11 +79,11 @@ def marked(mark: str) -> dict[int, str]:
 
 
 class Node:
-    """One Ray node: ``ray start`` and everything that comes of it."""
+    """One Ray node: ``ray start`` and everything that it spawns."""
 
     def __init__(self, token: Path, log: Path, *options: str) -> None:
         self.mark = uuid.uuid4().hex
-        # Sockets live in here and their paths are short of space, so not in pytest's folder.
+        # It contains sockets, whose paths must be short, so it is not in pytest's folder.
         self.folder = tempfile.TemporaryDirectory(prefix="wf-", dir="/tmp", ignore_cleanup_errors=True)
         command = [
             str(Path(sys.executable).with_name("ray")), "start", "--block", "--num-cpus=1", "--disable-usage-stats",
@@ -91,14 +91,14 @@ class Node:
         ]  # fmt: skip
         self.log = log
         with log.open("w") as out:
-            self._process = subprocess.Popen(  # noqa: S603  # our own words
+            self._process = subprocess.Popen(  # noqa: S603  # our own arguments
                 command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True,
                 env=environment(token, **{MARK: self.mark}, **IMPATIENT),
             )  # fmt: skip
 
     @property
     def running(self) -> bool:
-        """Whether ``ray start`` lives."""
+        """Whether ``ray start`` is alive."""
         return self._process.poll() is None
 
     def pids(self) -> dict[int, str]:
@@ -106,11 +106,11 @@ class Node:
         return marked(self.mark)
 
     def raylet(self) -> int | None:
-        """Its scheduler."""
+        """Process id of its scheduler; None if there is none."""
         return next((pid for pid, name in self.pids().items() if name == "raylet"), None)
 
     def kill(self) -> None:
-        """Pull the plug: SIGKILL for every process of the node, until none is left."""
+        """SIGKILL to every process of the node, until none is left."""
         victims = self.pids()
         deadline = time.monotonic() + 10.0
         while victims and time.monotonic() < deadline:
@@ -122,9 +122,9 @@ class Node:
             victims = {p: n for p, n in victims.items() if p in everyone and everyone[p].state != "Z"} | self.pids()
         self._process.wait(10.0)
         if victims:
-            raise RuntimeError(f"processes of a Ray node do not die: {victims}")
+            raise RuntimeError(f"these processes of a Ray node survive SIGKILL: {victims}")
 
     def remove(self) -> None:
-        """Kill it, and remove what it wrote."""
+        """Kill the node and remove its files."""
         self.kill()
         self.folder.cleanup()

@@ -1,4 +1,4 @@
-"""Those who use a server while it dies: they repeat a request until it is answered, and note what it acknowledged."""
+"""Clients of a server that is killed: they repeat a request until it is answered, and record what was acknowledged."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from benchmarks.durability.ledger import KnownRun, Ledger, without_times
 from benchmarks.durability.workloads import DIAGNOSED, DIAGNOSIS, WORKS, Work
 
 Json = dict[str, Any]
-ACTIVE = 3  # runs of one visitor at a time
+ACTIVE = 3  # unfinished runs of one client
 MOST_DATASETS = 3
-MOST_DIAGNOSES = 2  # of all visitors
+MOST_DIAGNOSES = 2  # of all clients
 WAIT_SECONDS = 0.02
 ANSWERED = frozenset(range(200, 500))
 
 
 class OverError(Exception):
-    """The visit is over."""
+    """The client was asked to stop."""
 
 
-class Visitor(threading.Thread):
-    """One user with runs of its own, so that what it asked for has an order."""
+class Client(threading.Thread):
+    """A user with runs of its own, so that its requests have an order."""
 
     def __init__(self, number: int, seed: int, port: int, ledger: Ledger, expected: Mapping[str, Json]) -> None:
-        super().__init__(name=f"visitor-{number}", daemon=True)
+        super().__init__(name=f"client-{number}", daemon=True)
         self._rng, self._ledger, self._expected = np.random.default_rng([seed, number]), ledger, expected
-        self._base, self._over, self._asked = f"http://127.0.0.1:{port}", threading.Event(), 0
+        self._base, self._over, self._requests = f"http://127.0.0.1:{port}", threading.Event(), 0
         self._datasets: dict[str, list[str]] = {work.example: [] for work in WORKS}
         self._mine: list[str] = []
         self.error: BaseException | None = None
 
     def leave(self) -> None:
-        """Ask for nothing more."""
+        """Ask the client to stop."""
         self._over.set()
 
     def run(self) -> None:
-        """Visit until told to leave."""
+        """Act until asked to stop."""
         try:
             with httpx.Client(base_url=self._base, timeout=30.0) as self._http:
                 while not self._over.is_set():
@@ -56,7 +56,7 @@ class Visitor(threading.Thread):
             self.error = error
             raise
 
-    # -- what a visitor does ---------------------------------------------------------------------------------
+    # -- actions ---------------------------------------------------------------------------------------------
 
     def _act(self) -> None:
         open_ = [run for run in self._mine if self._ledger.runs[run].final is None]
@@ -65,7 +65,7 @@ class Visitor(threading.Thread):
             return
         run = open_[self._rng.integers(len(open_))]
         acts: list[tuple[Callable[[str], None], float]] = [
-            # A run is looked at some hundred times: most shall end by themselves.
+            # A run is watched some hundred times, so that most end by themselves.
             (self._look, 0.93),
             (self._diagnose, 0.02),
             (self._pause_and_resume, 0.01),
@@ -79,7 +79,7 @@ class Visitor(threading.Thread):
         dataset = self._dataset(work.example)
         answer = self._ask("POST", "/v1/runs", json=work.body | {"dataset_id": dataset}, repeated=True)
         if answer.status_code != 202:
-            raise AssertionError(f"a good run was refused: {answer.text}")
+            raise AssertionError(f"a valid run was refused: {answer.text}")
         run = answer.json()["id"]
         with self._ledger.lock:
             self._ledger.runs[run] = KnownRun(work.name)
@@ -92,7 +92,7 @@ class Visitor(threading.Thread):
             body = archive(example)
             answer = self._ask("POST", "/v1/datasets", files={"file": (f"{example}.zip", body)}, repeated=True)
             if answer.status_code != 201:
-                raise AssertionError(f"a good dataset was refused: {answer.text}")
+                raise AssertionError(f"a valid dataset was refused: {answer.text}")
             known.append(answer.json()["id"])
             with self._ledger.lock:
                 self._ledger.datasets[known[-1]] = hashlib.sha256(body).hexdigest()
@@ -115,7 +115,7 @@ class Visitor(threading.Thread):
             self._ledger.acknowledge()
         for _ in range(int(self._rng.integers(1, 20))):
             self._look(run)
-        # Of a request that was carried out the answer may be lost: the state says what is left to ask.
+        # The answer to a completed request may be lost, so the run's state decides whether to repeat it.
         while (now := self._fetch(f"/v1/runs/{run}")) and (now["state"] == "PAUSED" or now["wish"] == "PAUSE"):
             if self._ask("POST", f"/v1/runs/{run}/resume").status_code == 202:
                 self._ledger.acknowledge()
@@ -132,7 +132,7 @@ class Visitor(threading.Thread):
         if len(known) < MOST_DIAGNOSES:
             answer = self._ask("POST", "/v1/diagnoses", json=DIAGNOSIS | {"dataset_id": dataset}, repeated=True)
             if answer.status_code != 202:
-                raise AssertionError(f"a good diagnosis was refused: {answer.text}")
+                raise AssertionError(f"a valid diagnosis was refused: {answer.text}")
             with self._ledger.lock:
                 self._ledger.diagnoses[answer.json()["id"]] = None
             self._ledger.acknowledge()
@@ -147,7 +147,7 @@ class Visitor(threading.Thread):
         if answer.status_code != 200 or hashlib.sha256(answer.content).hexdigest() != digest:
             self._ledger.lose(f"dataset {dataset}: {answer.status_code}, {len(answer.content)} bytes")
 
-    # -- asking until there is an answer ---------------------------------------------------------------------
+    # -- requests, repeated until there is an answer ---------------------------------------------------------
 
     def _fetch(self, path: str) -> Json | None:
         answer = self._ask("GET", path)
@@ -155,8 +155,8 @@ class Visitor(threading.Thread):
 
     def _ask(self, method: str, path: str, *, repeated: bool = False, **more: Any) -> httpx.Response:
         if repeated:
-            self._asked += 1
-            more["headers"] = {"Idempotency-Key": f"{self.name}-{self._asked}"}
+            self._requests += 1
+            more["headers"] = {"Idempotency-Key": f"{self.name}-{self._requests}"}
         while not self._over.is_set():
             try:
                 answer = self._http.request(method, path, **more)
@@ -173,7 +173,7 @@ class Visitor(threading.Thread):
 def settle(
     ledger: Ledger, run: str, now: Json, fetch: Callable[[str], Json | None], expected: Mapping[str, Json]
 ) -> None:
-    """Judge a run that has ended."""
+    """Check a finished run."""
     known = ledger.runs[run]
     if now["state"] not in known.endings:
         ledger.lose(f"run {run} is {now['state']}, must be {' or '.join(known.endings)}: {now['error']}")
@@ -185,7 +185,7 @@ def settle(
 def settle_diagnosis(
     ledger: Ledger, diagnosis: str, now: Json, fetch: Callable[[str], Json | None], expected: Json
 ) -> None:
-    """Judge a diagnosis that has ended."""
+    """Check a finished diagnosis."""
     if now["state"] != "SUCCEEDED":
         ledger.lose(f"diagnosis {diagnosis} is {now['state']}: {now['error']}")
     else:
@@ -194,14 +194,14 @@ def settle_diagnosis(
 
 
 def finding(diagnosis: str, fetch: Callable[[str], Json | None]) -> Json:
-    """All that a diagnosis found, without what a clock says."""
+    """The finding of a diagnosis without its duration."""
     return {
         key: value for key, value in (fetch(f"/v1/diagnoses/{diagnosis}/finding") or {}).items() if key != "seconds"
     }
 
 
 def outcome(run: str, fetch: Callable[[str], Json | None]) -> Json:
-    """All numbers of a run that has succeeded, without times."""
+    """All numbers of a successful run without times."""
     history = fetch(f"/v1/runs/{run}/history?limit=10000") or {"items": []}
     return {
         "history": [without_times(item) for item in history["items"]],

@@ -1,4 +1,4 @@
-"""What the runs compute: small calibrations of either kind, each with the end that an undisturbed server gives it."""
+"""Workloads: small calibrations of both kinds and a diagnosis. Undisturbed, each always has the same result."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Work:
-    """A run to submit on the dataset called ``example``."""
+    """A run to submit on the dataset ``example``."""
 
     name: str
     example: str
@@ -35,5 +35,5 @@ WORKS = (
 
 
 DIAGNOSIS: Json = {"axes": ["x", "z"], "seed": 1}
-"""Of what a balance recorded; begun again after every death of the server, it ends when there is peace."""
+"""Of balance recordings. It starts again after every kill of the server, and ends in the quiet phase."""
 DIAGNOSED = "delfly"

@@ -13,7 +13,7 @@ from benchmarks.abuse import __main__ as abuse
 from benchmarks.abuse import fuzz, requests, uploads
 from benchmarks.abuse.__main__ import _wrong
 from benchmarks.abuse.cases import Case
-from benchmarks.abuse.valid_values import Filling
+from benchmarks.abuse.valid_values import ValidValues
 from tests.service import toy
 from tests.service.conftest import Api, serving
 from wingfit.records import load_archive
@@ -98,15 +98,15 @@ def good_of(dataset: str, run: str) -> Json:
 
 def test_what_is_valid_is_filled_alike_for_the_same_request_and_what_others_need_is_not_deleted() -> None:
     dataset, run = "ds_" + "1" * 16, "run_" + "2" * 16
-    filling = Filling(good_of(dataset, run), [b"zip"], seed=1)
+    values = ValidValues(good_of(dataset, run), [b"zip"], seed=1)
     asked = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
-    filled = [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
-    assert filled == [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
+    filled = [values.body(asked, "tracks", values.dice("POST", seed)) for seed in range(50)]
+    assert filled == [values.body(asked, "tracks", values.dice("POST", seed)) for seed in range(50)]
     assert 25 < sum(one["dataset_id"] == dataset for one in filled) < 50
     assert all(one["population"] == 8 and one["seed"] == 5 for one in filled)
     assert all("preset" not in one for one in filled if one["dataset_id"] == dataset)
-    assert filling.spared({"run_id": run}) == {"run_id": "run_" + "0" * 16}
-    assert filling.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
+    assert values.spared({"run_id": run}) == {"run_id": "run_" + "0" * 16}
+    assert values.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
 
 
 @pytest.mark.skipif(fuzz.program() is None, reason="schemathesis is not installed")
