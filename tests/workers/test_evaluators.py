@@ -287,5 +287,5 @@ def test_refuses_settings_that_cannot_be() -> None:
         make_evaluator("processes", address="127.0.0.1:6379")
     with pytest.raises(ValueError, match="'ray://head:10001'; write host:port"):
         make_evaluator("ray", address="ray://head:10001")
-    with pytest.raises(ValueError, match="no evaluator 'dask'; there are in_process, processes, ray"):
+    with pytest.raises(ValueError, match="unknown evaluator 'dask'; give one of in_process, processes, ray"):
         make_evaluator("dask")  # type: ignore[arg-type]

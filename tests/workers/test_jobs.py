@@ -141,7 +141,7 @@ def test_a_refusal_says_what_could_be_done() -> None:
         match=r"^cannot resume a job in state QUEUED; allowed: start, pause, cancel, restart$",
     ):
         step(Job(), Resume())
-    with pytest.raises(IllegalTransition, match="state RUNNING that is about to cancel; allowed: "):
+    with pytest.raises(IllegalTransition, match="state RUNNING with a pending cancel; allowed: "):
         step(Job(State.RUNNING, Wish.CANCEL), Resume())
     with pytest.raises(IllegalTransition, match="state FAILED; allowed: nothing: the state is final"):
         step(Job(State.FAILED), Cancel())

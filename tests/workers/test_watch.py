@@ -107,7 +107,7 @@ def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(
             got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
         assert_same_bits(got, reference(pendulum.problem(), values))
         assert evaluator.standing == Standing(1, 0, 1, 1)
-        assert f"worker process {pid} hung before it had begun 8 individuals" in caplog.text
+        assert f"worker process {pid} hung before starting 8 individuals" in caplog.text
     finally:
         evaluator.close()
 
