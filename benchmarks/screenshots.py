@@ -69,7 +69,7 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
         for number, run in enumerate(runs):
             with progress(f"calibration {number + 1} of {len(runs)}") as tell:
                 client.wait(run, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or ""))
-        diagnosis = client.submit_diagnosis(its, name="What is left out?", division="11")["id"]
+        diagnosis = client.submit_diagnosis(its, name="Missing physics", division="11")["id"]
         with progress("diagnosis") as tell:
             client.wait_for_diagnosis(
                 diagnosis, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or "")

@@ -51,7 +51,7 @@ def main(words: list[str] | None = None) -> int:
             if options.keep:
                 keep(url)
     except KeyboardInterrupt:
-        note("\nstopped; the server of the demo has ended too")
+        note("\nstopped; the server of the demo has stopped too")
         return INTERRUPTED
     except (WingfitError, OSError) as error:
         note(f"the demo failed: {error}")

@@ -1,4 +1,7 @@
-"""The seed's equations written down one by one, element by element, sharing nothing with the simulator's kernels."""
+"""The equations of Armanini et al.
+
+(2016), one by one and element by element, independent of the simulator's kernels.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Uploads that try to write outside the store, and a database as years of use leave it."""
+"""Uploads that try to write outside the store, and a database filled with many runs."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def rate_of(series: Array, step: float) -> Array:
 
 
 def newton_euler(model: FlexibleWing, outputs: Outputs, motion: State, condition: Condition) -> tuple[Array, Array]:
-    """[n, N, 6] sum of the wrenches on every body in its frame, and what its motion needs (finite differences)."""
+    """[n, N, 6] sum of the wrenches on every body in its frame, and rate of momentum by finite differences."""
     w, n = model.structure.wiring, len(model.structure.bodies)
     R = motion.R.reshape(len(motion.R), -1, 3, 3)
     applied = outputs.air_wrench.copy()

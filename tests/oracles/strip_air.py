@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Blown(NamedTuple):
-    """What the kernel needs, shapes as its docstring says."""
+    """Input of the air kernel, with the shapes of its docstring."""
 
     start: npt.NDArray[np.int64]
     weight: Array

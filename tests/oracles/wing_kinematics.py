@@ -1,4 +1,4 @@
-"""Motions whose every derivative is known, noise of known correlation, and wings seen by cameras."""
+"""Wing motions with known derivatives, noise with known correlation, and markers on moving wings."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def passive_pitch(zeta: Array, rate: Array) -> Array:
 def wing_markers(zeta: Array, pitch: Array, upper: bool, right: bool, dihedral: float) -> tuple[Array, Array]:
     """Three markers on the leading edge [T, 3, 3] and two along the chord [T, 2, 3], in body axes, m.
 
-    Told from rotations of a wing that lies flat, not from the formulas under test.
+    Computed from rotations of a wing that lies flat, not from the formulas under test.
     """
     turn = dihedral + zeta if upper else dihedral - zeta  # up from the horizontal
     side, opening = (1.0 if right else -1.0), (1.0 if upper else -1.0)

@@ -56,7 +56,7 @@ def _start_ray(token: Path, address: str) -> None:
 
 
 def _refused() -> list[str]:
-    """Folders of which one would expect that they can be written, and cannot."""
+    """Usually writable folders that are read-only here."""
     refused = []
     for folder in (REPOSITORY, REPOSITORY / "sim" / "kernels" / "__pycache__", Path("/var/tmp"), Path("/etc")):  # noqa: S108
         try:

@@ -158,7 +158,7 @@ def workers(driver: Driver) -> int:
     return int(driver.answer())
 
 
-def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path: Path) -> None:
+def test_two_nodes_give_the_same_bits_even_if_one_dies(cluster: Cluster, tmp_path: Path) -> None:
     wanted = digest(make_evaluator("in_process").evaluate(pendulum.problem(), pendulum.population(96), residuals=True))
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir()

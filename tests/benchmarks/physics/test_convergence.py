@@ -39,8 +39,8 @@ def test_periodic_tracks_at_other_instants(known: int, wanted: int) -> None:
     np.testing.assert_allclose(at_steps(harmonics(known), wanted), harmonics(wanted), atol=1e-13)
 
 
-def test_instants_that_are_known_keep_their_tracks() -> None:
-    """Of any tracks, with the highest frequency that their instants can carry."""
+def test_tracks_at_known_instants_are_unchanged() -> None:
+    """For any tracks, including the highest frequency that their instants can represent."""
     tracks = np.random.default_rng(2).normal(size=(64, 2, 3))
     np.testing.assert_allclose(at_steps(tracks, 48)[::3], tracks[::4], atol=1e-13)
 
@@ -77,7 +77,7 @@ def test_fewest_steps_are_enough_and_two_less_are_not() -> None:
     assert ms_per_beat(VACUUM, steps, converged.start, seconds=0.0) > 0
 
 
-def test_reference_that_has_not_converged_is_refused() -> None:
+def test_unconverged_reference_is_refused() -> None:
     with pytest.raises(ArithmeticError, match="no reference"):
         reference(AIR, 1e-10)
 

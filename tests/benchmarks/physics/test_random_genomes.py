@@ -46,7 +46,7 @@ def test_genomes_fill_the_box_log_uniformly() -> None:
     assert not np.array_equal(genomes, draw(GENES, 2000, 4))
 
 
-def test_every_genome_is_simulated_once_and_every_condition_is_visited() -> None:
+def test_every_genome_is_simulated_once_and_every_condition_is_used() -> None:
     genomes = draw(GENES, 1000, 1)
     todo = tasks(genomes)
     everyone = np.concatenate([task.genomes for task in todo])
@@ -61,7 +61,7 @@ def ended(division: str, condition: Condition, reasons: list[str | None], errors
     return Ended(Task(division, condition, genomes), reasons, [5] * len(reasons), 0.5, errors)
 
 
-def test_summary_counts_what_ended_and_how() -> None:
+def test_summary_counts_outcomes() -> None:
     nan = float("nan")
     done = [
         ended("11", VACUUM, [None, None, FLUTTER], [nan, nan, nan]),
@@ -83,7 +83,7 @@ def test_summary_counts_what_ended_and_how() -> None:
     assert found["ms_per_genome"] == pytest.approx(250.0)
 
 
-def test_what_hangs_is_ended_and_counted() -> None:
+def test_hung_tasks_are_killed_and_counted() -> None:
     todo = [Task("11", VACUUM, draw(GENES, 1, 1))]
     start = time.monotonic()
     done = run(todo, 1, silent, limit=0.5, work=hang)

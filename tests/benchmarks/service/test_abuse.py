@@ -1,4 +1,4 @@
-"""Hostile requests are many, the same for the same seed, and their answers are judged; so is what a fuzzer reports."""
+"""Hostile requests are numerous and reproducible; answers and fuzzer reports are judged."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Json = dict[str, Any]
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_there_are_many_and_the_same_seed_gives_the_same() -> None:
+def test_there_are_many_requests_and_a_seed_reproduces_them() -> None:
     first, again = (list(uploads.cases(1)) for _ in range(2))
     assert first == again
     assert first != list(uploads.cases(2))
@@ -82,7 +82,7 @@ def test_a_report_of_the_fuzzer_is_judged(changed: Json, said: list[str]) -> Non
     assert fuzz.counted(WELL | changed) == 1960
 
 
-def test_without_the_fuzzer_the_benchmark_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_fuzzer_is_reported_with_the_command_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fuzz, "program", lambda: None)
     monkeypatch.setattr(sys, "argv", ["abuse", "--json"])
     with pytest.raises(SystemExit, match=r"pip install -e \.\[fuzz\]"):
@@ -96,7 +96,7 @@ def good_of(dataset: str, run: str) -> Json:
     return kinds | more | {"effects": ["added_mass"], "examples": []}
 
 
-def test_what_is_valid_is_filled_alike_for_the_same_request_and_what_others_need_is_not_deleted() -> None:
+def test_values_are_reproducible_and_needed_objects_are_not_deleted() -> None:
     dataset, run = "ds_" + "1" * 16, "run_" + "2" * 16
     values = ValidValues(good_of(dataset, run), [b"zip"], seed=1)
     asked = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}

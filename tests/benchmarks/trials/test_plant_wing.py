@@ -1,4 +1,4 @@
-"""The plant of the concealed trials: laws by closed forms, the whole wing against the tool's own simulator."""
+"""The plant of the concealed trials: laws against closed forms, the whole wing against the product's simulator."""
 
 import ast
 from dataclasses import replace
@@ -92,7 +92,7 @@ def test_bodies_and_joints_are_those_of_the_simulator(division: str) -> None:
     assert (cut.under(places[:, 0], places[:, 1]) == structure.wiring.carrier).all()
 
 
-def test_divisions_are_read_or_refused() -> None:
+def test_divisions_are_parsed_or_refused() -> None:
     assert counts_of("11") == (3, 3, 3, 2)
     assert counts_of("2x3") == (3, 3)
     for text in ("", "1x1", "4x0", "one", "3,-1"):
@@ -157,7 +157,9 @@ def test_steps_are_fine_enough_and_the_motion_is_periodic() -> None:
     # what the simulator's sums over cells leave is most in thin air at 4 Hz: 0.05 mm, without them 0.008 mm
     [("4", THIN, 7e-5), ("4", STREAM, 2e-5), ("11", THICK, 4e-5), ("11", STREAM, 3e-5), ("24", THIN, 3e-5)],
 )
-def test_without_anything_hidden_it_moves_as_the_simulator(division: str, condition: Condition, allowed: float) -> None:
+def test_without_hidden_effects_the_motion_equals_the_simulators(
+    division: str, condition: Condition, allowed: float
+) -> None:
     values = genome(1)
     model = FlexibleWing(WING, division, numerics=Numerics(accuracy=1e-5))
     told = model.beat([values[gene.name] for gene in model.genes], blank_recording(WING, condition))
@@ -170,7 +172,7 @@ def test_without_anything_hidden_it_moves_as_the_simulator(division: str, condit
 # --- hidden effects as a whole --------------------------------------------------------------------------------------
 
 
-def test_the_catalogue_says_rightly_what_the_library_has() -> None:
+def test_listed_effects_are_in_the_library_and_the_others_are_not() -> None:
     assert len(LISTED) >= 12
     assert len(UNKNOWN) >= 5
     assert set(LISTED) <= set(EFFECTS)
@@ -180,7 +182,7 @@ def test_the_catalogue_says_rightly_what_the_library_has() -> None:
 
 
 @pytest.mark.parametrize("name", list(KINDS))
-def test_every_effect_is_nothing_at_nothing_and_grows(name: str) -> None:
+def test_every_effect_vanishes_at_zero_strength_and_grows(name: str) -> None:
     condition, typical = STREAM if name in IN_STREAM else THIN, KINDS[name].typical
     nominal = beat(condition).tracks
     assert np.array_equal(beat(condition, name).tracks, nominal)
@@ -197,7 +199,7 @@ def test_every_effect_is_nothing_at_nothing_and_grows(name: str) -> None:
         ("added_mass", 0.05), ("backlash", 0.05), ("stroke_amplitude", 0.3), ("drive_harmonics", 0.3),
     ],
 )  # fmt: skip
-def test_genes_that_are_told_are_those_of_the_library(name: str, left: float) -> None:
+def test_true_gene_values_mean_the_same_in_the_library(name: str, left: float) -> None:
     """The library's effect with these values moves the wing as the plant's does, but for the difference in form."""
     condition = STREAM if name in IN_STREAM else THIN
     found = beat(condition, name, KINDS[name].typical)
@@ -224,7 +226,7 @@ def test_two_effects_at_once_and_their_answers() -> None:
     ]  # fmt: skip
 
 
-def test_a_stop_is_told_where_the_wing_is_highest() -> None:
+def test_a_stop_acts_where_the_wing_is_highest() -> None:
     found = beat(STREAM, "stop", KINDS["stop"].typical)
     (truth,) = found.truths
     assert truth.turn is not None
@@ -243,7 +245,7 @@ def test_the_beat_begins_where_reference_markers_rise_through_the_hinge() -> Non
     assert height[(k + 20) % 4096] > 1e-3
 
 
-def test_draws_stay_in_their_ranges_and_what_is_unknown_is_refused() -> None:
+def test_draws_stay_in_their_ranges_and_unknown_effects_are_refused() -> None:
     rng = np.random.default_rng(5)
     for name, kind in KINDS.items():
         effect = drawn(name, kind.typical, rng)
