@@ -71,7 +71,7 @@ class Fitted:
     problem: Problem
     estimate: Estimate
     agreement: dict[Quantity, Agreement]
-    lacking: tuple[float, float] | None
+    misfit_range: tuple[float, float] | None
 
     @property
     def errors(self) -> dict[str, float]:
@@ -234,9 +234,9 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
     """Errors of the coefficients, where models without a term fail, and agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
-        "misfit_tstar_range": widest([one.lacking for one in fitted["without_fling"]]),
-        "misfit_tstar_range_berman_wang": widest([one.lacking for one in fitted["berman_wang"]]),
-        "misfit_located_with_fling": sum(one.lacking is not None for one in fitted["proposed"]),
+        "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
+        "misfit_tstar_range_berman_wang": widest([one.misfit_range for one in fitted["berman_wang"]]),
+        "misfit_located_with_fling": sum(one.misfit_range is not None for one in fitted["proposed"]),
     }
     for name, suffix in (("proposed", ""), ("without_fling", "_without_fling"), ("berman_wang", "_berman_wang")):
         figures[f"lift_correlation{suffix}"], figures[f"lift_rmse_percent{suffix}"] = mean_lift(fitted[name])
@@ -245,7 +245,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
             "lift_correlation": one.agreement["lift"].correlation,
             "lift_rmse_percent": one.agreement["lift"].rmse_percent,
             "coefficients": one.estimate.values,
-            "misfit_tstar_range": one.lacking,
+            "misfit_tstar_range": one.misfit_range,
         }
         for name, one in finer.items()
     }
@@ -317,7 +317,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
                 "lift_rmse_percent": poorer.agreement["lift"].rmse_percent,
                 "lift_correlation": poorer.agreement["lift"].correlation,
                 "mean_lift_modelled_n": poorer.agreement["lift"].mean_modelled,
-                "misfit_tstar_range": poorer.lacking,
+                "misfit_tstar_range": poorer.misfit_range,
             },
         }
         for one, poorer in zip(fitted["proposed"], fitted["without_fling"], strict=True)

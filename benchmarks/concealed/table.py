@@ -238,21 +238,21 @@ def wrongs(one: Mark) -> str:
     """What is wrong with a trial's result; "" if nothing is."""
     if one.verdict == "failed":
         return f"no finding: {one.remark}"
-    said = list[str]()
+    mistakes = list[str]()
     if not one.truth:
         return "false alarm" if one.alarm else ""
     if one.strength < WEAK and one.group != "pairs":
         pass
     elif one.group == "unlisted":
-        said += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
+        mistakes += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
     elif one.group == "measurement":
-        said += ["wrong side"] * (not one.right_side)
+        mistakes += ["wrong side"] * (not one.right_side)
     elif one.group == "pairs":
-        said += ["not both"] * ((one.found or 0) < len(one.truth))
+        mistakes += ["not both"] * ((one.found or 0) < len(one.truth))
     else:
-        said += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
-    said += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
-    return "; ".join(said)
+        mistakes += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
+    mistakes += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
+    return "; ".join(mistakes)
 
 
 def of_rig(one: Mark) -> str:

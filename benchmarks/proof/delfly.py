@@ -73,7 +73,7 @@ def located(
     spec, model = CalibrationSpec(preset=BASELINE), vehicle_model(dataset, CalibrationSpec(preset=BASELINE))
     tests = {trial.name: trial for trial in trials}
     return {
-        one.name: fit(model, prepared(spec, one), tests[one.name], evaluator).lacking
+        one.name: fit(model, prepared(spec, one), tests[one.name], evaluator).misfit_range
         for one in dataset.recordings
         if one.name not in dataset.held_out
     }

@@ -1,7 +1,4 @@
-"""The equations of Armanini et al.
-
-(2016), one by one and element by element, independent of the simulator's kernels.
-"""
+"""The equations of Armanini et al. (2016), element by element, independent of the simulator's kernels."""
 
 from __future__ import annotations
 

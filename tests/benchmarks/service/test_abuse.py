@@ -66,7 +66,7 @@ FAILURE = {"title": "Server error", "count": 3, "operations": ["POST /v1/runs", 
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "failures"),
     [
         ({}, []),
         ({"failures": [FAILURE]}, ["fuzz: Server error, 3 times in POST /v1/runs, GET /v1/runs"]),
@@ -77,8 +77,8 @@ FAILURE = {"title": "Server error", "count": 3, "operations": ["POST /v1/runs", 
         ({"operations": None}, ["fuzz: 0 of all calls of the API"]),
     ],
 )
-def test_a_report_of_the_fuzzer_is_judged(changed: Json, said: list[str]) -> None:
-    assert fuzz.judged(WELL | changed) == said
+def test_a_report_of_the_fuzzer_is_judged(changed: Json, failures: list[str]) -> None:
+    assert fuzz.judged(WELL | changed) == failures
     assert fuzz.counted(WELL | changed) == 1960
 
 

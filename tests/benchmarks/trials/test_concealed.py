@@ -309,8 +309,8 @@ def test_recording_a_trial_is_reproducible_and_reaches_the_target_strength(tmp_p
     assert truth.secrets[0].values["stroke_amplitude.part"] == pytest.approx(truth.secrets[0].strength)
     assert len(one.held_out) == 2
     assert len(one.fitted) == 5
-    for told in (one.name, one.description, *(r.name for r in one.recordings)):
-        assert "stroke_amplitude" not in told
+    for text in (one.name, one.description, *(r.name for r in one.recordings)):
+        assert "stroke_amplitude" not in text
     assert all(r.standard_deviation is None for r in one.recordings)
 
 

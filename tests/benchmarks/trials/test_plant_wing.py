@@ -162,9 +162,9 @@ def test_without_hidden_effects_the_motion_equals_the_simulators(
 ) -> None:
     values = genome(1)
     model = FlexibleWing(WING, division, numerics=Numerics(accuracy=1e-5))
-    told = model.beat([values[gene.name] for gene in model.genes], blank_recording(WING, condition))
+    simulated = model.beat([values[gene.name] for gene in model.genes], blank_recording(WING, condition))
     found = simulate(WING, division, values, condition).tracks
-    difference = found - resample(told.tracks, len(found), axis=0)
+    difference = found - resample(simulated.tracks, len(found), axis=0)
     assert np.linalg.norm(difference, axis=2).max() < allowed
     assert rms(difference) < 2e-5
 
@@ -210,9 +210,9 @@ def test_true_gene_values_mean_the_same_in_the_library(name: str, left: float) -
     with_it = model.beat([genes.get(gene.name, gene.nominal) for gene in model.genes], blank).tracks
     without = base.beat([gene.nominal for gene in base.genes], blank).tracks
     n = len(found.tracks)
-    told = resample(with_it, n, axis=0) - resample(without, n, axis=0)
+    expected = resample(with_it, n, axis=0) - resample(without, n, axis=0)
     change = found.tracks - beat(condition).tracks
-    assert rms(change - told) < left * rms(change)
+    assert rms(change - expected) < left * rms(change)
 
 
 def test_two_effects_at_once_and_their_answers() -> None:

@@ -206,10 +206,7 @@ def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Arr
 
 
 def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
-    """Fraction of each instant in which the wings peel (Eq.
-
-    7), and fraction of the chord that has separated, [n] each.
-    """
+    """Fraction of each instant in which the wings peel (Eq. 7), and of the chord that has separated, [n] each."""
     if not vehicle.claps:
         return np.zeros(len(t)), np.ones(len(t))
     started = np.logical_or.accumulate(turn < 0)

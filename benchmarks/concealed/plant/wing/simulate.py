@@ -77,11 +77,9 @@ def simulate(
     hidden: Hidden | None = None,
     accuracy: Accuracy | None = None,
 ) -> Beat:
-    """Simulate ``wing`` divided by ``division`` (:func:`.geometry.counts_of`) with a genome (thesis Eqs.
+    """Simulate ``wing`` with a genome (thesis Eqs. 18-19, SI units).
 
-    18-19, SI units).
-
-    ArithmeticError if there is no periodic motion.
+    ``division`` as in :func:`.geometry.counts_of`. ArithmeticError if there is no periodic motion.
     """
     draft = Draft(wing, division, genome, condition)
     concealed = hidden or Hidden()

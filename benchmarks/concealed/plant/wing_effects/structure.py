@@ -53,7 +53,7 @@ def _damage_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
 def _hardening(draft: Draft, strength: float, _: Values) -> None:
     """Moment k phi sinh(x) / x, x = h times curvature.
 
-    H such that the factor is 1 + strength at a radian over the span.
+    ``h`` is such that the factor is 1 + strength at a radian over the span.
     """
     steep = float(brentq(lambda h: math.sinh(h) / h - 1 - strength, 1e-6, _STEEPEST))
     for c, joint in enumerate(draft.joints):
