@@ -12,7 +12,6 @@ import json
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import machine
-from benchmarks.concealed.bench import WingBench
+from benchmarks.concealed.bench import WingBench, record_all
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from wingfit.calibration.spec import CalibrationSpec
@@ -44,12 +43,8 @@ def recorded(division: str, plant: str, seed: int) -> Dataset:
     """Twelve recordings of a plant with random parameters; the same seed gives the same bits."""
     bench = WingBench(Build("wing", division, plant))
     genome = bench.genome(np.random.default_rng([seed, 1]))
-    filmset = bench.quality(np.random.default_rng([seed, 2]))
-    found = []
-    for number, condition in enumerate((*FITTED, *HELD_OUT)):
-        made = bench.recording(condition, genome, HIDDEN, filmset, np.random.default_rng([seed, 3, number]))
-        found.append(replace(made.recording, name=name_of(condition)))
-    return Dataset("twelve", bench.rig, tuple(found), tuple(name_of(condition) for condition in HELD_OUT))
+    recordings = tuple(record_all(bench, (*FITTED, *HELD_OUT), genome, HIDDEN, seed))
+    return Dataset("twelve", bench.rig, recordings, tuple(name_of(condition) for condition in HELD_OUT))
 
 
 def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
@@ -27,7 +27,7 @@ from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
 from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden
 from benchmarks.concealed.plant.wing_effects.kind import Kind
 from benchmarks.concealed.strength import rms
-from benchmarks.concealed.trials import Build
+from benchmarks.concealed.trials import Build, name_of
 from wingfit.calibration.plan import prepared
 from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
@@ -324,3 +324,17 @@ class VehicleBench(Bench[Array, Weighing]):
 def bench_of(build: Build) -> Bench[Beat, Filmset] | Bench[Array, Weighing]:
     """The bench for a build."""
     return VehicleBench(build) if build.rig == "vehicle" else WingBench(build)
+
+
+def record_all(
+    bench: Bench[Motion, Quality],
+    conditions: Sequence[Condition],
+    genome: Mapping[str, float],
+    hidden: Concealed,
+    seed: int,
+) -> Iterator[Recording]:
+    """A recording under each of ``conditions``, all with the same settings; the same seed gives the same bits."""
+    quality = bench.quality(np.random.default_rng([seed, 2]))
+    for number, condition in enumerate(conditions):
+        made = bench.recording(condition, genome, hidden, quality, np.random.default_rng([seed, 3, number]))
+        yield replace(made.recording, name=name_of(condition))

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.bench import WingBench
+from benchmarks.concealed.bench import WingBench, record_all
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from benchmarks.proof.story import (
@@ -36,7 +36,7 @@ from wingfit.calibration.search import calibrate
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.cli.base.output import progress
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import Condition, Dataset
+from wingfit.records import Condition, Dataset, Recording
 from wingfit.workers import make_evaluator
 
 DIVISION = "11"
@@ -104,14 +104,11 @@ def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
     """Film the plant with random parameters under all conditions; the same seed gives the same bits."""
     bench = WingBench(Build("wing", DIVISION, DIVISION))
     genome = bench.genome(np.random.default_rng([seed, 1]))
-    filmset = bench.quality(np.random.default_rng([seed, 2]))
-    recordings, conditions = [], (*FITTED, *HELD_OUT)
+    recordings, conditions = list[Recording](), (*FITTED, *HELD_OUT)
     with progress("robird: filming the plant") as tell:
-        for number, condition in enumerate(conditions):
-            rng = np.random.default_rng([seed, 3, number])
-            made = bench.recording(condition, genome, hidden, filmset, rng)
-            recordings.append(replace(made.recording, name=name_of(condition)))
-            tell((number + 1) / len(conditions), None, name_of(condition))
+        for recording in record_all(bench, conditions, genome, hidden, seed):
+            recordings.append(recording)
+            tell(len(recordings) / len(conditions), None, recording.name)
     truth = {gene: value for name, one in hidden.items() for gene, value in bench.laws[name].values(one).items()}
     dataset = Dataset("robird", bench.rig, tuple(recordings), tuple(name_of(condition) for condition in HELD_OUT))
     return Campaign(dataset, genome, truth)
