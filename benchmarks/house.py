@@ -42,6 +42,8 @@ IDIOMS = {
     r"\blacking\b": "missing physics; residual",
     r"\bwhat (?:it|they|(?:the|a) (?:model|simulation|baseline)) (?:still )?lacks?\b": "missing physics",
     r"\bwhat (?:is|was) left(?: out)?\b": "residual; missing physics",
+    r"\bwhat (?:it|(?:a|the) (?:re)?fit|the model) leaves\b": "residual",
+    r"\basks? of\b": "request",
     r"\binnocent\b": "the discretisation is not the cause",
     r"\bin parts of the noise\b": "residual / noise",
     r"\bto the 3\.3\b": "scales with f^3.3",
