@@ -274,7 +274,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
     """Coverage of intervals with and without systematic errors, and convergence from the corners."""
     beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
     covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
-    begun = [
+    starts = [
         fit(
             model,
             low_passed(record(beat, trial, SMALL, np.random.default_rng([seed, 5])), LowPass(CUTOFF)),
@@ -287,7 +287,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
         "interval_coverage_percent": float(np.mean(list(covered.values()))),
         "interval_coverage_percent_by_coefficient": covered,
         "interval_coverage_percent_with_systematic_errors": coverage(model, beats, SMALL, repetitions, seed, evaluator),
-        "converged_from_corners_percent": corners(model, begun, evaluator),
+        "converged_from_corners_percent": corners(model, starts, evaluator),
         "coefficient_error_percent_of_other_draws": luck(model, beats, seed, evaluator),
         "systematic_error_percent": systematic(model, evaluator),
     }

@@ -122,7 +122,7 @@ def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Pat
     # fmt: on
     hooks = {"SCHEMATHESIS_HOOKS": "benchmarks.abuse.fuzz_hooks", "WINGFIT_FUZZ_GOOD": str(folder)}
     with log.open("wb") as stream:
-        ended = subprocess.run(  # noqa: S603  the fuzzer that was asked for
+        ended = subprocess.run(  # noqa: S603  our own arguments
             command,
             env={**os.environ, "PYTHONPATH": str(REPOSITORY), **hooks},
             cwd=folder,

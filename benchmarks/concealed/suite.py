@@ -131,11 +131,14 @@ def _made(trial: Trial, folders: Folders) -> bool:
     """Whether the folder holds the trial; ValueError if a trial of another suite has its name there."""
     if not (folders.answer(trial.name).exists() and folders.dataset(trial.name).exists()):
         return False
-    kept = seal.read(folders.answer(trial.name))
-    stored, asked = (kept.seed, kept.names, kept.plant, kept.target), (trial.seed, frozenset(trial.hidden))
-    if stored != (*asked, trial.build.plant, trial.target):
+    earlier = seal.read(folders.answer(trial.name))
+    stored, requested = (
+        (earlier.seed, earlier.names, earlier.plant, earlier.target),
+        (trial.seed, frozenset(trial.hidden)),
+    )
+    if stored != (*requested, trial.build.plant, trial.target):
         raise ValueError(
-            f"{folders.root} holds {trial.name} with seed {kept.seed}, but seed {trial.seed} is requested: "
+            f"{folders.root} holds {trial.name} with seed {earlier.seed}, but seed {trial.seed} is requested: "
             "give an empty folder, or run the suite that it was made for"
         )
     return True
@@ -157,9 +160,9 @@ def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = Fal
     answers = {trial.name: seal.open_seal(trial.name, folders.sealed, manifest) for trial in trials}
     marks = tuple(_marked(first[trial.name], answers[trial.name]) for trial in trials)
     advised = tuple(_advised(one, first[one.name], second, answers[one.name].names) for one in followed)
-    asked = sum(trial.group == "advice" for trial in trials)
+    advice_trials = sum(trial.group == "advice" for trial in trials)
     return {
-        "wingfit": Table(marks, advised, asked, seconds),
+        "wingfit": Table(marks, advised, advice_trials, seconds),
         **{name: _table_of_peer(found, answers) for name, found in others.items()},
     }
 
@@ -170,25 +173,25 @@ def _peers(trials: Sequence[Trial], folders: Folders, jobs: int) -> dict[str, li
 
     folders.peers.mkdir(exist_ok=True)
     tasks = [task(trial, trial.name, folders) for trial in trials]
-    kept = {one.trial: found for one in tasks if (found := _kept_of_peers(one, folders)) is not None}
+    stored = {one.trial: found for one in tasks if (found := _stored_peers(one, folders)) is not None}
 
     def keep(found: tuple[PeerOutcome, ...]) -> None:
-        kept[found[0].trial] = found
+        stored[found[0].trial] = found
         path = folders.peers / f"{found[0].trial}.json"
         path.with_suffix(".part").write_text(json.dumps([asdict(one) for one in found]), encoding="utf-8")
         path.with_suffix(".part").replace(path)
 
     with pool(jobs) as executor:
-        each(executor, run_peers, [one for one in tasks if one.trial not in kept], "peers", keep)
-    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*(kept[one.trial] for one in tasks), strict=True)}
+        each(executor, run_peers, [one for one in tasks if one.trial not in stored], "peers", keep)
+    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*(stored[one.trial] for one in tasks), strict=True)}
 
 
-def _kept_of_peers(asked: Task, folders: Folders) -> tuple[PeerOutcome, ...] | None:
+def _stored_peers(request: Task, folders: Folders) -> tuple[PeerOutcome, ...] | None:
     """Results of the comparison methods from an earlier run on the same dataset; None if there are none."""
     from benchmarks.concealed.peers import PeerOutcome as Outcome
 
-    path = folders.peers / f"{asked.trial}.json"
-    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+    path = folders.peers / f"{request.trial}.json"
+    if not path.exists() or path.stat().st_mtime < request.dataset.stat().st_mtime:
         return None
     stored = json.loads(path.read_text(encoding="utf-8"))
     return tuple(Outcome(**(one | {"named": tuple(one["named"])})) for one in stored)
@@ -204,32 +207,32 @@ def _table_of_peer(outcomes: Sequence[PeerOutcome], answers: Mapping[str, Answer
 def diagnosed(tool: Executor, labelled: Sequence[tuple[Trial, str]], folders: Folders, what: str) -> list[Outcome]:
     """Diagnose the datasets with these labels and store the findings."""
     tasks = [task(trial, label, folders) for trial, label in labelled]
-    kept = {one.trial: found for one in tasks if (found := _kept(one, folders)) is not None}
+    stored = {one.trial: found for one in tasks if (found := _stored(one, folders)) is not None}
 
     def keep(outcome: Outcome) -> None:
-        kept[outcome.trial] = outcome
+        stored[outcome.trial] = outcome
         path = folders.findings / f"{outcome.trial}.json"
         content = finding_json(outcome.finding) if outcome.finding else {"failed": outcome.reason}
         path.with_suffix(".part").write_text(json.dumps(content), encoding="utf-8")
         path.with_suffix(".part").replace(path)
 
-    each(tool, run, [one for one in tasks if one.trial not in kept], what, keep)
-    return [kept[one.trial] for one in tasks]
+    each(tool, run, [one for one in tasks if one.trial not in stored], what, keep)
+    return [stored[one.trial] for one in tasks]
 
 
-def _kept(asked: Task, folders: Folders) -> Outcome | None:
+def _stored(request: Task, folders: Folders) -> Outcome | None:
     """The finding of an earlier run on the same dataset.
 
     None if there is none or if it failed, so that it is tried again.
     """
-    path = folders.findings / f"{asked.trial}.json"
-    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+    path = folders.findings / f"{request.trial}.json"
+    if not path.exists() or path.stat().st_mtime < request.dataset.stat().st_mtime:
         return None
     stored = json.loads(path.read_text(encoding="utf-8"))
     if "failed" in stored:
         return None
     finding = finding_from_json(stored)
-    return Outcome(asked.trial, finding, "", finding.seconds)
+    return Outcome(request.trial, finding, "", finding.seconds)
 
 
 def task(trial: Trial, label: str, folders: Folders) -> Task:

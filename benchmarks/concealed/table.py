@@ -90,12 +90,12 @@ class Advised:
 class Table:
     """All scores.
 
-    ``advised`` holds the ambiguous trials only, out of ``asked`` trials that were made to be ambiguous.
+    ``advised`` holds the ambiguous trials only, out of ``advice_trials`` trials that were made to be ambiguous.
     """
 
     marks: tuple[Mark, ...]
     advised: tuple[Advised, ...]
-    asked: int
+    advice_trials: int
     seconds: float
 
     @property
@@ -218,7 +218,7 @@ class Table:
             "held-out misfit over floor": f"median {figures['heldout_over_floor_median']}",
             "place": f"medians {place['span_R']} R, {place['chord_c']} c, {place['phase_deg']} degrees",
             f"too weak to count (d < {WEAK})": str(len(self.hiding) - len(seen(self.hiding))),
-            "advice: ambiguous at first": f"{len(self.advised)} of {self.asked} trials",
+            "advice: ambiguous at first": f"{len(self.advised)} of {self.advice_trials} trials",
             "failures": str(len(figures["failures"])),
             "seconds of a trial": f"median {median(m.seconds for m in self.marks)}",
         }

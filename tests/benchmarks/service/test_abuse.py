@@ -99,9 +99,9 @@ def good_of(dataset: str, run: str) -> Json:
 def test_values_are_reproducible_and_needed_objects_are_not_deleted() -> None:
     dataset, run = "ds_" + "1" * 16, "run_" + "2" * 16
     values = ValidValues(good_of(dataset, run), [b"zip"], seed=1)
-    asked = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
-    filled = [values.body(asked, "tracks", values.dice("POST", seed)) for seed in range(50)]
-    assert filled == [values.body(asked, "tracks", values.dice("POST", seed)) for seed in range(50)]
+    generated = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
+    filled = [values.body(generated, "tracks", values.dice("POST", seed)) for seed in range(50)]
+    assert filled == [values.body(generated, "tracks", values.dice("POST", seed)) for seed in range(50)]
     assert 25 < sum(one["dataset_id"] == dataset for one in filled) < 50
     assert all(one["population"] == 8 and one["seed"] == 5 for one in filled)
     assert all("preset" not in one for one in filled if one["dataset_id"] == dataset)

@@ -90,7 +90,7 @@ def test_a_refit_starts_from_a_given_genome_if_that_is_better() -> None:
 
 
 class Counting(Line):
-    """It notes how many individuals it is asked for."""
+    """Counts the individuals of every request."""
 
     def __init__(self, calls: list[int]) -> None:
         self.calls = calls

@@ -45,7 +45,7 @@ def weighed() -> Dataset:
 
 
 class Browser(webbrowser.GenericBrowser):
-    """One that remembers what it was asked to open."""
+    """A browser that records the opened addresses."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
