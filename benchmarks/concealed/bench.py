@@ -315,7 +315,7 @@ class VehicleBench(Bench[Array, Weighing]):
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator
     ) -> Made:
-        """Weighed."""
+        """Record the forces with the balance."""
         made = weigh(beat, self.rig, condition, quality, rng, hidden)
         noise = self.fitted(replace(made.recording, values=made.recording.values - made.clean)).values
         return Made(made.recording, rms(noise.ravel()))

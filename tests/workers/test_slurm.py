@@ -50,7 +50,7 @@ def folder() -> Iterator[Path]:
 
 
 class Job:
-    """One life of a job."""
+    """One execution of the Slurm script."""
 
     def __init__(self, folder: Path, **more: str) -> None:
         self.folder, self.mark, self.port = folder, uuid.uuid4().hex, free_port()
@@ -94,7 +94,7 @@ class Job:
         return (self.folder / "job.log").read_text(errors="replace")[-4000:]
 
     def assert_nothing_left(self) -> None:
-        """Ray's processes notice within some seconds that their node has stopped."""
+        """No process is left; Ray's need some seconds to notice that their node has stopped."""
         deadline = time.monotonic() + 20.0
         while (left := marked(self.mark)) and time.monotonic() < deadline:
             time.sleep(0.2)
