@@ -1,8 +1,8 @@
-"""What a division into rigid bodies costs: beams against their theory, and the robird wing against a finer cut.
+"""Error of the discretisation into rigid bodies: beams against beam theory, the Robird's wing against finer divisions.
 
 ``python -m benchmarks.beams [--json | --table] [--quick]``
-Frequencies come from the compiled connectors at rest and the bodies' masses; the elastica from the compiled spring
-forces in equilibrium; the wing from the simulator itself.
+Frequencies are computed from the compiled connectors at rest and the bodies' masses, the elastica from the compiled
+spring forces in equilibrium, the wing with the simulator itself.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-# Shear and rotary inertia change the third frequency of the uniform rod by 3e-5 of itself.
+# Shear and rotary inertia change the third frequency of the uniform rod by 3e-5.
 UNIFORM_ROD = Beam(4.0, (0.006, 0.006), (0.005, 0.005))
 TAPERED_ROD = Beam(4.0, (0.006, 0.004), (0.005, 0.003))
 UNIFORM_SHEET = Beam(1.0, (0.1, 0.1), (0.0025, 0.0025))
 TAPERED_SHEET = Beam(1.0, (0.1, 0.06), (0.0025, 0.0015))
 THICK_PLATE = Beam(1.0, (0.2, 0.2), (0.01, 0.01))
 STOCKY = Beam(0.5, (0.1, 0.1), (0.05, 0.05))
-# name, beam, families, without shear and rotary inertia
+# name, beam, families, whether shear and rotary inertia are negligible
 CASES: tuple[tuple[str, Beam, tuple[Family, ...], bool], ...] = (
     ("uniform rod", UNIFORM_ROD, ("flapwise", "in-plane"), True),
     ("tapered rod", TAPERED_ROD, ("flapwise", "in-plane"), True),
@@ -50,7 +50,7 @@ CHORDWISE = (1, 2, 4)
 MOST_BODIES = 128
 LOADS = (1.0, 2.0)
 ELASTIC = Beam(0.5, (0.01, 0.01), (0.002, 0.002))
-# bodies along the chord: strips of the wing, each twice those before it
+# by number of bodies along the chord: numbers of strips, each twice the one before
 WING_STRIPS: dict[int, tuple[int, ...]] = {1: (4, 8, 16, 32, 64), 4: (6, 12, 24)}
 QUICK_WING: dict[int, tuple[int, ...]] = {1: (4, 8, 16)}
 FINEST = "16x8"
@@ -58,15 +58,15 @@ DIVISIONS = ("4", "11", "24", "64x1", "32x2", "32x3", "32x4", "20x6", "12x8")
 WING_NUMERICS = Numerics(steps=480, max_beats=60, periodic=2e-6)
 # Which of a body's six coordinates (rotation x, y, z, then translation) move together in a flat wing.
 _OUT_OF_PLANE, _IN_PLANE = (0, 1, 5), (2, 3, 4)
-_KEPT = 24  # lowest modes looked at
-_ABSENT = 0.5  # relative error of a frequency that is no longer the same motion's
+_KEPT = 24  # lowest modes that are examined
+_ABSENT = 0.5  # relative error above which a frequency belongs to another mode
 
 
 @dataclass(frozen=True)
 class Row:
-    """Relative error of the first three frequencies of one family of modes of one division.
+    """Relative errors of the first three frequencies of one family of modes for one discretisation.
 
-    NaN where a division has so few bodies that what comes next is another motion, over half again as fast.
+    NaN where a discretisation has too few bodies for a mode.
     """
 
     case: str
@@ -77,7 +77,7 @@ class Row:
 
 
 def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Family, Array]:
-    """Frequencies (Hz, rising) of the bodies on their springs about rest by family; the first ``held`` bodies fixed.
+    """Frequencies (Hz, rising) of the bodies on their springs by family; the first ``held`` bodies are fixed.
 
     A mode belongs to the family whose rigid motion of whole strips has most of its kinetic energy.
     """
@@ -97,7 +97,7 @@ def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Fam
     for group, bending, across in ((_OUT_OF_PLANE, 0, 5), (_IN_PLANE, 2, 3)):
         ix = np.ix_(range(n - held), group, range(n - held), group)
         size = (n - held) * len(group)
-        # largest eigenvalues of (M, K): the smallest of (K, M) would lose their digits to the largest
+        # largest eigenvalues of (M, K), because the smallest of (K, M) would be inaccurate
         top = (max(0, size - _KEPT), size - 1)
         mu, shape = eigh(M[ix].reshape(size, size), K[ix].reshape(size, size), subset_by_index=top)
         for value, u in zip(mu[::-1], shape.T[::-1], strict=True):
@@ -117,10 +117,10 @@ def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Fam
 def frequency_errors(
     name: str, beam: Beam, families: tuple[Family, ...], slender: bool, chordwise: int, strips: int
 ) -> list[Row]:
-    """Error of one division.
+    """Frequency errors of one discretisation.
 
-    One body along the chord hangs on the rods at the root. The two rods cannot hold more than two bodies, so where the
-    chord is cut the first strip is held instead, and the beam begins at that strip's middle.
+    With one body along the chord the beam hangs on the rods at the root. The two rods cannot hold more than two bodies,
+    so otherwise the first strip is held instead, and the beam begins at that strip's middle.
     """
     structure = cut_beam(beam, f"{strips}x{chordwise}")
     held = 0 if chordwise == 1 else chordwise
@@ -136,7 +136,7 @@ def frequency_errors(
 
 
 def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
-    """All cases and divisions, in the order of ``CASES``."""
+    """All cases and discretisations, in the order of ``CASES``."""
     rows = [
         row
         for name, beam, families, slender in CASES
@@ -150,10 +150,10 @@ def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
 
 
 def torsion_carried(structure: Structure) -> float:
-    """Share of the section's torsion constant that the connectors of a uniform sheet bear under uniform twist.
+    """Fraction of the section's torsion constant that the connectors of a uniform sheet carry under uniform twist.
 
-    Twist kappa turns neighbours along the span by kappa times their distance, and neighbours along the chord too: the
-    energy of both, per length, over G J kappa^2 / 2. Taken around one strip in the middle.
+    Twist kappa rotates neighbours along the span, and neighbours along the chord, by kappa times their distance: energy
+    of both per length, over G J kappa^2 / 2, for one strip in the middle.
     """
     n, strip = structure.division.bodies[0], len(structure.division.bodies) // 2
     station = structure.wing.stations[0]
@@ -169,7 +169,7 @@ def torsion_carried(structure: Structure) -> float:
 
 
 def twist_rate(beam: Beam, division: str) -> float:
-    """Twist per length in the middle half under a couple at the tip, over Saint-Venant's T / G J (uniform beam)."""
+    """Twist per length in the middle half under a couple at the tip, relative to Saint-Venant's T / G J."""
     structure = cut_beam(beam, division)
     n, strips = structure.division.bodies[0], len(structure.division.bodies)
     load = np.zeros((len(structure.bodies), 6))
@@ -181,7 +181,7 @@ def twist_rate(beam: Beam, division: str) -> float:
 
 
 def twist_table() -> list[dict[str, Any]]:
-    """:func:`twist_rate` of the uniform sheet and of a plate as thick as the wing; strips down to its thickness."""
+    """:func:`twist_rate` of the uniform sheet and of a plate as thick as the wing."""
     return [
         {"plate": name, "division": division, "twist": twist_rate(beam, division)}
         for name, beam, strips in (("uniform sheet", UNIFORM_SHEET, (16, 32)), ("thick plate", THICK_PLATE, (16, 32)))
@@ -190,12 +190,12 @@ def twist_table() -> list[dict[str, Any]]:
 
 
 def observed_order(coarse: float, fine: float, refinement: float = 2.0) -> float:
-    """p where the error goes with the p-th power of the strips' width; NaN where an error is missing."""
+    """Order p of an error proportional to the p-th power of the strips' width; NaN if an error is missing."""
     return math.log(abs(coarse / fine)) / math.log(refinement)
 
 
 def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
-    """Error of tip deflection and shortening, as part of the length, of the chain under large loads."""
+    """Error of tip deflection and shortening of the chain under large loads, relative to the length."""
     rows = []
     for load in LOADS:
         truth = elastica(load)
@@ -208,7 +208,7 @@ def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
 
 
 def rods_to_the_tip(wing: Wing) -> Wing:
-    """The wing with its rods drawn out along their lines to the tip station."""
+    """The wing with its rods extended along their lines to the tip station."""
     rods = []
     for rod in wing.rods:
         y = wing.stations[-1].y
@@ -231,9 +231,9 @@ def wing_tracks(wing: Wing, division: str, numerics: Numerics = WING_NUMERICS) -
 
 
 def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUMERICS) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat of each division's markers from those of twice as many strips.
+    """Mean and largest distance (m) over a beat between markers with n and with 2 n strips.
 
-    ``order`` compares a mean distance with that before it. A division is as far from the limit as the sum of all that
+    ``order`` compares a mean distance with the one before it. The distance from the limit is the sum of all that
     follow.
     """
     rows: list[dict[str, Any]] = []
@@ -255,7 +255,7 @@ def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUM
 
 
 def chord_table(divisions: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat of the robird's markers from those of ``FINEST``."""
+    """Mean and largest distance (m) over a beat of the Robird's markers from those with ``FINEST``."""
     finest, rows = wing_tracks(WINGS["robird"], FINEST), []
     for division in divisions:
         distance = np.linalg.norm(wing_tracks(WINGS["robird"], division) - finest, axis=-1)
@@ -273,7 +273,10 @@ def _markdown(head: list[str], rows: list[str]) -> str:
 
 
 def frequency_markdown(rows: list[Row]) -> str:
-    """A line per family, cut and mode: error in per cent against strips, and the order of the last refinement."""
+    """A row per family, chord division and mode.
+
+    Error in per cent by number of strips, and the order of the last refinement.
+    """
     strips, lines = sorted({r.strips for r in rows}), []
     for key in dict.fromkeys((r.case, r.family, r.chordwise) for r in rows):
         found = {r.strips: r.errors for r in rows if (r.case, r.family, r.chordwise) == key}
@@ -317,7 +320,7 @@ def table(figures: dict[str, Any], rows: list[Row]) -> str:
 
 
 def _without_nan(value: Any) -> Any:
-    """What JSON can say: None for what there is not."""
+    """The value with None instead of NaN, which JSON does not have."""
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -325,14 +328,14 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-@one_blas_thread  # on matrices this small, more threads take ten times as long
+@one_blas_thread  # on such small matrices several threads take ten times as long
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.beams", description=__doc__)
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--json", action="store_true", help="print only the JSON object")
     shown.add_argument("--table", action="store_true", help="print only the tables, in markdown")
-    parser.add_argument("--quick", action="store_true", help="up to 16 strips")
+    parser.add_argument("--quick", action="store_true", help="at most 16 strips")
     arguments = parser.parse_args()
     strips = tuple(n for n in STRIPS if n <= 16 or not arguments.quick)
     rows = frequency_table(strips)

@@ -1,7 +1,7 @@
-"""The staged calibration of the example campaign against the truth that it never reads.
+"""Accuracy and cost of the staged calibration of the example campaign, whose true genome it does not read.
 
-``python -m benchmarks.calibration [--json] [--joint] [--evaluator KIND]``. The misfit floor is what the true genome
-leaves on the same recordings: tracking noise, and the error of placing the beat from noisy tracks.
+``python -m benchmarks.calibration [--json] [--joint] [--evaluator KIND]``. The misfit floor is the misfit of the true
+genome on the same recordings: tracking noise, and the error in the start of the beat estimated from noisy tracks.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ import json
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from benchmarks.common.files import EXAMPLES
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.result import Result, judge
@@ -37,10 +38,10 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.workers import make_evaluator
 from wingfit.workers.factory import EvaluatorKind
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
+EXAMPLE = EXAMPLES / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")
 WITHIN = 0.15
-# Evaluators that must agree: kind, workers, and threads of linear algebra in this process (None: as it was started).
+# Evaluators that must agree: kind, workers, and BLAS threads in this process (None: unchanged).
 RUNS: tuple[tuple[EvaluatorKind, int | None, int | None], ...] = (
     ("in_process", None, None),
     ("in_process", None, 1),
@@ -65,8 +66,8 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
     """Calibrate and judge, with progress on standard error."""
     start, last = time.perf_counter(), None
     for last in calibrate(spec, dataset, evaluator):
-        note = f"{label}: {last.stage} generation {last.index}, {last.distance * 1e3:.3f} mm"
-        print(f"\r{note}, {time.perf_counter() - start:.0f} s   ", end="", file=sys.stderr, flush=True)
+        note = f"{label}: {last.stage}, generation {last.index}, {last.distance * 1e3:.3f} mm"
+        show(f"{note}, {time.perf_counter() - start:.0f} s")
     print(file=sys.stderr)
     if last is None:
         raise RuntimeError("the calibration had no generation")
@@ -74,15 +75,15 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
 
 
 def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
-    """Mean distance (m) that the true genome leaves on fitted and on held-out recordings."""
+    """Mean distance (m) of the true genome's markers from the recorded ones, on fitted and held-out recordings."""
     found = judge(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
-        raise ValueError("the campaign holds no recording out")
+        raise ValueError("the campaign has no held-out recording")
     return found.after, found.held_out_after
 
 
 def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
-    """Deviation from the truth of each gene (shares normalised), in per cent, beside its standard error."""
+    """Relative error (per cent) and standard error of each gene, with shares normalised."""
     true = truth.normalised()
     return [
         {
@@ -98,7 +99,7 @@ def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
 
 
 def thesis_campaign() -> Dataset:
-    """The thesis's search (V-A): one vacuum and one tunnel recording, here of a wing of 24 bodies."""
+    """The recordings of the search in the thesis (V-A): one in vacuum and one in the tunnel, of a wing of 24 bodies."""
     model = FlexibleWing(robird_wing(), "24", numerics=REFERENCE)
     truth, conditions = true_genome(model, 2), (vacuum(10.0, 0.0524, 3.0), tunnel(0.0524, 3.0, 6.0))
     recordings = tuple(
@@ -108,7 +109,7 @@ def thesis_campaign() -> Dataset:
 
 
 def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
-    """Cut a short calibration in each stage; the rest must come out the same, through JSON."""
+    """Whether a short calibration resumed from each stage's checkpoint (through JSON) gives the same generations."""
     spec = CalibrationSpec(division="11", population=16, max_generations=3, seed=5)
     whole = list(calibrate(spec, dataset, evaluator))
     return all(
@@ -118,7 +119,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 
 
 def evaluators_are_identical(dataset: Dataset) -> bool:
-    """The same individuals in this process, with 1, 2 and 4 threads of linear algebra, on pools of 1 and 2, on Ray."""
+    """Whether all evaluators in RUNS return the same bits for the same individuals."""
     spec = CalibrationSpec(division="11")
     model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
@@ -187,7 +188,9 @@ def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print only the JSON object")
-    parser.add_argument("--joint", action="store_true", help="also search all genes at once, to compare with stages")
+    parser.add_argument(
+        "--joint", action="store_true", help="also search all genes at once, for comparison with stages"
+    )
     parser.add_argument("--evaluator", choices=("in_process", "processes", "ray"), default="ray")
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()

@@ -1,7 +1,7 @@
-"""The quasi-steady model with clap-and-peel against a virtual balance whose coefficients are known.
+"""The quasi-steady model with clap-and-peel, fitted to a virtual balance with known coefficients.
 
-``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]`` measures; with ``--json`` the last line is one
-JSON object. ``--example FOLDER`` only writes the example campaign.
+``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]``; with ``--json`` the last line is one JSON object.
+``--example FOLDER`` only writes the example campaign.
 """
 
 from __future__ import annotations
@@ -50,51 +50,51 @@ Array = npt.NDArray[np.float64]
 
 COEFFICIENTS = ("C_l", "C_r", "C_F")
 CUTOFF, FINER_CUTOFF = 40.0, 67.0  # Hz (Armanini et al. 2016, 3.4)
-FINER_TRIAL = 3  # its number four, as in the source's Fig. 13
-INTERVAL = 1.6449  # standard errors to either side: 90 %
+FINER_TRIAL = 3  # test number four, as in Fig. 13 of Armanini et al. (2016)
+INTERVAL = 1.6449  # half width of a 90 % interval in standard errors
 REPETITIONS = 200
-DRAWS = 20  # campaigns for the luck of a seed
+DRAWS = 20  # campaigns with other seeds
 CORNER_TOLERANCE = 1e-3  # relative
-SMALL = Balance(every=10, beats=40)  # for what is repeated many times
-# No residual shows an error that stays the same throughout a recording: the resonance's amplification, slow drift.
+SMALL = Balance(every=10, beats=40)  # for measurements that are repeated many times
+# Errors that are constant throughout a recording, which residuals do not show: resonance, slow drift.
 TOLD_BY_RESIDUALS = replace(SMALL, participation=0.0, drift=0.0)
-LIFT_RMSE_PERCENT = (13, 13, 13, 15, 17, 18, 50, 32)  # the source's Table 7
+LIFT_RMSE_PERCENT = (13, 13, 13, 15, 17, 18, 50, 32)  # Table 7 of Armanini et al. (2016)
 LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A model fitted to one recording, and how it agrees."""
+    """A model fitted to one recording, and its agreement."""
 
     trial: Trial
     recording: Recording
     problem: Problem
     estimate: Estimate
     agreement: dict[Quantity, Agreement]
-    missing_interval: tuple[float, float] | None
+    misfit_range: tuple[float, float] | None
 
     @property
     def errors(self) -> dict[str, float]:
-        """Relative error of each coefficient that the truth has, per cent."""
+        """Relative error of each coefficient with a known true value, per cent."""
         true = self.trial.coefficients
         return {name: 100 * (value / true[name] - 1) for name, value in self.estimate.values.items() if name in true}
 
     @property
     def local(self) -> LocalEstimate:
-        """As the global model takes it."""
+        """As input of the global model."""
         found, name = self.estimate, self.recording.name
         bounds = dict(zip(found.free, np.sqrt(np.diag(found.covariance)).tolist(), strict=True))
         return LocalEstimate(name, (name,), found.values, bounds, (), (), found.cost, True, ())
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
-    """Coefficients searched on X with the drag fixed, as in the source."""
+    """Coefficients estimated from X with fixed drag, as in Armanini et al. (2016)."""
     drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
     return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
 
 
 def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: Evaluator) -> Fitted:
-    """Estimate from the nominal coefficients, and judge."""
+    """Estimate, starting from the nominal coefficients, and judge."""
     problem = problem_of(model, recording)
     found = estimate(problem, evaluator, {})
     best = replace(problem, base=problem.base.replace(found.values))
@@ -104,7 +104,7 @@ def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: 
 
 
 def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
-    """Percentage of starts, every corner of the box under every condition, that end at the estimate."""
+    """Percentage of starts (every corner of the search box under every condition) that end at the estimate."""
     good, total = 0, 0
     for one in fitted:
         problem = problem_of(model, one.recording)
@@ -119,7 +119,7 @@ def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator)
 def coverage(
     model: BladeElementWing, beats: list[Array], balance: Balance, repetitions: int, seed: int, evaluator: Evaluator
 ) -> dict[str, float]:
-    """Percentage of 90 % intervals that hold the truth, by coefficient; each repetition has noise of its own."""
+    """Percentage of 90 % intervals that contain the truth, by coefficient, over repetitions with different noise."""
     held = dict.fromkeys(COEFFICIENTS, 0)
     for k in range(repetitions):
         trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
@@ -131,7 +131,10 @@ def coverage(
 
 
 def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
-    """Largest error of a coefficient under any condition, per cent, in other campaigns: median and most."""
+    """Largest error of a coefficient under any condition, per cent, in campaigns with other seeds.
+
+    Median and maximum.
+    """
     largest = []
     for draw in range(DRAWS):
         errors = []
@@ -144,7 +147,7 @@ def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Eval
 
 
 def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float]:
-    """Largest error of a coefficient under any condition, per cent, from what stays the same in a whole recording."""
+    """Largest error of a coefficient under any condition, per cent, due to errors that are constant in a recording."""
     still = Balance(every=10, beats=10, sensor=0.0, participation=0.0, rattle=0.0, drift=0.0, scatter=0.0, timing=0.0)
     largest = dict.fromkeys(
         ("finer_truth", "resonance", "zero_off_by_1_mn", "phase_off_by_a_thousandth_of_a_beat"), 0.0
@@ -168,7 +171,7 @@ def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float
 
 
 def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> float:
-    """Processor time of one individual with a wing motion of its own, in a batch; the best of some rounds."""
+    """Processor time of one individual with its own wing motion, in a batch; the best of several rounds."""
     rng, best = np.random.default_rng(0), np.inf
     nominal = np.array([gene.nominal for gene in model.genes])
     width = np.array([gene.upper - gene.lower for gene in model.genes])
@@ -189,7 +192,7 @@ def global_errors(law: GlobalModel) -> dict[str, float]:
 
 
 def lift_by_law(fitted: list[Fitted], law: GlobalModel) -> float:
-    """Mean over the conditions of the lift's RMS difference with the global model, per cent."""
+    """RMS error of lift with the global model, mean over the conditions, per cent."""
     found = []
     for one in fitted:
         genome = one.problem.base.replace(at(law, one.trial.condition).values)
@@ -199,13 +202,13 @@ def lift_by_law(fitted: list[Fitted], law: GlobalModel) -> float:
 
 
 def mean_lift(fitted: list[Fitted]) -> tuple[float, float]:
-    """Mean over the conditions of the lift's correlation and RMS difference in per cent."""
+    """Correlation and RMS error (per cent) of lift, means over the conditions."""
     lift = [one.agreement["lift"] for one in fitted]
     return float(np.mean([a.correlation for a in lift])), float(np.mean([a.rmse_percent for a in lift]))
 
 
 def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
-    """From the earliest beginning to the latest end; None where one of them is not located."""
+    """From the earliest start to the latest end; None if one of them is not located."""
     known = [one for one in ranges if one is not None]
     return [min(r[0] for r in known), max(r[1] for r in known)] if len(known) == len(ranges) else None
 
@@ -228,12 +231,12 @@ def fits(
 
 
 def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
-    """How well coefficients come back, where the poorer models fail, and how well the lift is met."""
+    """Errors of the coefficients, where models without a term fail, and agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
-        "misfit_tstar_range": widest([one.missing_interval for one in fitted["without_fling"]]),
-        "misfit_tstar_range_berman_wang": widest([one.missing_interval for one in fitted["berman_wang"]]),
-        "misfit_located_with_fling": sum(one.missing_interval is not None for one in fitted["proposed"]),
+        "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
+        "misfit_tstar_range_berman_wang": widest([one.misfit_range for one in fitted["berman_wang"]]),
+        "misfit_located_with_fling": sum(one.misfit_range is not None for one in fitted["proposed"]),
     }
     for name, suffix in (("proposed", ""), ("without_fling", "_without_fling"), ("berman_wang", "_berman_wang")):
         figures[f"lift_correlation{suffix}"], figures[f"lift_rmse_percent{suffix}"] = mean_lift(fitted[name])
@@ -242,7 +245,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
             "lift_correlation": one.agreement["lift"].correlation,
             "lift_rmse_percent": one.agreement["lift"].rmse_percent,
             "coefficients": one.estimate.values,
-            "misfit_tstar_range": one.missing_interval,
+            "misfit_tstar_range": one.misfit_range,
         }
         for name, one in finer.items()
     }
@@ -250,7 +253,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
 
 
 def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
-    """The global model: how far it is from the local estimates, weighted, plain, and on the printed table."""
+    """Differences between the global model and the local estimates: weighted, unweighted, and for the printed table."""
     local, conditions = [one.local for one in fitted], [one.trial.condition for one in fitted]
     law, plain = fit_global(local, conditions), fit_global(local, conditions, weighted=False)
     return {
@@ -268,10 +271,10 @@ def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
 
 
 def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evaluator: Evaluator) -> dict[str, Any]:
-    """What is repeated many times: intervals, with and without systematic errors, and starts from corners."""
+    """Coverage of intervals with and without systematic errors, and convergence from the corners."""
     beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
     covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
-    begun = [
+    starts = [
         fit(
             model,
             low_passed(record(beat, trial, SMALL, np.random.default_rng([seed, 5])), LowPass(CUTOFF)),
@@ -284,14 +287,14 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
         "interval_coverage_percent": float(np.mean(list(covered.values()))),
         "interval_coverage_percent_by_coefficient": covered,
         "interval_coverage_percent_with_systematic_errors": coverage(model, beats, SMALL, repetitions, seed, evaluator),
-        "converged_from_corners_percent": corners(model, begun, evaluator),
+        "converged_from_corners_percent": corners(model, starts, evaluator),
         "coefficient_error_percent_of_other_draws": luck(model, beats, seed, evaluator),
         "systematic_error_percent": systematic(model, evaluator),
     }
 
 
 def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
-    """One row per condition: coefficients beside Table 8, lift beside Table 7, drag, and where the fling is missed."""
+    """One row per condition: coefficients and Table 8, lift and Table 7, drag, and where the fling is missed."""
     return [
         {
             "condition": one.trial.name,
@@ -314,7 +317,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
                 "lift_rmse_percent": poorer.agreement["lift"].rmse_percent,
                 "lift_correlation": poorer.agreement["lift"].correlation,
                 "mean_lift_modelled_n": poorer.agreement["lift"].mean_modelled,
-                "misfit_tstar_range": poorer.missing_interval,
+                "misfit_tstar_range": poorer.misfit_range,
             },
         }
         for one, poorer in zip(fitted["proposed"], fitted["without_fling"], strict=True)
@@ -322,7 +325,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
 
 
 def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]:
-    """All figures but the estimators'."""
+    """All figures except those of the estimators."""
     start, vehicle = time.perf_counter(), delfly()
     models = {
         "proposed": BladeElementWing(vehicle),
@@ -338,9 +341,9 @@ def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]
 
 
 def table(conditions: list[dict[str, Any]]) -> str:
-    """Human-readable rows; in brackets the source's own figures, on its own measurements."""
+    """The rows as text; in brackets the figures of Armanini et al. (2016) for their own measurements."""
     head = (
-        "condition  C_l found (true)   C_r found (true)   C_F found (true)   lift: RMSE %    correlation   "
+        "condition  C_l est. (true)    C_r est. (true)    C_F est. (true)    lift: RMSE %    correlation   "
         "without fling: RMSE %  correlation  misfit at t*"
     )
     lines = [head]
@@ -360,11 +363,13 @@ def table(conditions: list[dict[str, Any]]) -> str:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.delfly", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
-    parser.add_argument("--no-estimators", action="store_true", help="leave out the comparison of search methods")
-    parser.add_argument("--repetitions", type=int, default=REPETITIONS, help="noise draws for the intervals")
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.add_argument("--no-estimators", action="store_true", help="do not compare search methods")
+    parser.add_argument(
+        "--repetitions", type=int, default=REPETITIONS, help="number of noise realisations for the intervals"
+    )
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--example", type=Path, help="only write the example campaign to this folder")
+    parser.add_argument("--example", type=Path, help="only write the example campaign into this folder")
     arguments = parser.parse_args()
     if arguments.example:
         print(f"truth: {write_campaign(arguments.example, arguments.seed)}")

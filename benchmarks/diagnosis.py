@@ -1,8 +1,8 @@
-"""How long one diagnosis takes: twelve recordings, a wing of 24 pieces, a plant that is divided finer.
+"""Duration of one diagnosis: twelve recordings, a wing of 24 bodies, a plant with a finer discretisation.
 
-``python -m benchmarks.diagnosis --json`` films the concealed trials' plant under twelve conditions, with one effect
-hidden, and diagnoses the files as a user does; the last line tells the time, the longest silence between two reports
-of progress, and how far the first estimates of the time that was left were from what came.
+``python -m benchmarks.diagnosis --json`` films the concealed trials' plant under twelve conditions, with one hidden
+effect, and diagnoses the files as a user does. It prints the time, the longest interval between two progress reports,
+and the ratio of true to estimated remaining time at half of the work.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import json
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import machine
-from benchmarks.concealed.bench import WingBench
-from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.bench import WingBench, record_all
+from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.cli.base.output import progress
@@ -37,23 +36,19 @@ FITTED = (
     *(tunnel(LAGS[k % 3], FREQUENCIES[k + 1], speed) for k, speed in enumerate((3.5, 5.0, 6.0, 7.5))),
 )
 HELD_OUT = (chamber(THIN_PA, LAGS[1], 2.5), chamber(THICK_PA, LAGS[2], 3.0), tunnel(LAGS[2], 3.5, 8.5))
-HALF = 0.5  # of the work: the time that is left is estimated there
+HALF = 0.5  # fraction of the work at which the estimated remaining time is checked
 
 
 def recorded(division: str, plant: str, seed: int) -> Dataset:
-    """Twelve recordings of a plant with parameters that are drawn; the same seed, the same bits."""
+    """Twelve recordings of a plant with random parameters; the same seed gives the same bits."""
     bench = WingBench(Build("wing", division, plant))
     genome = bench.genome(np.random.default_rng([seed, 1]))
-    filmset = bench.quality(np.random.default_rng([seed, 2]))
-    found = []
-    for number, condition in enumerate((*FITTED, *HELD_OUT)):
-        made = bench.recording(condition, genome, HIDDEN, filmset, np.random.default_rng([seed, 3, number]))
-        found.append(replace(made.recording, name=name_of(condition)))
-    return Dataset("twelve", bench.rig, tuple(found), tuple(name_of(condition) for condition in HELD_OUT))
+    recordings = tuple(record_all(bench, (*FITTED, *HELD_OUT), genome, HIDDEN, seed))
+    return Dataset("twelve", bench.rig, recordings, tuple(name_of(condition) for condition in HELD_OUT))
 
 
 def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) -> dict[str, Any]:
-    """Diagnose the file at ``path``: the time it takes, and how it reports."""
+    """Diagnose the file at ``path``: time, progress reports and verdict."""
     spec, pool = DiagnosisSpec(CalibrationSpec(division=division)), make_evaluator(evaluator, workers)
     reports: list[tuple[float, Progress]] = []
     began = time.perf_counter()
@@ -84,7 +79,7 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
 
 
 def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
-    """Seconds of each kind of stage, by its first words."""
+    """Seconds per kind of stage, by its first two words."""
     spent: dict[str, float] = {}
     for (at, one), (after, _) in pairwise(reports):
         name = " ".join(one.stage.split()[:2])
@@ -95,23 +90,23 @@ def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
-    parser.add_argument("--division", default="24", help="of the model")
-    parser.add_argument("--plant", default="8x4", help="division of the plant")
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.add_argument("--division", default="24", help="discretisation of the model")
+    parser.add_argument("--plant", default="8x4", help="discretisation of the plant")
     parser.add_argument("--evaluator", choices=("processes", "ray", "in_process"), default="ray")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "twelve.nc"
-        save_dataset(recorded(asked.division, asked.plant, asked.seed), path)
-        found = measured(path, asked.division, asked.evaluator, asked.workers)
-    told = {"cpu": machine.cpu(), "commit": machine.commit(), **found}
-    width = max(map(len, told))
-    for name, value in told.items():
+        save_dataset(recorded(options.division, options.plant, options.seed), path)
+        found = measured(path, options.division, options.evaluator, options.workers)
+    figures = {"cpu": machine.cpu(), "commit": machine.commit(), **found}
+    width = max(map(len, figures))
+    for name, value in figures.items():
         print(f"{name:{width}} {value}")
-    if asked.json:
-        print(json.dumps(told))
+    if options.json:
+        print(json.dumps(figures))
 
 
 if __name__ == "__main__":

@@ -1,17 +1,16 @@
-"""What each effect costs, what it moves, and what of that a refit leaves: ``python -m benchmarks.effects [--json]``.
+"""Cost of each effect, and the change it makes before and after a refit: ``python -m benchmarks.effects [--json]``.
 
 On the Robird's wing of 11 bodies over the small campaign (ten conditions), without noise, and on the DelFly over its
-eight tests. An effect is put in at its typical size, and the nominal genes are fitted to what is then recorded; what
-the fit leaves is what can be seen of the effect at all. Effects are compared after that: the angle between what two of
-them do, both freed from what the nominal genes can do. About twelve minutes on two cores; ``--quick`` takes three
-conditions, ``--only a,b`` some of the effects.
+eight tests. An effect is simulated at its typical size and the nominal genes are refitted; the residual is the part of
+the effect that can be detected at all. Residual directions of two effects are compared by the angle between them, after
+projecting out what the nominal genes can change. About twelve minutes on two cores; ``--quick`` uses three conditions,
+``--only a,b`` some of the effects.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -25,6 +24,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show_count
 from benchmarks.physics.effect_rigs import RIGS, AnyModel, Rig, rig_of
 from wingfit.calibration.estimates.linearised import free_genes, linearise, residuals_of, unit_at, values_at
 from wingfit.calibration.problem import Problem, base_genome
@@ -36,19 +36,21 @@ from wingfit.workers.in_process import InProcessEvaluator
 Array = npt.NDArray[np.float64]
 
 REPEATS = 4
-SPREAD = 0.1  # of the genes of a batch whose cost is measured, in logarithm or part of the value
-SEEN = 1e-3  # mm or mN: less is the simulation's own error
+SPREAD = 0.1  # relative spread of the genes in a batch whose cost is measured
+SEEN = 1e-3  # mm or mN: smaller changes are within the simulation's error
 ITERATIONS = 12
-GAIN = 0.98  # an iteration that leaves more of the squares is the last
-LENGTHS = np.array([1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6])  # of a step, tried at once: a group of lanes
+GAIN = 0.98  # iterations end when the sum of squares falls by less than this factor
+LENGTHS = np.array(
+    [1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6]
+)  # step lengths that are tried together, in one group of lanes
 
 
 @dataclass(frozen=True)
 class Moved:
-    """What an effect does on a rig.
+    """Change that an effect makes to a rig's recordings.
 
-    ``size`` of what it moves and ``left`` of that after the refit: root mean square, mm or mN; ``columns`` [D, sizes]:
-    what its sizes do one by one, m or N.
+    ``size``: RMS change; ``left``: RMS residual after the refit, mm or mN; ``columns`` [D, sizes]: change by each of
+    the effect's size parameters, m or N.
     """
 
     size: float
@@ -57,7 +59,7 @@ class Moved:
 
 
 def batch(rig: Rig, model: AnyModel, effect: Effect | None, seed: int = 1, count: int = 16) -> Array:
-    """Genomes [count, G] near the nominal one, each with a motion of its own; the effect at its typical size."""
+    """Genomes [count, G] near the nominal one, each with a different motion; the effect has its typical size."""
     values = np.array([gene.nominal for gene in model.genes])
     wobble = np.random.default_rng([seed, 1]).uniform(-1.0, 1.0, (count, len(values)))
     genomes = values * (1.0 + SPREAD * wobble)
@@ -70,12 +72,15 @@ def batch(rig: Rig, model: AnyModel, effect: Effect | None, seed: int = 1, count
 
 
 def cost_ratio(rig: Rig, effect: Effect) -> float:
-    """Processor time of a batch with the effect over that without: median of alternating repeats, new genomes each."""
+    """Processor time of a batch with the effect relative to one without.
+
+    Median of alternating repeats with new genomes.
+    """
     without = rig.stands_for(effect)
     models = [(rig.by_default(one, without), one) for one in (None, effect)]
     records = rig.timed()
     spent: list[list[float]] = [[], []]
-    for repeat in range(REPEATS + 1):  # the first warms up
+    for repeat in range(REPEATS + 1):  # the first repeat is not counted
         for times, (model, one) in zip(spent, models, strict=True):
             genomes = batch(rig, model, one, repeat)
             began = time.process_time()
@@ -87,7 +92,7 @@ def cost_ratio(rig: Rig, effect: Effect) -> float:
 
 
 def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings: tuple[Recording, ...]) -> Array:
-    """[D]: what the effect at ``values`` of its genes changes in all recordings, m or N."""
+    """[D]: change of all recordings by the effect with its genes at ``values``, m or N."""
     model = rig.model(effect)
     genome = base_genome(model, values)
     changed = []
@@ -100,7 +105,7 @@ def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings:
 
 
 def moved(rig: Rig, effect: Effect) -> Moved:
-    """What the effect moves, what a refit leaves of it, and in which directions."""
+    """Change by the effect, residual after a refit, and directions."""
     recordings, typical = rig.recordings(rig.stands_for(effect)), effect.typical(rig.description)
     whole = displacement(rig, effect, typical, recordings)
     size = rig.unit * rig.rms(whole)
@@ -113,7 +118,7 @@ def moved(rig: Rig, effect: Effect) -> Moved:
 
 
 def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole: Array) -> float:
-    """RMS (m or N) that is left when the nominal genes have been fitted to recordings with the effect in them."""
+    """RMS residual (m or N) of the nominal genes fitted to recordings with the effect."""
     model = rig.model(None, without=rig.stands_for(effect))
     slopes, total, samples = sensitivities(rig, rig.stands_for(effect)), 0.0, 0
     for part, slope in zip(rig.parts(rig.changed(recordings, whole)), slopes, strict=True):
@@ -124,7 +129,7 @@ def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole:
 
 
 def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
-    """Least squares with the sensitivities at the nominal genome kept, several step lengths at a time."""
+    """Least squares with the Jacobian at the nominal genome, trying several step lengths at once."""
     genes, evaluator = free_genes(problem), InProcessEvaluator()
     unit, best, inverse = (
         unit_at(genes, np.array([gene.nominal for gene in genes]))[None],
@@ -145,7 +150,7 @@ def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
 
 @cache
 def sensitivities(rig: Rig, without: str) -> list[Array]:
-    """What the nominal genes do, [D, F] for each set of recordings that share them."""
+    """Jacobian [D, F] of the nominal genes, for each set of recordings that share a genome."""
     found = []
     for part in rig.parts(rig.recordings(without)):
         model = rig.model(None, without=without)
@@ -158,7 +163,7 @@ def sensitivities(rig: Rig, without: str) -> list[Array]:
 
 @cache
 def nominal_directions(rig: Rig, without: str) -> Array:
-    """[D, F]: orthonormal basis of what the nominal genes can do to the recordings."""
+    """[D, F]: orthonormal basis of the changes that the nominal genes can make."""
     basis, spread, _ = np.linalg.svd(block_diag(*sensitivities(rig, without)), full_matrices=False)
     return np.asarray(basis[:, spread > 1e-6 * spread[0]])
 
@@ -169,14 +174,17 @@ def angle(a: Array, b: Array) -> float:
 
 
 def freed(rig: Rig, one: Moved, known: Array) -> Array:
-    """Orthonormal basis of what the sizes of an effect do and the nominal genes cannot; less than SEEN is nothing."""
+    """Orthonormal basis of the effect's changes without those that the nominal genes can make.
+
+    Changes below SEEN are zero.
+    """
     free = one.columns - known @ (known.T @ one.columns)
     seen = [rig.unit * rig.rms(column) > SEEN for column in free.T]
     return np.asarray(np.linalg.svd(free[:, seen], full_matrices=False)[0])
 
 
 def nearest(rig: Rig, name: str, found: dict[str, Moved]) -> tuple[str | None, float | None]:
-    """The effect most like ``name``, and the angle to it; None where nothing of either can be seen."""
+    """The effect with the most similar residual, and the angle to it; None if either residual is below SEEN."""
     known = nominal_directions(rig, rig.stands_for(EFFECTS[name]))
     own = freed(rig, found[name], known)
     others = {other: freed(rig, one, known) for other, one in found.items() if other != name}
@@ -197,16 +205,16 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
     tasks = [(k, n) for k in RIGS for n in names if EFFECTS[n].applies_to(rig_of(k, quick).description)]
     ratios: dict[tuple[str, str], float | None] = dict.fromkeys(tasks)
     total = len(tasks) * (2 if costs else 1)
-    for done, (kind, name) in enumerate(tasks if costs else [], 1):  # alone: costs are ratios of processor time
+    for done, (kind, name) in enumerate(tasks if costs else [], 1):  # one at a time, because costs are measured
         ratios[kind, name] = cost_ratio(rig_of(kind, quick), EFFECTS[name])
-        _say(done, total, f"cost of {name} on the {kind}", began)
+        show_count(f"cost of {name} on the {kind}", done, total, began)
     found: dict[str, dict[str, Moved]] = {kind: {} for kind in RIGS}
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
         under_way = {pool.submit(_task, kind, name, quick): (kind, name) for kind, name in tasks}
         for done, future in enumerate(as_completed(under_way), total - len(tasks) + 1):
             kind, name = under_way[future]
             found[kind][name] = future.result()
-            _say(done, total, f"{name} on the {kind}", began)
+            show_count(f"{name} on the {kind}", done, total, began)
     rows = [row(name, found, ratios, quick=quick) for name in names]
     return {"effects": rows, "quick": quick, "commit": commit(), "cpu": cpu(), "seconds": time.monotonic() - began}
 
@@ -214,7 +222,7 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
 def row(
     name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None], *, quick: bool
 ) -> dict[str, Any]:
-    """One line: what an effect does to tracks in mm; beside it what it does to forces in mN."""
+    """One row: changes of tracks in mm, and of forces in mN."""
     line: dict[str, Any] = {"name": name, "family": EFFECTS[name].family}
     for kind, prefix, unit in (("wing", "", "mm"), ("vehicle", "vehicle_", "mn")):
         one = found[kind].get(name)
@@ -229,14 +237,8 @@ def row(
     return line
 
 
-def _say(done: int, total: int, label: str, began: float) -> None:
-    spent = time.monotonic() - began
-    text = f"[{done}/{total}] {label}, about {spent / done * (total - done):.0f} s left"
-    print(f"\r{text:<100}", end="" if done < total else "\n", file=sys.stderr, flush=True)
-
-
 def table(answer: dict[str, Any]) -> str:
-    """The same for people, as in docs/effects.md."""
+    """The rows in markdown, as in docs/effects.md."""
 
     def cell(value: float | None, digits: int = 2) -> str:
         return "" if value is None else f"{value:.{digits}f}"
@@ -261,8 +263,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--quick", action="store_true", help="three conditions of each rig")
-    parser.add_argument("--only", default="", help="names of effects, separated by commas; all without")
-    parser.add_argument("--no-costs", action="store_true", help="leave out the costs")
+    parser.add_argument("--only", default="", help="names of effects, separated by commas (default: all)")
+    parser.add_argument("--no-costs", action="store_true", help="do not measure costs")
     arguments = parser.parse_args()
     names = [name for name in arguments.only.split(",") if name] or list(EFFECTS)
     for name in names:

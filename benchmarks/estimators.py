@@ -1,7 +1,7 @@
-"""Ways of finding the genome, on the example wing: what each costs until it has as good as the best misfit.
+"""Search methods on the example wing: cost until the misfit is as good as the best of all methods.
 
 ``python -m benchmarks.estimators [--json] [--evaluator KIND] [--starts N]``. All genes at once on all fitted
-recordings of examples/robird, 11 bodies. The floor is the best misfit (thesis Eq. 14) that any of them reaches.
+recordings of examples/robird, 11 bodies. The floor is the best misfit (thesis Eq. 14) that any method reaches.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ import sys
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.common.files import EXAMPLES
 from benchmarks.common.machine import commit, cpu
+from benchmarks.common.progress import show
 from wingfit.calibration.estimates.likelihood import iterate
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
@@ -27,8 +28,8 @@ from wingfit.records import Dataset, load_dataset
 from wingfit.workers import make_evaluator
 from wingfit.workers.factory import EvaluatorKind
 
-EXAMPLE = Path(__file__).parent.parent / "examples" / "robird"
-AS_GOOD = 1.01  # of the floor
+EXAMPLE = EXAMPLES / "robird"
+AS_GOOD = 1.01  # ratio to the floor below which a misfit counts as equal
 SPEC = CalibrationSpec(division="11", mode="joint")
 SEARCHES = {
     "genetic": replace(SPEC, method="genetic"),
@@ -48,12 +49,12 @@ class Point:
 
 
 def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
-    """Follow a search that yields individuals evaluated so far and its sum of squares."""
+    """Points of a search that yields the number of individuals evaluated so far and their sum of squares."""
     start, points, best = time.perf_counter(), list[Point](), np.inf
     for evaluations, squares in states:
         best = min(best, squares)
         points.append(Point(evaluations, time.perf_counter() - start, best))
-        print(f"\r{label}: {evaluations} evaluations, {best:.6g} m2   ", end="", file=sys.stderr, flush=True)
+        show(f"{label}: {evaluations} evaluations, {best:.6g} m2")
     print(file=sys.stderr)
     return points
 
@@ -61,7 +62,7 @@ def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
 def from_random(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, seed: int
 ) -> Iterable[tuple[int, float]]:
-    """Gauss-Newton from a start drawn evenly from the whole box (in unit coordinates)."""
+    """Gauss-Newton from a random start, uniform over the genes' ranges (in unit coordinates)."""
     (stage,), model = prepare(spec, dataset).stages, model_for(dataset, spec)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
@@ -74,12 +75,12 @@ def from_random(
 
 
 def reached(points: list[Point], floor: float) -> Point | None:
-    """The first state as good as the floor, to AS_GOOD; None when there was none."""
+    """The first point within AS_GOOD of the floor; None if there is none."""
     return next((point for point in points if point.squares <= AS_GOOD * floor), None)
 
 
 def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
-    """Cost until as good as the floor (None: never), and the end."""
+    """Cost until the floor is reached (None: never), and at the end."""
     first = reached(points, floor)
     return {
         "method": method,
@@ -92,7 +93,7 @@ def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
 
 
 def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1) -> list[dict[str, Any]]:
-    """One row for each way; that of the random starts is their median, with how many reached the floor."""
+    """One row per method; for random starts the median, with the number of starts that reached the floor."""
     dataset, evaluator = load_dataset(EXAMPLE), make_evaluator(kind)
     try:
         _warm(dataset, evaluator)
@@ -111,7 +112,7 @@ def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1
 
 
 def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
-    """Compile the kernels and build the wing before any clock runs."""
+    """Compile the kernels and build the wing before anything is timed."""
     (stage,), model = prepare(SPEC, dataset).stages, model_for(dataset, SPEC)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
@@ -119,7 +120,7 @@ def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
 
 
 def _started(dataset: Dataset, evaluator: Evaluator, seed: int) -> list[Point]:
-    """Trace from a random start; empty where the start cannot be simulated."""
+    """Points of a search from a random start; empty if the start cannot be simulated."""
     try:
         return trace(f"Gauss-Newton from random start {seed}", from_random(SPEC, dataset, evaluator, seed))
     except ValueError as error:

@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from benchmarks.concealed.run_diagnosis import Outcome, Task, run
 from benchmarks.concealed.seal import read
 from benchmarks.concealed.suite import Folders, each, make, pool, task
-from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import Trial, plan
 from wingfit.diagnosis.policy import POLICY, described
 

@@ -1,7 +1,7 @@
-"""``python -m benchmarks.screenshots``: pictures of the page for the README, of a real server at real work.
+"""``python -m benchmarks.screenshots``: screenshots of the web page for the README, taken from a running server.
 
-The Robird's story (a drive that is not where and not what its description says) is recorded, uploaded, calibrated
-twice and diagnosed, and the page is photographed in Chromium. A few minutes.
+The data of the Robird example (a displaced axis and a wrong linkage) are recorded, uploaded, calibrated twice and
+diagnosed, and the page is photographed in Chromium. A few minutes.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import machine
-from benchmarks.common.ray_nodes import REPOSITORY
+from benchmarks.common.files import REPOSITORY
 from benchmarks.common.server_process import Server
 from benchmarks.proof import robird
-from benchmarks.proof.told import saved
+from benchmarks.proof.story import saved
 from wingfit.cli.base.output import progress
 from wingfit.client.client import Client
 
@@ -34,29 +34,29 @@ DRAWN_SECONDS = 60.0
 
 
 def main() -> None:
-    """Record, work, photograph; the last line is one JSON object."""
+    """Record, compute, take the screenshots; the last line is one JSON object."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.screenshots", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
-    parser.add_argument("--out", type=Path, default=OUT, help="folder for the pictures")
+    parser.add_argument("--out", type=Path, default=OUT, help="folder for the screenshots")
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
         folder = Path(scratch)
-        dataset = saved(robird.campaign(asked.seed).dataset, folder)
+        dataset = saved(robird.campaign(options.seed).dataset, folder)
         server = Server(folder, "processes")
         server.start()
         try:
             pages = worked(f"http://127.0.0.1:{server.port}", dataset)
-            files = photographed(f"http://127.0.0.1:{server.port}", pages, asked.out)
+            files = photographed(f"http://127.0.0.1:{server.port}", pages, options.out)
         finally:
             server.stop()
-    told = {"files": files, "seconds": round(time.monotonic() - began, 1)}
-    print(json.dumps(told | {"processor": machine.cpu(), "commit": machine.commit()}))
+    figures = {"files": files, "seconds": round(time.monotonic() - began, 1)}
+    print(json.dumps(figures | {"processor": machine.cpu(), "commit": machine.commit()}))
 
 
 def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
-    """Address of every page to photograph, and the figure that is drawn on it last."""
+    """Submit the jobs; address of every page, and the id of the figure that is drawn last on it."""
     with Client(url) as client:
         its = client.upload_dataset(dataset)["id"]
         runs = [
@@ -69,7 +69,7 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
         for number, run in enumerate(runs):
             with progress(f"calibration {number + 1} of {len(runs)}") as tell:
                 client.wait(run, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or ""))
-        diagnosis = client.submit_diagnosis(its, name="What is left out?", division="11")["id"]
+        diagnosis = client.submit_diagnosis(its, name="Missing physics", division="11")["id"]
         with progress("diagnosis") as tell:
             client.wait_for_diagnosis(
                 diagnosis, on_progress=lambda now: tell(now["progress"], now["eta_seconds"], now["stage"] or "")
@@ -83,12 +83,12 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
 
 
 def photographed(url: str, pages: dict[str, tuple[str, str]], out: Path) -> list[str]:
-    """Each page in light, and the diagnosis in dark and on a phone as well; names of the files."""
+    """Each page in light colours, the diagnosis also in dark colours and on a phone; names of the files."""
     from playwright.sync_api import sync_playwright  # needed here alone
 
     path = next((found for name in NAMES if (found := shutil.which(name))), None)
     if path is None:
-        sys.exit("no chromium to take pictures with; install it, e.g. apt-get install chromium")
+        sys.exit("chromium is not installed; install it, e.g. apt-get install chromium")
     out.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
@@ -115,12 +115,12 @@ def _shot(
     address, figure = page
     tab.goto(f"{url}/#{address}")
     deadline = time.monotonic() + DRAWN_SECONDS
-    # Asked from here: waiting in the page needs eval, which its content policy forbids.
+    # Polled from here: waiting inside the page needs eval, which its content security policy forbids.
     while not tab.evaluate(f"document.getElementById('{figure}').data?.length > 0"):
         if time.monotonic() > deadline:
             raise RuntimeError(f"{figure} was not drawn within {DRAWN_SECONDS:g} s on #{address}")
         tab.wait_for_timeout(100)
-    tab.wait_for_timeout(1500)  # the 3-D figure draws itself a moment later
+    tab.wait_for_timeout(1500)  # the 3-D figure needs a moment to draw
     tab.screenshot(path=path)
     context.close()
     return path.name

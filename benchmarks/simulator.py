@@ -1,10 +1,9 @@
-"""Cost and accuracy of the simulator, beside other engines: ``python -m benchmarks.simulator [--json] [--quick]``.
+"""Cost and accuracy of the simulator, with other engines: ``python -m benchmarks.simulator [--json] [--quick]``.
 
-Costs are processor times of one thread, of one beat and one individual in a full group of lanes, with the fewest steps
-whose markers are nowhere more than 0.1 mm from the converged periodic motion. The other engines are run by
-``python -m benchmarks.peers`` in processes of their own and measured in the same way, each against its own converged
-run. ``--quick`` leaves out the other engines, the search and the two largest wings. The whole takes about ten minutes
-on two cores.
+Costs are processor times of one thread for one beat and one individual in a full group of lanes, with the fewest steps
+that keep all markers within 0.1 mm of the converged periodic motion. The other engines run in processes of their own
+(``python -m benchmarks.peers``) and are measured in the same way, each against its own converged run. ``--quick`` omits
+the other engines, the search and the two largest wings. The whole takes about ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -26,8 +25,9 @@ import numpy as np
 
 from benchmarks import calibration
 from benchmarks.common.machine import commit, cpu
-from benchmarks.physics import flops, gene_box
-from benchmarks.physics.settling import (
+from benchmarks.common.progress import show
+from benchmarks.physics import flops, random_genomes
+from benchmarks.physics.convergence import (
     Subject,
     beats_to_periodic,
     by_default,
@@ -47,18 +47,18 @@ from wingfit.workers import make_evaluator
 TOLERANCE = 1e-4  # m
 CONDITIONS = {"vacuum": vacuum(10.0, 0.05, 3.0), "air": tunnel(0.05, 3.0, 6.0)}
 DIVISIONS = {4: "4", 11: "11", 24: "6x4", 48: "12x4", 96: "24x4"}
-GROWING = (24, 48, 96)  # bodies, four along every chord
+GROWING = (24, 48, 96)  # bodies, with four along every chord, for the growth of the cost
 QUICK = (4, 11, 24)
 ENGINES = ("scipy", "exudyn")
 ENERGY_BODIES = 24
-LIGHT = 0.2  # of the nominal damping: the lower end of the gene box
+LIGHT = 0.2  # fraction of the nominal damping: the lower bound of the damping genes
 WORKERS = 2
 GENOMES, SEED = 1000, 1
-_SILENCE = 3.0  # a peer that takes this many times its limit is ended
+_SILENCE = 3.0  # multiple of its time limit after which a peer process is killed
 
 
 class Progress:
-    """Stages and what is left of the one under way, on standard error."""
+    """Number of stages, and remaining time of the present one, on standard error."""
 
     def __init__(self, stages: int) -> None:
         self.stages, self.stage, self.label = stages, 0, ""
@@ -66,25 +66,23 @@ class Progress:
 
     @contextmanager
     def during(self, label: str) -> Iterator[None]:
-        """A stage."""
+        """Run a stage."""
         self.stage, self.label, self.stage_began = self.stage + 1, label, time.monotonic()
         self._say("")
         yield
-        self._say(f", {time.monotonic() - self.stage_began:.0f} s")
-        print(file=sys.stderr)
+        self._say(f", {time.monotonic() - self.stage_began:.0f} s", last=True)
 
     def __call__(self, done: int, of: int) -> None:
-        """``done`` of ``of`` parts of the stage."""
+        """``done`` of ``of`` parts of the stage are done."""
         left = (time.monotonic() - self.stage_began) / done * (of - done)
         self._say(f", {done}/{of}, about {left:.0f} s left")
 
-    def _say(self, rest: str) -> None:
-        text = f"[{self.stage}/{self.stages}, {time.monotonic() - self.began:.0f} s] {self.label}{rest}"
-        print(f"\r{text:<100}", end="", file=sys.stderr, flush=True)
+    def _say(self, rest: str, *, last: bool = False) -> None:
+        show(f"[{self.stage}/{self.stages}, {time.monotonic() - self.began:.0f} s] {self.label}{rest}", last=last)
 
 
 def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
-    """One line of the table, without the peak and the other engines; ``operations`` of one step and group of lanes."""
+    """One row of the table, without peak and other engines; ``operations`` of one step of a group of lanes."""
     subject = Subject(DIVISIONS[bodies], CONDITIONS[medium])
     converged = reference(subject, TOLERANCE)
     steps, error = fewest_steps(subject, converged, TOLERANCE)
@@ -116,7 +114,7 @@ def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Peer:
-    """A run of another engine to be made: which, bodies, medium."""
+    """A case for another engine: engine, bodies, medium."""
 
     engine: str
     bodies: int
@@ -124,7 +122,10 @@ class Peer:
 
 
 def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
-    """What ``benchmarks.peers`` finds within ``seconds``; without a result ``cpu_ms_per_beat`` is None, with a note."""
+    """Result of ``benchmarks.peers`` within ``seconds``.
+
+    Without a result ``cpu_ms_per_beat`` is None and there is a note.
+    """
     command = [
         sys.executable, "-m", "benchmarks.peers", "--division", DIVISIONS[peer.bodies], "--medium", peer.medium,
         "--engine", peer.engine, "--tolerance-mm", str(1e3 * TOLERANCE), "--seconds", str(seconds), "--json",
@@ -136,14 +137,17 @@ def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
         )
         found: dict[str, Any] = json.loads(ended.stdout.splitlines()[-1])[0]
     except subprocess.TimeoutExpired:
-        return {"cpu_ms_per_beat": None, "note": f"ended after {_SILENCE * seconds:g} s without a word"}
+        return {"cpu_ms_per_beat": None, "note": f"ended after {_SILENCE * seconds:g} s without a result"}
     except subprocess.CalledProcessError as failed:
-        return {"cpu_ms_per_beat": None, "note": (failed.stderr.strip().splitlines() or ["failed silently"])[-1]}
+        return {
+            "cpu_ms_per_beat": None,
+            "note": (failed.stderr.strip().splitlines() or ["failed without a message"])[-1],
+        }
     return found
 
 
 def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> None:
-    """Add the other engines to the cases: the large ones first, WORKERS at a time, each a thread of its own."""
+    """Add the results of the other engines to the cases: large ones first, WORKERS at a time, one thread each."""
     peers = [Peer(engine, row["bodies"], row["medium"]) for row in reversed(cases) for engine in ENGINES]
     with ThreadPoolExecutor(WORKERS) as pool:
         for done, (peer, found) in enumerate(
@@ -155,7 +159,7 @@ def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> 
 
 
 def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
-    """Put what an engine needed beside ours."""
+    """Add the result of an engine to a case."""
     cost = found["cpu_ms_per_beat"]
     ratio = None if cost is None else cost / row["ms_per_beat"]
     row[engine] = {name: found.get(name) for name in ("cpu_ms_per_beat", "error_mm", "method", "settings", "note")} | {
@@ -168,7 +172,7 @@ def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
 
 
 def installed(package: str) -> str:
-    """Version of a package."""
+    """Version of a package, or "not installed"."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -176,7 +180,7 @@ def installed(package: str) -> str:
 
 
 def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """By medium: least-squares slope of log(ms) against log(bodies) at four bodies along every chord."""
+    """By medium: least-squares slope of log(ms) over log(bodies), with four bodies along every chord."""
     slopes = {}
     for medium in CONDITIONS:
         rows = [row for row in cases if row["medium"] == medium and row["bodies"] in GROWING]
@@ -187,7 +191,10 @@ def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def search_seconds() -> float:
-    """Time of the thesis's search: 24 bodies, population 50, to stall, a vacuum and a tunnel recording, staged."""
+    """Duration of the thesis's search.
+
+    24 bodies, population 50, until it stalls, one vacuum and one tunnel recording.
+    """
     evaluator = make_evaluator("processes", WORKERS)
     try:
         spec = CalibrationSpec(division="24", seed=SEED)
@@ -197,7 +204,7 @@ def search_seconds() -> float:
 
 
 def energy_errors(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """By medium: the ledger over 20 beats with the steps that the default accuracy takes."""
+    """By medium: energy error over 20 beats with the steps of the default accuracy."""
     rows = {row["medium"]: row for row in cases if row["bodies"] == ENERGY_BODIES}
     return {
         medium: energy_error(Subject(DIVISIONS[ENERGY_BODIES], CONDITIONS[medium]), row["default_steps"])
@@ -214,7 +221,7 @@ def light_damping() -> dict[str, int | None]:
 
 
 def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """The cases of these numbers of bodies, and what is the same for all."""
+    """The cases of these numbers of bodies, and the figures that all share."""
     peak, cases, differences = flops.peak_gflops(), [], []
     for bodies in sizes:
         counted = flops.count_step(DIVISIONS[bodies])
@@ -222,17 +229,17 @@ def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, An
         for medium in CONDITIONS:
             cases.append(case(bodies, medium, counted.operations))
             progress(len(cases), len(sizes) * len(CONDITIONS))
-    peak = max(peak, flops.peak_gflops())  # again, lest another process had the core
+    peak = max(peak, flops.peak_gflops())  # repeated in case another process used the core
     for row in cases:
         row["fraction_of_peak"] = row["gflops"] / peak
     return cases, {"peak_gflops": peak, "counted_differs_from_compiled": max(differences)}
 
 
-def random_genomes(every: int, progress: Progress) -> dict[str, Any]:
-    """How the genomes end; with ``every`` more than 1, of so many genomes and conditions one only."""
-    genomes = gene_box.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
-    todo = gene_box.tasks(genomes, gene_box.CAMPAIGN[::every])
-    return gene_box.summary(todo, gene_box.run(todo, WORKERS, progress))
+def outcomes_of_random_genomes(every: int, progress: Progress) -> dict[str, Any]:
+    """How simulations of random genomes end, with every ``every``-th genome and condition only."""
+    genomes = random_genomes.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
+    todo = random_genomes.tasks(genomes, random_genomes.CAMPAIGN[::every])
+    return random_genomes.summary(todo, random_genomes.run(todo, WORKERS, progress))
 
 
 def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
@@ -243,7 +250,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
     with progress.during("energy ledger, light damping"):
         energy, light = energy_errors(cases), light_damping()
     with progress.during("random genomes"):
-        box = random_genomes(9 if quick else 1, progress)
+        box = outcomes_of_random_genomes(9 if quick else 1, progress)
     if not quick:
         with progress.during("other engines"):
             compare(cases, peer_seconds, progress)
@@ -269,7 +276,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> str:
-    """The figures for people."""
+    """The figures as text."""
     columns = [
         "bodies", "medium", "steps", "ms_per_beat", "error_mm", "gflops", "fraction_of_peak", "times_faster_than_scipy",
         "times_faster_than_engine", "beats_to_periodic", "beats_to_periodic_plain",

@@ -1,7 +1,7 @@
-"""A calibration over HTTP from beginning to end: ``python -m examples.demo`` (or ``make demo``).
+"""A complete calibration over HTTP: ``python -m examples.demo`` (or ``make demo``).
 
-Starts a server of its own on a free port with a temporary data folder, uploads the example campaign, calibrates
-the 11-body wing, and only then opens the true genome, to say how close the calibration came.
+Starts a server on a free port with a temporary data folder, uploads the example campaign and calibrates the 11-body
+wing. Only then it reads the true genome and prints the error of the calibration.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ INTERRUPTED = 130
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the demo; 0 when it went through."""
+    """Run the demo; 0 on success."""
     parser = argparse.ArgumentParser(prog="python -m examples.demo", description=__doc__)
-    parser.add_argument("--keep", action="store_true", help="keep the server and its page until Ctrl-C")
+    parser.add_argument("--keep", action="store_true", help="keep the server running until Ctrl-C")
     options = parser.parse_args(words)
     signal.signal(signal.SIGTERM, _terminate)
     try:
@@ -51,26 +51,26 @@ def main(words: list[str] | None = None) -> int:
             if options.keep:
                 keep(url)
     except KeyboardInterrupt:
-        note("\nstopped; the server of the demo has ended too")
+        note("\nstopped; the server of the demo has stopped too")
         return INTERRUPTED
     except (WingfitError, OSError) as error:
         note(f"the demo failed: {error}")
         return 1
     say("")
-    say("The server of the demo has stopped. To keep one: wingfit serve --data wingfit-data")
+    say("The server of the demo has stopped. To run one: wingfit serve --data wingfit-data")
     say("then open http://127.0.0.1:8321, or: wingfit datasets upload examples/robird")
     return 0
 
 
 @contextmanager
 def server(data: Path) -> Iterator[str]:
-    """Run a server as a child process, ready to calibrate; stopped on the way out, whatever happens."""
+    """Run a server as a child process; yields its URL when it is ready, and stops it in any case."""
     url, port = _free_address()
     log = data / "server.log"
     chosen = {"WINGFIT_DATA": str(data / "data"), "WINGFIT_PORT": str(port), "WINGFIT_EVALUATOR": "ray"}
     inherited = {key: value for key, value in os.environ.items() if not key.startswith("WINGFIT_")}
     with log.open("wb") as stream:
-        # A session of its own: Ctrl-C reaches us alone, and we end the whole group in order.
+        # A session of its own: Ctrl-C reaches this process only, which then ends the whole group in order.
         child = subprocess.Popen(  # noqa: S603  # our own module
             [sys.executable, "-m", *SERVER],
             stdin=subprocess.DEVNULL,
@@ -97,7 +97,7 @@ def calibrate(client: Client) -> None:
     with progress("calibrating") as report:
         run = client.wait(run["id"], lambda now: report(now["progress"], now["eta_seconds"], _state(now)))
     if run["state"] != "SUCCEEDED":
-        raise WingfitError(f"the run is {run['state']}", run["error"] or "the server gives no reason")
+        raise WingfitError(f"the run is {run['state']}", run["error"] or "the server gave no reason")
     say(f"calibrated in {time.monotonic() - started:.0f} s with {run['evaluations']} evaluations")
     result = cast(a.Result, client.result(run["id"]))
     say("")
@@ -108,21 +108,21 @@ def calibrate(client: Client) -> None:
 
 
 def keep(url: str) -> NoReturn:
-    """Leave the server up until Ctrl-C."""
-    say(f"the server stays at {url} until Ctrl-C")
+    """Keep the server running until Ctrl-C."""
+    say(f"the server runs at {url} until Ctrl-C")
     while True:
         time.sleep(3600)
 
 
 def true_values(path: Path) -> dict[str, float]:
-    """Read the genome that made the recordings, shares normalised as the results have them."""
-    from wingfit.sim.virtual_rigs.campaign import read_truth  # compiled kernels wait until they are needed
+    """The true genome of the recordings, with shares normalised as in the results."""
+    from wingfit.sim.virtual_rigs.campaign import read_truth  # imported late, because it compiles kernels
 
     return read_truth(path).normalised()
 
 
 def _print_genes(genes: list[a.GeneInfo]) -> None:
-    """Best beside nominal and, now that the calibration is done, the truth."""
+    """Print nominal, estimated and true value of each gene."""
     truth = true_values(EXAMPLE.with_suffix(".truth.json"))
     off = {gene["name"]: 100 * (gene["best"] / truth[gene["name"]] - 1) for gene in genes}
     rows = [
@@ -137,10 +137,10 @@ def _print_genes(genes: list[a.GeneInfo]) -> None:
         ]
         for gene in genes
     ]
-    table(["gene", ">nominal", ">best", ">truth", "unit", "the data tell it", ">off by"], rows)
+    table(["gene", ">nominal", ">best", ">truth", "unit", "identifiable", ">error"], rows)
     known = [abs(off[gene["name"]]) for gene in genes if gene["identifiable"]]
     close = sum(value <= GOAL_PERCENT for value in known)
-    say(f"of {len(known)} genes that the data tell, {close} are within {GOAL_PERCENT:g} % of the truth")
+    say(f"of {len(known)} identifiable genes, {close} are within {GOAL_PERCENT:g} % of the truth")
 
 
 def _print_floor(result: a.Result) -> None:
@@ -180,19 +180,19 @@ def _await_start(url: str, child: subprocess.Popen[bytes], log: Path) -> None:
             time.sleep(0.2)
     tail = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()[-8:]
     why = "it ended" if child.poll() is not None else f"it was not ready after {START_S:.0f} s"
-    raise WingfitError("the server did not start", "\n".join([f"{why}. Its last words:", *tail]))
+    raise WingfitError("the server did not start", "\n".join([f"{why}. The end of its log:", *tail]))
 
 
 def _stop(child: subprocess.Popen[bytes]) -> None:
-    """End the server in order; what is left of its group after that is killed."""
-    # A second Ctrl-C must not leave processes behind; the stop is bounded anyway.
+    """Stop the server; processes of its group that are left are killed."""
+    # A second Ctrl-C must not interrupt this; it takes a limited time.
     previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         child.terminate()
         try:
             child.wait(STOP_S)
         except subprocess.TimeoutExpired:
-            note("the server does not stop by itself; killing it")
+            note("the server does not stop; killing it")
         with suppress(ProcessLookupError):
             os.killpg(child.pid, signal.SIGKILL)
         child.wait()

@@ -1,4 +1,4 @@
-"""Where evaluations run: in this process, in worker processes or on a Ray cluster; and the life of a job."""
+"""Evaluators (in this process, in worker processes, or on a Ray cluster), and the state machine of a job."""
 
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
 from wingfit.workers.factory import EvaluatorKind, RunningEvaluator, make_evaluator

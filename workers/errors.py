@@ -1,4 +1,4 @@
-"""What can go wrong with the machinery, as against the model."""
+"""Errors of the evaluators, as opposed to errors of the model."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class EvaluatorClosedError(RuntimeError):
 
 
 class EvaluationInterruptedError(RuntimeError):
-    """The call was given up because its caller asked for it; what had begun ends by itself, and nobody waits for it."""
+    """The caller interrupted the call. Units that have started run to their end; their results are dropped."""
 
 
 class WorkerLostError(RuntimeError):
-    """Work was given up because the processes that did it kept dying."""
+    """A unit was given up because the processes that evaluated it kept dying."""

@@ -1,4 +1,4 @@
-"""Makes evaluators by name, so that nothing else needs to know where evaluations run."""
+"""Creates evaluators by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EvaluatorKind = Literal["in_process", "processes", "ray"]
 
 
 class RunningEvaluator(Evaluator, Protocol):
-    """An evaluator that also says what it is, for the health page, and whose calls can be given up."""
+    """An evaluator with its kind and the state of its workers for the health page; its calls can be interrupted."""
 
     def evaluate(
         self,
@@ -25,34 +25,33 @@ class RunningEvaluator(Evaluator, Protocol):
         residuals: bool = False,
         interrupted: Callable[[], bool] = never,
     ) -> Evaluation:
-        """Misfits of ``values`` [B, F]; EvaluationInterruptedError soon after ``interrupted`` turns true.
+        """Misfits of ``values`` [B, F]; EvaluationInterruptedError soon after ``interrupted`` returns true.
 
-        Units that no worker has begun by then are dropped.
+        Units that no worker has started by then are dropped.
         """
         ...
 
     @property
     def kind(self) -> EvaluatorKind:
-        """Which implementation this is."""
+        """Name of the implementation."""
         ...
 
     @property
     def workers(self) -> int:
-        """Number of units that can run at the same time."""
+        """Number of units that can be evaluated at the same time."""
         ...
 
     @property
     def standing(self) -> Standing:
-        """The workers that live, and what became of others."""
+        """Number of living workers, and counts of lost ones."""
         ...
 
 
 def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str | None = None) -> RunningEvaluator:
     """Start an evaluator.
 
-    ``workers`` is the number of worker processes, by default one per processor. ``address`` ("host:port" or
-    "auto") joins a standing Ray cluster, which then decides the number of workers; without it, Ray starts on
-    this machine.
+    ``workers`` is the number of worker processes, by default one per processor. ``address`` ("host:port" or "auto")
+    joins an existing Ray cluster, whose number of workers then counts; without it, Ray starts on this machine.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; it must be at least 1, or absent for one per processor")
@@ -72,4 +71,4 @@ def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str
         from wingfit.workers.ray_cluster import RayEvaluator
 
         return RayEvaluator(workers, address)
-    raise ValueError(f"no evaluator {kind!r}; there are {', '.join(get_args(EvaluatorKind))}")
+    raise ValueError(f"unknown evaluator {kind!r}; give one of {', '.join(get_args(EvaluatorKind))}")

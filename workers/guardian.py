@@ -1,9 +1,9 @@
-"""Ends this process when a unit takes too long, or when it is stopped: for workers whose owner cannot watch them.
+"""Kills this process if a unit exceeds its time limit or if the process is stopped; for Ray workers.
 
-A Ray worker is started by Ray, often on another machine, and a task that hangs would hold its processor for ever. So
-each worker starts a small process of its own that needs nothing but the standard library. It is told when a unit
-begins and how long it may take, hears a heartbeat in between, and kills its parent when the one takes too long or the
-other stays away. Ray then notices the death, and the unit is done again. It ends with its parent.
+A Ray worker is started by Ray, often on another machine, where its owner cannot watch it; a hung task would block its
+processor for ever. So each worker starts a small process that needs only the standard library. The worker sends it the
+start and time limit of each unit and a regular heartbeat. If the limit passes, or the heartbeat stops, it kills the
+worker; Ray reports the death, and the unit is repeated. The small process ends with the worker.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 BEAT_SECONDS = 5.0
-# Kernels and libraries let other threads run within a fraction of a second.
+# Kernels and libraries release the interpreter lock within a fraction of a second.
 SILENCE_SECONDS = 60.0
 
 _SCRIPT = """
@@ -27,7 +27,7 @@ deadline, rest = None, b""
 while True:
     readable = select.select([0], [], [], 0.5)[0]
     now = time.monotonic()
-    if now - looked > 5.0:  # this process was stopped itself, with all others: nobody is late
+    if now - looked > 5.0:  # this process was stopped too: extend the limits
         heard, deadline = now, deadline and deadline + (now - looked)
     looked = now
     if readable:
@@ -49,7 +49,7 @@ while True:
 
 
 class Guardian:
-    """The small process, and our end of the pipe to it. For one unit at a time."""
+    """The small process and the pipe to it; for one unit at a time."""
 
     def __init__(self, silence_s: float = SILENCE_SECONDS, beat_s: float = BEAT_SECONDS) -> None:
         self._silence, self._beat = silence_s, beat_s
@@ -59,7 +59,7 @@ class Guardian:
 
     @contextmanager
     def watching(self, limit_s: float) -> Iterator[None]:
-        """Within the block this process is ended once ``limit_s`` have passed."""
+        """Kill this process if the block takes longer than ``limit_s``."""
         self._say(b"%f" % limit_s)
         try:
             yield
@@ -67,9 +67,9 @@ class Guardian:
             self._say(b"done")
 
     def _say(self, line: bytes) -> None:
-        """Say it, to a new process where there is none or it ended; without one the work goes on unwatched."""
+        """Send a line, restarting the small process if it has ended; without one the unit runs unwatched."""
         with self._lock:
-            for _ in range(2):  # it may end between the look and the word
+            for _ in range(2):  # it may end between the check and the write
                 with suppress(OSError):
                     if self._process is None or self._process.poll() is not None:
                         self._process = self._started()
@@ -80,7 +80,7 @@ class Guardian:
     def _started(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-I", "-S", "-c", _SCRIPT, str(self._silence)]
         quiet = subprocess.DEVNULL
-        return subprocess.Popen(  # noqa: S603  # our own words
+        return subprocess.Popen(  # noqa: S603  # our own arguments
             command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet, bufsize=0, start_new_session=True
         )
 

@@ -1,4 +1,4 @@
-"""Evaluation in the caller's own thread: the reference that the other evaluators must match bit for bit."""
+"""Evaluation in the caller's own thread. The other evaluators must return the same bits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wingfit.workers.watch import Standing, never
 
 
 class InProcessEvaluator:
-    """Runs one unit after the other."""
+    """Evaluates one unit after the other."""
 
     kind: Literal["in_process"] = "in_process"
     workers = 1
@@ -24,7 +24,7 @@ class InProcessEvaluator:
 
     @property
     def standing(self) -> Standing:
-        """One, that cannot be lost without this process."""
+        """One worker: this process."""
         return Standing(self.workers)
 
     def evaluate(
@@ -47,5 +47,5 @@ class InProcessEvaluator:
         return gather(problem, done)
 
     def close(self) -> None:
-        """Refuse further work; a call under way ends after its current unit."""
+        """Refuse further calls; a call in progress ends after its current unit."""
         self._closed = True

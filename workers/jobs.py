@@ -24,7 +24,7 @@ MOST_STARTS = 3
 
 
 class State(StrEnum):
-    """Where a job stands; the last three are final."""
+    """State of a job; the last three are final."""
 
     QUEUED = "QUEUED"
     RUNNING = "RUNNING"
@@ -40,7 +40,7 @@ class State(StrEnum):
 
 
 class Wish(StrEnum):
-    """What a user asked of a running job that its runner has not yet acted on."""
+    """Request of a user that the runner of the job has not acted on yet."""
 
     NONE = "NONE"
     PAUSE = "PAUSE"
@@ -48,20 +48,20 @@ class Wish(StrEnum):
 
 
 class Instruction(StrEnum):
-    """What the caller of :func:`step` must do once the new job is stored."""
+    """What the caller of :func:`step` must do after it has stored the new job."""
 
     ENQUEUE = "ENQUEUE"
-    """Put the job at the end of the waiting line."""
+    """Put the job at the end of the queue."""
     DEQUEUE = "DEQUEUE"
-    """Take the job out of the waiting line."""
+    """Take the job out of the queue."""
     RUN = "RUN"
-    """Begin, or go on from the last stored generation."""
+    """Start, or continue from the last stored generation."""
     STORE = "STORE"
     """Store the generation that came with the event; in the same transaction as the job."""
     STOP = "STOP"
-    """The runner stops here; without this instruction it goes on to the next generation."""
+    """The runner stops; without this instruction it continues with the next generation."""
     PUBLISH = "PUBLISH"
-    """The state changed: tell whoever watches."""
+    """The state changed: notify subscribers."""
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class Submit:
 
 @dataclass(frozen=True)
 class Start:
-    """A runner took the job out of the waiting line."""
+    """A runner took the job from the queue."""
 
 
 @dataclass(frozen=True)
 class Generation:
     """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1].
 
-    ``lasting`` says that a restart goes on after it.
+    ``lasting``: a restart continues after this generation.
     """
 
     progress: float
@@ -91,17 +91,17 @@ class Generation:
 
 @dataclass(frozen=True)
 class Pause:
-    """A user asked to pause."""
+    """A user requested a pause."""
 
 
 @dataclass(frozen=True)
 class Resume:
-    """A user asked to go on, or took back a pause that has not happened yet."""
+    """A user requested to continue, or withdrew a pause that has not happened yet."""
 
 
 @dataclass(frozen=True)
 class Cancel:
-    """A user asked to cancel."""
+    """A user requested cancellation."""
 
 
 @dataclass(frozen=True)
@@ -111,21 +111,21 @@ class Finish:
 
 @dataclass(frozen=True)
 class Fail:
-    """The runner broke down; ``error`` is for the user."""
+    """The runner failed; ``error`` is shown to the user."""
 
     error: str
 
 
 @dataclass(frozen=True)
 class Leave:
-    """The server stops in good order while the job runs; it goes on after the next start."""
+    """The server shuts down in an orderly way while the job runs; the job continues after the next start."""
 
 
 @dataclass(frozen=True)
 class Restart:
-    """The server came up and found the job unfinished; whoever ran it is gone.
+    """The server started and found the job unfinished, without its runner.
 
-    A job that was started ``most_starts`` times without lasting progress is given up: it may be what ends the server.
+    A job that was started ``most_starts`` times without lasting progress fails, because it may be what ends the server.
     """
 
     most_starts: int = MOST_STARTS
@@ -138,8 +138,8 @@ Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | 
 class Job:
     """A job as it is stored.
 
-    ``progress`` never decreases; ``error`` is set only in state FAILED; ``starts`` counts those since the last lasting
-    generation whose end was no stop in good order, the present one included.
+    ``progress`` never decreases; ``error`` is set only in state FAILED; ``starts`` counts the starts since the last
+    lasting generation, with the present one and without those that ended by an orderly shutdown.
     """
 
     state: State = State.QUEUED
@@ -154,7 +154,7 @@ Outcome = tuple[Job, tuple[Instruction, ...]]
 
 
 class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an error, and named in the contract
-    """An event that the job's state does not admit. ``allowed`` names those that it does."""
+    """An event that the job's state does not allow; ``allowed`` names those that it does."""
 
     def __init__(self, job: Job | None, event: Event) -> None:
         self.state = job.state if job else None
@@ -162,18 +162,18 @@ class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an
         self.allowed = allowed(job)
         standing = "a job that does not exist yet" if job is None else f"a job in state {job.state.value}"
         if job and job.wish is not Wish.NONE:
-            standing += f" that is about to {job.wish.value.lower()}"
+            standing += f" with a pending {job.wish.value.lower()}"
         choices = ", ".join(self.allowed) or "nothing: the state is final"
         super().__init__(f"cannot {self.event} {standing}; allowed: {choices}")
 
 
 def allowed(job: Job | None) -> tuple[str, ...]:
-    """Names of the events that ``step`` admits for ``job``, in a fixed order."""
+    """Names of the events that ``step`` allows for ``job``, in a fixed order."""
     return tuple(kind.__name__.lower() for kind, handle in _HANDLERS.items() if handle(job, _sample(kind)) is not None)
 
 
 def step(job: Job | None, event: Event) -> Outcome:
-    """Return the job after ``event`` and what to do now; IllegalTransition when the state forbids it."""
+    """The job after ``event``, and the instructions; IllegalTransition if the state does not allow the event."""
     outcome = _HANDLERS[type(event)](job, event)
     if outcome is None:
         raise IllegalTransition(job, event)
@@ -185,7 +185,7 @@ def _sample(kind: type[Event]) -> Event:
 
 
 def _move(job: Job, state: State, *instructions: Instruction, error: str | None = None) -> Outcome:
-    """Enter ``state``; a wish is fulfilled or void by then."""
+    """Enter ``state``; a wish is then fulfilled or void."""
     return replace(job, state=state, wish=Wish.NONE, error=error), (*instructions, Instruction.PUBLISH)
 
 
@@ -272,9 +272,9 @@ def _restart(job: Job | None, event: Event) -> Outcome | None:
 
 def _given_up(job: Job) -> str:
     return (
-        f"the server ended {job.starts} times in a row while this was computed, each time before anything new was "
-        f"stored (after step {job.generations}), so it is not started again; the computation may take more memory than "
-        "there is: the log of the server and of the system says why it ended. Submit it again to try once more"
+        f"the server ended {job.starts} times in a row while this was running, each time before a new step was "
+        f"stored (after step {job.generations}), so it is not started again. It may need more memory than "
+        "available; see the logs of the server and of the system. Submit it again to try once more"
     )
 
 
@@ -292,16 +292,16 @@ _HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
 }
 
 ETA_MEMORY = 0.2
-ETA_LONGEST = 1e9  # s, thirty years: more is no estimate
-"""Share of the elapsed time over which old progress fades out of the estimate, by a factor e."""
+"""Fraction of the elapsed time after which the weight of old progress has fallen by a factor e."""
+ETA_LONGEST = 1e9  # s, thirty years: larger estimates are dropped
 
 
 def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
-    """Seconds until progress 1, or None while nothing can be said.
+    """Remaining seconds, or None if they cannot be estimated.
 
-    ``history`` holds (elapsed s of running time, progress) of each generation, in order; (0, 0) is implied.
-    The speed is the slope of a straight line through the history, fitted by least squares with weights that
-    fade into the past: one slow generation moves the estimate little, a lasting change of speed is followed.
+    ``history`` holds (elapsed s of running time, progress) of each generation, in order; (0, 0) is implied. The speed
+    is the slope of a line fitted by least squares with weights that decay into the past: one slow generation changes
+    the estimate little, a lasting change of speed is followed.
     """
     points = [(0.0, 0.0), *history]
     now, progress = points[-1]

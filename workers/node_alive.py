@@ -1,7 +1,8 @@
 """Whether the Ray node of this machine is alive in its cluster: ``python -m wingfit.workers.node_alive ray-head:6379``.
 
-Exits with 0 if it is, else with 1 and the reason. The head is asked, because a node that lost its head, or that the
-head has given up, may still have all its processes. One call takes half a second of processor time, to import Ray.
+Exits with 0 if it is, else with 1 and the reason. The head is queried, because the processes of a node may live
+although the node has lost its head, or the head has dropped the node. A call takes half a second of processor time to
+import Ray.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def _addresses(host: str, port: int) -> tuple[str, str]:
 
 
 def _living_nodes(address: str) -> set[str]:
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray reads it when it is imported
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # Ray reads it at import
     from ray._raylet import GcsClient  # type: ignore[attr-defined]  # compiled
     from ray.core.generated.gcs_pb2 import GcsNodeInfo
 

@@ -1,9 +1,8 @@
 """Evaluation in worker processes of this machine.
 
-One thread looks after one process over one pipe. When a process dies, its thread alone notices, starts
-another and repeats the one unit that was lost; everything else goes on. One more thread watches the time: a process
-that is stopped, or takes longer for a unit than :class:`wingfit.workers.watch.Expectation` allows, is killed, and so
-replaced.
+Each process is served by one thread over one pipe. If the process dies, that thread starts another and repeats the lost
+unit; the other processes are not affected. One more thread kills processes that are stopped or exceed the time limit of
+:class:`wingfit.workers.watch.Expectation`, so that they are replaced.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
 class ProcessPoolEvaluator:
-    """Spreads units over ``workers`` processes, by default one per processor."""
+    """Distributes units over ``workers`` processes, by default one per processor."""
 
     kind: Literal["processes"] = "processes"
 
@@ -62,7 +61,7 @@ class ProcessPoolEvaluator:
 
     @property
     def standing(self) -> Standing:
-        """The processes that live, and what became of others."""
+        """Number of living processes, and counts of lost ones."""
         return self._tally.standing(sum(worker.alive for worker in self._pool))
 
     def evaluate(
@@ -89,7 +88,7 @@ class ProcessPoolEvaluator:
                 future.cancel()
 
     def close(self) -> None:
-        """Stop the processes; calls under way raise :class:`EvaluatorClosedError`."""
+        """Stop the processes; calls in progress raise :class:`EvaluatorClosedError`."""
         with self._lock:
             if self._closed:
                 return
@@ -119,7 +118,7 @@ class ProcessPoolEvaluator:
                 try:
                     misfit, seconds = worker.run(problem, task, residuals, limit)
                 except _Died as death:
-                    # One that dies while it starts has not seen the unit yet.
+                    # A process that dies during its start has not received the unit yet.
                     blamed, died = blamed + death.begun, died + 1
                     self._restart(worker, death, what, limit)
                 else:
@@ -127,7 +126,7 @@ class ProcessPoolEvaluator:
                     return misfit
         finally:
             self._idle.put(worker)
-        where = "on the same unit" if blamed == ATTEMPTS else "before it had begun the unit"
+        where = "on the same unit" if blamed == ATTEMPTS else "before starting the unit"
         raise WorkerLostError(
             f"{died} worker processes died or hung one after the other {where}, {what} (the last with "
             f"{worker.last_exit}); if memory ran out, use fewer workers than {self.workers}"
@@ -143,7 +142,7 @@ class ProcessPoolEvaluator:
         if death.hung and death.begun:
             LOG.warning("worker process %s hung: %s took more than %.0f s; it was replaced", pid, what, limit)
         elif death.hung:
-            LOG.warning("worker process %s hung before it had begun %s; it was replaced", pid, what)
+            LOG.warning("worker process %s hung before starting %s; it was replaced", pid, what)
         else:
             LOG.warning("worker process %s died (%s) with %s; it was replaced", pid, worker.last_exit, what)
 
@@ -153,15 +152,15 @@ def _result(future: Future[Misfit], interrupted: Callable[[], bool]) -> Misfit:
         try:
             return future.result(LOOK_SECONDS)
         except TimeoutError:
-            if future.done():  # it is the model's own
+            if future.done():  # a TimeoutError of the model itself
                 return future.result()
     raise EvaluationInterruptedError
 
 
 class _Died(Exception):  # noqa: N818  internal
-    """The process at the other end of the pipe is gone.
+    """The process at the other end of the pipe has ended.
 
-    ``begun``: with a unit that it had begun; ``hung``: it was killed because it took too long.
+    ``begun``: it had started the unit; ``hung``: it was killed for exceeding the time limit.
     """
 
     def __init__(self, *, begun: bool, hung: bool = False) -> None:
@@ -170,14 +169,14 @@ class _Died(Exception):  # noqa: N818  internal
 
 
 class _Worker:
-    """Our end of one process. Used by one thread at a time; the watch looks on."""
+    """Our end of one process, used by one thread at a time, and by the watch."""
 
     def __init__(self) -> None:
         self.last_exit = "exit code unknown"
-        # When the unit under way is overdue; under the lock, so that no process is killed for a unit that is done.
+        # Deadline of the current unit; under the lock, so that no process is killed for a unit that is done.
         self._deadline: float | None = None
         self._hung = False
-        # Whether the process has done a unit: one that still starts gets more time.
+        # Whether the process has finished a unit; before that it gets more time.
         self._proven = False
         self._watching = threading.Lock()
         self._process: SpawnProcess | None = None
@@ -190,29 +189,29 @@ class _Worker:
         process = context.Process(target=_serve, args=(theirs,), name="wingfit-worker", daemon=True)
         with child_environment():
             process.start()
-        # The process has its own copy now; ours must go, or its death would not end the pipe.
+        # The process has its own copy; ours must be closed, or its death would not close the pipe.
         theirs.close()
         self._process, self._connection = process, ours
         self._proven = self._hung = False
 
     @property
     def pid(self) -> int | None:
-        """Of the process."""
+        """Process id."""
         return self._process.pid if self._process else None
 
     @property
     def alive(self) -> bool:
-        """Whether the process has not ended."""
+        """Whether the process lives."""
         process = self._process
         try:
             return process is not None and not wait_for([process.sentinel], 0)
-        except ValueError:  # closed meanwhile
+        except ValueError:  # closed in the meantime
             return False
 
     def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
-        """Have ``task`` done within ``limit`` s of its beginning, and how long it took; _Died when the process is dead.
+        """Evaluate ``task`` within ``limit`` s of its start; misfit and duration (s). _Died if the process dies.
 
-        Raises what the model raised.
+        Raises the model's own exceptions.
         """
         self._expect(limit if self._proven else max(limit, START_SECONDS))
         try:
@@ -221,14 +220,14 @@ class _Worker:
             self._expect(None)
 
     def kill_if_overdue(self) -> None:
-        """End the process if it takes too long; the thread that waits for it gets _Died."""
+        """Kill the process if its deadline has passed; the waiting thread gets _Died."""
         with self._watching:
             if self._deadline is not None and time.monotonic() > self._deadline:
                 self._deadline, self._hung = None, True
                 self.kill()
 
     def _expect(self, seconds: float | None) -> None:
-        """Something is to happen within ``seconds``, or nothing is expected any more."""
+        """Set a deadline in ``seconds``, or none."""
         with self._watching:
             self._deadline = None if seconds is None else time.monotonic() + seconds
 
@@ -255,12 +254,12 @@ class _Worker:
         return misfit, float(seconds)
 
     def kill(self) -> None:
-        """End the process at once; a thread that waits for it gets _Died."""
+        """Kill the process; a waiting thread gets _Died."""
         if self._process:
             self._process.kill()
 
     def release(self) -> None:
-        """Let go of a process that is dead or dying."""
+        """Release a dead or dying process."""
         if self._process is None or self._connection is None:
             return
         self._process.kill()
@@ -272,8 +271,8 @@ class _Worker:
 
 
 def _serve(connection: Connection) -> None:
-    """Run tasks until the owner goes away: the main loop of a worker process."""
-    # Ctrl-C in a terminal reaches every process of the group; the owner decides what it means.
+    """Main loop of a worker process: evaluate tasks until the owner is gone."""
+    # Ctrl-C in a terminal reaches every process of the group; only the owner handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
     problems = ProblemMemory()
@@ -302,7 +301,7 @@ def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Ta
 
 
 def _portable(error: Exception) -> Exception:
-    """``error``, or a stand-in when it cannot cross a pipe."""
+    """``error``, or a RuntimeError with its text if it cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301  our own bytes
     except Exception:

@@ -1,9 +1,9 @@
-"""The batches of one call on Ray: handed out as workers come free, and done again where a worker was lost.
+"""The batches of one call on Ray: submitted as workers become free, and repeated if a worker is lost.
 
-Nothing is ever cancelled: in Ray 2.60 a cancellation that meets the end of its task aborts this process. So no more
-batches are under way than keep the workers busy, and what a call that is given up leaves behind is soon done.
-A worker that hangs ends itself (:mod:`wingfit.workers.guardian`). A batch whose worker or node is lost is done again
-from here and not by Ray, which would say nothing of it.
+Nothing is ever cancelled: in Ray 2.60, cancelling a task at the moment it ends aborts this process. So no more batches
+are submitted than keep the workers busy, and those of an interrupted call are soon done. A hung worker ends itself
+(:mod:`wingfit.workers.guardian`). A batch whose worker or node is lost is repeated from here and not by Ray, which
+would not report it.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from wingfit.workers.watch import ATTEMPTS, STARTS, Expectation, Tally
 
 LOG = logging.getLogger("wingfit.workers")
 POLL_SECONDS = 0.2
-# Batches of one call: as many, or so many that each takes no longer than a moment; of a problem that is not known yet,
-# a few tasks each.
+# Number of batches of one call: PER_WORKER per worker, or more so that each takes at most BATCH_SECONDS; for a problem
+# of unknown duration, UNKNOWN_TASKS in each.
 PER_WORKER, BATCH_SECONDS, UNKNOWN_TASKS = 3, 2.0, 8
-# Of them under way at a time: the next one lies ready when a worker is done.
+# Submitted batches per worker, so that the next one is there when a worker is done.
 UNDER_WAY = 2
-# A cluster that loses nodes is given time to get new ones.
+# Longest wait (s) before a batch is repeated, for a cluster to replace lost nodes.
 LONGEST_PAUSE = 30.0
-# What ends a worker at its work; all else is trouble of the cluster, and no fault of the batch.
+# Errors that the batch itself may have caused; all others are errors of the cluster.
 OF_THE_WORKER = (ray_errors.WorkerCrashedError, ray_errors.OutOfMemoryError)
 
 
 @dataclass
 class Batch:
-    """Tasks that travel together, by their numbers.
+    """Tasks that are sent together, by their numbers.
 
     Attributes:
-        blamed: workers that were lost while they worked on it.
-        lost: workers and nodes that were lost with it.
-        due: when it may be submitted.
-        limit: s that one of its tasks may take, when it was submitted last, at ``began``.
+        blamed: number of workers lost while they evaluated it.
+        lost: number of workers and nodes lost with it.
+        due: time before which it must not be submitted.
+        limit: time limit (s) of one of its tasks in the last submission, at ``began``.
     """
 
     numbers: tuple[int, ...]
@@ -54,10 +54,10 @@ class Batch:
 
 
 class Cluster(NamedTuple):
-    """What a call needs of the cluster.
+    """Functions of the cluster that a call needs.
 
-    ``submit(batch, limit)`` gives a reference to what becomes of it, ``forget`` says that the problem was lost there,
-    and ``check`` raises when the call is to end.
+    ``submit(batch, limit)`` returns a reference to the result, ``forget`` reports that the cluster has lost the
+    problem, and ``check`` raises if the call is to end.
     """
 
     workers: Callable[[], int]
@@ -74,13 +74,13 @@ class Batches:
         self._expectation, self._tally = expectation, tally
         seconds = expectation.usual(problem.key) or BATCH_SECONDS / UNKNOWN_TASKS
         hands = min(count, max(PER_WORKER * max(1, cluster.workers()), math.ceil(count * seconds / BATCH_SECONDS)))
-        # Dealt out like cards, so that recordings that cost more are spread over all batches.
+        # Distributed in turn, so that expensive recordings are spread over all batches.
         self._waiting = deque(Batch(tuple(range(first, count, hands))) for first in range(hands))
         self._pending: dict[Any, Batch] = {}
         self._done: dict[int, Misfit] = {}
 
     def collect(self) -> list[Misfit]:
-        """What became of all tasks, in their order."""
+        """Results of all tasks, in their order."""
         while self._waiting or self._pending:
             self._cluster.check()
             self._submit()
@@ -115,7 +115,7 @@ class Batches:
             cause = error.cause
             if not isinstance(cause, ray_errors.RayError):
                 raise (cause if isinstance(cause, Exception) else RuntimeError(str(error))) from error
-            # The worker lives, and could not get at the problem.
+            # The worker lives, but could not fetch the problem.
             self._cluster.forget()
             self._lost(batch, cause)
         except ray_errors.RayError as error:
@@ -127,14 +127,14 @@ class Batches:
                 self._expectation.done(self._problem.key, seconds)
 
     def _lost(self, batch: Batch, error: Exception) -> None:
-        """Do the batch again, some time later where the cluster is in trouble; WorkerLostError if that is no use."""
+        """Repeat the batch, after a wait if the cluster is in trouble; WorkerLostError after too many losses."""
         self._cluster.check()
         now = time.monotonic()
         what = f"{len(batch.numbers)} units of {self._problem.key[:8]} over {len(self._problem.recordings)} recordings"
         reason = f"{type(error).__name__}: {error}"
         if _hung(batch, error):
-            reason = f"it died, or it was ended because it took more than {batch.limit:.0f} s for one"
-        LOG.warning("lost on Ray after %.1f s: %s (%s); they are done again", now - batch.began, what, reason)
+            reason = f"it died, or was killed because a unit took more than {batch.limit:.0f} s"
+        LOG.warning("lost on Ray after %.1f s: %s (%s); they are repeated", now - batch.began, what, reason)
         batch.lost += 1
         if isinstance(error, OF_THE_WORKER):
             batch.blamed += 1
@@ -142,12 +142,12 @@ class Batches:
             batch.due = now + min(2.0 ** (batch.lost - 1), LONGEST_PAUSE)
         if batch.blamed >= ATTEMPTS or batch.lost >= STARTS:
             raise WorkerLostError(
-                f"{batch.lost} Ray workers were lost one after the other with the same {what}, the last because: "
+                f"{batch.lost} Ray workers were lost one after the other with the same {what}; the last one: "
                 f"{reason}; if memory ran out, use fewer workers than {self._cluster.workers()}"
             ) from error
         self._waiting.append(batch)
 
 
 def _hung(batch: Batch, error: Exception) -> bool:
-    """Whether its worker seems to have been ended for a task that took too long; who ended it, Ray does not say."""
+    """Whether the worker was probably killed for exceeding the time limit; Ray does not report who killed it."""
     return isinstance(error, ray_errors.WorkerCrashedError) and time.monotonic() - batch.began >= batch.limit

@@ -1,8 +1,8 @@
-"""Evaluation on Ray: on this machine, or on a standing cluster of any size.
+"""Evaluation on Ray: on this machine, or on an existing cluster.
 
-Arrays that come out of Ray's shared memory are read-only, and compiled kernels take those for another type:
-a problem travels as bytes. One call costs milliseconds: units travel in batches, a few per processor.
-Ray's default strategy leaves whole generations to the node that had the last one: batches are spread.
+Arrays from Ray's shared memory are read-only, a different type for compiled kernels, so a problem is sent as bytes. A
+call costs milliseconds, so units are sent in batches, a few per processor. Ray's default strategy sends whole
+generations to the node that had the last one, so batches are spread.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally, n
 LOG = logging.getLogger("wingfit.workers")
 STOP_SECONDS = 30.0
 LOOK_SECONDS = 2.0
-# A head that has not answered for so long is gone, and so are all workers.
+# After this time without an answer the head, and with it all workers, count as lost.
 STALE_SECONDS = 20.0
 
 
 class RayEvaluator:
-    """Spreads units over a Ray cluster; without ``address`` over ``workers`` processes of this machine."""
+    """Distributes units over a Ray cluster, or without ``address`` over ``workers`` processes of this machine."""
 
     kind: Literal["ray"] = "ray"
 
@@ -45,7 +45,7 @@ class RayEvaluator:
         self._closed = False
         self._calls = 0
         self._references: OrderedDict[str, Any] = OrderedDict()
-        # One at a time from here: Ray would run it again without a word.
+        # No retries by Ray, which would not report them.
         self._run_tasks = ray.remote(num_cpus=1, max_retries=0, scheduling_strategy="SPREAD")(_run_tasks)
         self._expectation, self._tally = Expectation(), Tally()
         self._workers, self._seen = _count_workers(), time.monotonic()
@@ -54,12 +54,12 @@ class RayEvaluator:
 
     @property
     def workers(self) -> int:
-        """Processors of the cluster, as of some seconds ago; 0 once its head does not answer."""
+        """Processors of the cluster a few seconds ago; 0 if its head does not answer."""
         return self._workers if time.monotonic() - self._seen < STALE_SECONDS else 0
 
     @property
     def standing(self) -> Standing:
-        """The processors that there are, and what became of workers."""
+        """Present number of processors, and counts of lost workers."""
         return self._tally.standing(self.workers)
 
     def evaluate(
@@ -90,13 +90,13 @@ class RayEvaluator:
             return gather(problem, batches.collect())
 
     def close(self) -> None:
-        """Leave the cluster, and stop it if it is our own; calls under way raise EvaluatorClosedError."""
+        """Leave the cluster, and stop it if it was started here; calls in progress raise EvaluatorClosedError."""
         with self._condition:
             if self._closed:
                 return
             self._closed = True
             self._over.set()
-            # Ray must not be taken away from under a call that still talks to it.
+            # Ray must not be stopped while a call still uses it.
             self._condition.wait_for(lambda: self._calls == 0, STOP_SECONDS)
             self._references.clear()
         self._connection.close()
@@ -115,17 +115,17 @@ class RayEvaluator:
                 self._condition.notify_all()
 
     def _look(self) -> None:
-        """Count the processors of nodes that live, again and again; a head that is gone holds up this thread alone."""
+        """Count the processors regularly, in a thread of its own, because a lost head blocks the query."""
         while not self._over.wait(LOOK_SECONDS):
-            # Without a head Ray raises what it happens to; the count is old then, and so counts as none.
+            # Without a head Ray raises various errors; the count becomes stale then.
             with suppress(Exception), self._call():
                 count = _count_workers()
                 if not count and self._workers:
-                    LOG.warning("the Ray cluster has no worker any more; evaluations wait until one joins")
+                    LOG.warning("the Ray cluster has no workers left; evaluations wait until one joins")
                 self._workers, self._seen = count, time.monotonic()
 
     def _put(self, problem: Problem) -> Any:
-        """Return the reference to the problem in the cluster's memory, where it is put once."""
+        """Reference to the problem in the cluster's memory, where it is stored once."""
         with self._condition:
             if problem.key not in self._references:
                 self._references[problem.key] = ray.put(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
@@ -135,7 +135,7 @@ class RayEvaluator:
             return self._references[problem.key]
 
     def _forget(self, problem: Problem) -> None:
-        """The cluster's memory lost the problem: it is put there anew when it is needed next."""
+        """The cluster's memory lost the problem; it is stored again when next needed."""
         with self._condition:
             self._references.pop(problem.key, None)
 
@@ -151,14 +151,14 @@ _guardian: list[Guardian] = []
 def _run_tasks(
     key: str, reference: list[Any], tasks: list[Task], limit: float, residuals: bool
 ) -> list[tuple[Misfit, float]]:
-    """Do some tasks in a Ray worker, each within ``limit`` s; with the seconds that each took.
+    """Evaluate some tasks in a Ray worker, each within ``limit`` s; misfit and duration (s) of each.
 
-    As an item of a list, the reference is not fetched at every call.
+    ``reference`` is in a list, so that Ray does not fetch its object at every call.
     """
     if not _guardian:
         lower_priority()
         _guardian.append(Guardian())
-    # The inner limit says what was waited for; the outer is for a worker that hangs.
+    # The inner limit gives an error message; the outer one is for a hung worker.
     with _guardian[0].watching(2 * START_SECONDS):
         problem = _problems.get(key, lambda: ray.get(reference[0], timeout=START_SECONDS))
     done: list[tuple[Misfit, float]] = []

@@ -1,12 +1,12 @@
-"""The connection of this process to Ray, and how Ray is started here when there is no cluster to join.
+"""The connection of this process to Ray, and the start of a local Ray if there is no cluster to join.
 
-Facts about Ray 2.60 that shaped this module:
-- A Ray that was started here dies with the *thread* that started it, and Ray ends a process that has lost its
-  Ray after a minute. So a thread of our own connects, and lives until the evaluator is closed. Away from the
-  main thread Ray also leaves the signal handlers of the process alone.
-- Ray listens on all interfaces. So a Ray of our own asks for a token too; it does so by default, but it would
-  write the token where others can read it, unless it finds one in the environment.
-- Ray's usual folder remembers cluster addresses and misleads whoever starts Ray next. So ours has its own.
+Facts about Ray 2.60 behind this module:
+- A local Ray ends with the *thread* that started it, and Ray ends a process that has been without its Ray for a minute.
+  So a thread of our own connects, and lives until the evaluator is closed. Outside the main thread, Ray also leaves the
+  signal handlers of the process unchanged.
+- Ray listens on all interfaces. So a local Ray requires a token too. It does so by default, but it would write the
+  token into a file that others can read, unless the environment has one.
+- Ray's default folder stores cluster addresses that misdirect the next start. So the local Ray has its own folder.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any
 
 from wingfit.workers.share import child_environment
 
-# Ray reads these when it is imported.
+# Ray reads these at import.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
@@ -38,14 +38,14 @@ __all__ = ["Connection", "ray", "ray_errors"]
 
 STOP_SECONDS = 30.0
 OBJECT_STORE_BYTES = 256 * 2**20
-# Ray puts sockets into its folder, and the path of a socket may not exceed 107 bytes.
+# Ray creates sockets in its folder, and the path of a socket is limited to 107 bytes.
 LONGEST_TEMP_PATH = 24
 FOLDER = "wingfit-ray-"
 QUIET: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
 
 
 class Connection:
-    """Ray, started or joined by a thread that stays until :meth:`close`."""
+    """A connection to Ray, made by a thread that lives until :meth:`close`."""
 
     def __init__(self, workers: int | None, address: str | None) -> None:
         if ray.is_initialized():
@@ -61,7 +61,7 @@ class Connection:
         atexit.register(self.close)
 
     def close(self) -> None:
-        """Leave Ray, and stop it if it was started here."""
+        """Disconnect, and stop Ray if it was started here."""
         atexit.unregister(self.close)
         self._leave.set()
         self._thread.join(STOP_SECONDS)
@@ -95,7 +95,7 @@ def _start(workers: int) -> Callable[[], None]:
         os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
     folder = _own_folder()
     try:
-        # Ray hands only the folder of the script on to its workers, not the rest of the search path.
+        # Ray passes only the folder of the script to its workers, not the rest of the search path.
         with child_environment(PYTHONPATH=os.pathsep.join(filter(None, sys.path))):
             ray.init(
                 address="local",
@@ -120,7 +120,7 @@ def _stop(folder: Path | None = None) -> None:
 
 
 def _own_folder() -> Path:
-    """Make a private folder, and remove those of processes that were killed before they could clean up."""
+    """Make a private folder, and remove those of killed processes."""
     usual = Path(tempfile.gettempdir())
     base = usual if len(str(usual)) <= LONGEST_TEMP_PATH else Path("/tmp")  # noqa: S108  mkdtemp is private
     for old in base.glob(f"{FOLDER}*-*"):

@@ -1,4 +1,4 @@
-"""What worker processes of every kind share: manners, a memory of problems, and tasks that can travel."""
+"""Common code of worker processes: priority and threads, a cache of problems, and tasks that can be sent to them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,9 @@ _environment = threading.Lock()
 
 @contextmanager
 def child_environment(**more: str) -> Iterator[None]:
-    """Give each process that is started inside one computing thread: they share the processors.
+    """Set the environment for child processes: one computing thread each, because they share the processors.
 
-    Numerical libraries read the setting when they load: in a spawned process, before any code of ours runs.
-    ``more`` are further variables for those processes.
+    Numerical libraries read the setting when they are loaded. ``more`` are further variables.
     """
     settings = dict.fromkeys(THREAD_SETTINGS, "1") | more
     with _environment:
@@ -45,37 +44,37 @@ def child_environment(**more: str) -> Iterator[None]:
 
 
 def lower_priority() -> None:
-    """Yield to the API: run this process at a niceness of at least ``NICENESS``."""
+    """Raise the niceness of this process to at least ``NICENESS``, so that the API has priority."""
     os.nice(max(0, NICENESS - os.nice(0)))
 
 
 @dataclass(frozen=True)
 class Task:
-    """A unit with its own rows of the batch, so that it can travel alone."""
+    """A unit with its own rows of the batch, which can be sent to another process."""
 
     unit: Unit
     values: npt.NDArray[np.float64]
 
     @classmethod
     def cut(cls, batch: npt.NDArray[np.float64], unit: Unit) -> Task:
-        """Take the rows of ``unit`` out of ``batch``."""
+        """A task with the rows of ``unit`` in ``batch``."""
         rows = batch[unit.start : unit.stop]
         return cls(Unit(0, len(rows), unit.recording), rows)
 
     def run(self, problem: Problem, *, residuals: bool) -> Misfit:
-        """Evaluate; on a copy, because what arrives through shared memory may be read-only."""
+        """Evaluate a copy, because arrays in shared memory may be read-only."""
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)
 
 
 class ProblemMemory:
-    """The problems used last, by key. Held by one worker; not for several threads."""
+    """Cache of the problems used last, by key; not thread-safe."""
 
     def __init__(self, kept: int = PROBLEMS_KEPT) -> None:
         self._kept = kept
         self._problems: OrderedDict[str, Problem] = OrderedDict()
 
     def get(self, key: str, fetch: Callable[[], bytes]) -> Problem:
-        """Return the problem called ``key``; ``fetch`` brings it, pickled, when it is not remembered."""
+        """The problem with this key; ``fetch`` returns it pickled if it is not cached."""
         if key not in self._problems:
             self._problems[key] = pickle.loads(fetch())  # noqa: S301  comes from the process that owns this worker
             while len(self._problems) > self._kept:

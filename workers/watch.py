@@ -1,4 +1,4 @@
-"""How long a unit may take before its worker is taken to hang, and what became of the workers."""
+"""Time limits of units, after which their worker counts as hung, and counts of lost workers."""
 
 from __future__ import annotations
 
@@ -7,38 +7,35 @@ from collections import OrderedDict, deque
 from dataclasses import dataclass, replace
 from statistics import median
 
-# A unit may take FACTOR times as long as those of its problem mostly do, and SLACK_SECONDS more: individuals near
-# divergence take many times the beats of others, and other programs take the processors.
+# Limit of a unit: FACTOR times the median of its problem plus SLACK_SECONDS. Individuals near divergence need many
+# times the beats of others, and other programs use the processors too.
 FACTOR, SLACK_SECONDS = 60.0, 10.0
-# Until ENOUGH of its problem were done a unit may take as long as one of any other problem, and NEW_SECONDS at least;
-# as long as there is no other either, FIRST_SECONDS: kernels may have to be compiled.
+# Before ENOUGH units of a problem are done, the longest median of the other problems is used, with a limit of at least
+# NEW_SECONDS; without other problems at least FIRST_SECONDS, because kernels may have to be compiled.
 ENOUGH, NEW_SECONDS, FIRST_SECONDS = 3, 30.0, 120.0
 UNITS_REMEMBERED, PROBLEMS_REMEMBERED = 32, 256
-# Losses in a row after which a unit is given up: of workers that had begun it, and of any.
+# A unit is given up after ATTEMPTS losses of workers that had started it, or STARTS losses of any.
 ATTEMPTS, STARTS = 6, 60
-# How long a worker may take to start, to load its libraries and to fetch the problem.
+# Time limit for a worker to start, load its libraries and fetch the problem.
 START_SECONDS = 120.0
 
 
 def never() -> bool:
-    """No call is given up."""
+    """The default of ``interrupted``: no call is interrupted."""
     return False
 
 
 class Expectation:
-    """How long units mostly take, by their problem: the median, which one that had to compile kernels does not move.
-
-    Safe to use from several threads.
-    """
+    """Median duration of units by problem; compilation of kernels in one unit does not affect it. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._seconds: OrderedDict[str, deque[float]] = OrderedDict()
 
     def limit(self, key: str, attempt: int = 0) -> float:
-        """Seconds after which a unit of the problem ``key`` hangs; twice as many with each attempt at the same unit.
+        """Time limit (s) of a unit of the problem ``key``, doubled with each ``attempt`` at the same unit.
 
-        So a unit that is slow, but honest, is done in the end, and one that never ends is given up.
+        A slow unit is finished in the end, and one that never ends is given up.
         """
         with self._lock:
             usual = self._usual(key)
@@ -47,17 +44,17 @@ class Expectation:
         return float(max(least, SLACK_SECONDS + FACTOR * longest) * 2**attempt)
 
     def usual(self, key: str) -> float:
-        """Seconds that a unit of the problem ``key`` mostly takes; 0 while that is not known."""
+        """Median duration (s) of a unit of the problem ``key``; 0 if unknown."""
         with self._lock:
             return self._usual(key)
 
     def _usual(self, key: str) -> float:
-        """The median of the problem's units; 0 where too few were done."""
+        """Median duration; 0 with fewer than ENOUGH units."""
         known = self._seconds.get(key, ())
         return median(known) if len(known) >= ENOUGH else 0.0
 
     def done(self, key: str, seconds: float) -> None:
-        """One unit took ``seconds``."""
+        """Record that a unit took ``seconds``."""
         with self._lock:
             self._seconds.setdefault(key, deque(maxlen=UNITS_REMEMBERED)).append(seconds)
             self._seconds.move_to_end(key)
@@ -67,13 +64,13 @@ class Expectation:
 
 @dataclass(frozen=True)
 class Standing:
-    """What an evaluator's workers are and were.
+    """Workers of an evaluator.
 
     Attributes:
-        workers: that live now.
+        workers: number that live now.
         died: workers that ended by themselves, or whose machine was lost.
-        hung: workers that were ended because a unit took longer than its limit.
-        restarts: workers that were started in place of others.
+        hung: workers that were killed because a unit exceeded its time limit.
+        restarts: workers that were started as replacements.
     """
 
     workers: int
@@ -83,7 +80,7 @@ class Standing:
 
 
 class Tally:
-    """Counts what becomes of workers; safe to use from several threads."""
+    """Counts of lost workers; thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -96,6 +93,6 @@ class Tally:
             self._counted = Standing(0, was.died + died, was.hung + hung, was.restarts + restarts)
 
     def standing(self, workers: int) -> Standing:
-        """The counts, with the number of ``workers`` that live."""
+        """The counts, with the number of living ``workers``."""
         with self._lock:
             return replace(self._counted, workers=workers)

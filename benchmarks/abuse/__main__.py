@@ -1,7 +1,7 @@
-"""``python -m benchmarks.abuse --json``: a server under malformed and hostile requests, then under a fuzzer.
+"""``python -m benchmarks.abuse --json``: sends malformed and hostile requests to a server, then runs a fuzzer on it.
 
-A request that must be refused is answered with 4xx in the form of a problem, and none with 5xx; the server lives on
-and answers good requests in between; its memory stays bounded.
+A request that must be refused is answered with 4xx and a problem document; no request is answered with 5xx. In between,
+the server answers valid requests, and its memory stays bounded.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from typing import Any
 
 import httpx
 
-from benchmarks.abuse import fuzz, good, hdf5, requests, uploads
+from benchmarks.abuse import fuzz, hdf5, requests, uploads, valid_inputs
 from benchmarks.abuse.cases import Case
 from benchmarks.common import machine
+from benchmarks.common.progress import show
 from benchmarks.common.server_process import Server
 
 Json = dict[str, Any]
@@ -32,49 +33,52 @@ WORKING = {"WINGFIT_MAX_ACTIVE": "100000", "WINGFIT_MAX_RUNS": "1"}
 
 def main() -> None:
     """Send everything, and print one JSON object as the last line."""
-    asked = _asked()
-    st = None if asked.no_fuzz else fuzz.program()
-    if st is None and not asked.no_fuzz:
+    options = _options()
+    st = None if options.no_fuzz else fuzz.program()
+    if st is None and not options.no_fuzz:
         sys.exit(fuzz.MISSING)
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
         server = Server(Path(scratch), "in_process", settings=WORKING)
         server.start()
         try:
-            told = _told(server, st, asked, Path(scratch))
+            figures = _measured(server, st, options, Path(scratch))
         finally:
             server.kill()
-    told |= {"seconds": round(time.monotonic() - began, 1), "processor": machine.cpu(), "commit": machine.commit()}
-    print(json.dumps(told))
-    sys.exit(1 if told["server_errors"] or told["failures"] or told["peak_rss_mb"] > ENOUGH_MB else 0)
+    figures |= {"seconds": round(time.monotonic() - began, 1), "processor": machine.cpu(), "commit": machine.commit()}
+    print(json.dumps(figures))
+    sys.exit(1 if figures["server_errors"] or figures["failures"] or figures["peak_rss_mb"] > ENOUGH_MB else 0)
 
 
-def _asked() -> argparse.Namespace:
+def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.abuse", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--fuzz-cases", type=int, default=10_000, help="at least so many cases of the fuzzer")
+    parser.add_argument("--fuzz-cases", type=int, default=10_000, help="least number of cases of the fuzzer")
     parser.add_argument(
-        "--hdf5-files", type=int, default=hdf5.MUTATED, help="damaged NetCDF files, besides crafted ones"
+        "--hdf5-files",
+        type=int,
+        default=hdf5.MUTATED,
+        help="number of damaged NetCDF files, in addition to crafted ones",
     )
-    parser.add_argument("--no-fuzz", action="store_true", help="leave the fuzzer out")
+    parser.add_argument("--no-fuzz", action="store_true", help="do not run the fuzzer")
     return parser.parse_args()
 
 
-def _told(server: Server, st: str | None, asked: argparse.Namespace, scratch: Path) -> Json:
+def _measured(server: Server, st: str | None, options: argparse.Namespace, scratch: Path) -> Json:
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
-        names = good.names(http)
-        told = abused(http, server.port, names, [*uploads.cases(asked.seed), *requests.cases()])
-        files = hdf5.abused(http, server, names, asked.seed, asked.hdf5_files)
-        told |= files | {"failures": told["failures"] + files["failures"]}
+        names = valid_inputs.names(http)
+        figures = abused(http, server.port, names, [*uploads.cases(options.seed), *requests.cases()])
+        files = hdf5.abused(http, server, names, options.seed, options.hdf5_files)
+        figures |= files | {"failures": figures["failures"] + files["failures"]}
         if st is not None:
-            found = fuzz.fuzzed(st, http, names, asked.fuzz_cases, asked.seed, scratch)
-            told |= found | {"failures": told["failures"] + found["failures"]}
-    return told | {"peak_rss_mb": round(server.peak_mb(), 1)}
+            found = fuzz.fuzzed(st, http, names, options.fuzz_cases, options.seed, scratch)
+            figures |= found | {"failures": figures["failures"] + found["failures"]}
+    return figures | {"peak_rss_mb": round(server.peak_mb(), 1)}
 
 
 def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Case]) -> Json:
-    """How the server at ``port`` answers ``cases``."""
+    """Answers of the server at ``port`` to ``cases``: number per status, and failures."""
     statuses, failures = Counter[int](), list[str]()
     for number, case in enumerate(cases):
         status, wrong = _sent(http, port, case, names)
@@ -83,15 +87,14 @@ def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Cas
             failures.append(f"{case.method} {case.path[:80]}, {case.name}: {wrong}")
         if number % 100 == 0 or number + 1 == len(cases):
             _still_well(http, names, failures, case)
-            print(f"\rabused {number + 1} of {len(cases)}  ", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+            show(f"hostile requests: {number + 1} of {len(cases)}", last=number + 1 == len(cases))
     errors = sum(count for status, count in statuses.items() if status >= 500)
     counted = {str(status): count for status, count in sorted(statuses.items())}
     return {"cases": len(cases), "server_errors": errors, "failures": failures, "statuses": counted}
 
 
 def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, str]:
-    """Its status (0 where a bare socket got none), and what is wrong with the answer."""
+    """Status of the answer (0 if a bare socket got none), and what is wrong with it."""
     if case.raw:
         return _raw(port, case.raw), ""
     path, more = case.path, dict(case.more)
@@ -102,7 +105,7 @@ def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, 
     try:
         answer = http.request(case.method, path, **more)
     except (httpx.InvalidURL, httpx.LocalProtocolError, UnicodeError):
-        return 0, ""  # nothing that a client of HTTP can send
+        return 0, ""  # an HTTP client cannot send it
     except httpx.TransportError as error:
         return 0, f"no answer: {error!r}"
     return answer.status_code, _wrong(case, answer)
@@ -113,9 +116,9 @@ def _wrong(case: Case, answer: httpx.Response) -> str:
     if status >= 500:
         return f"{status} {answer.text[:300]}"
     if status < 400:
-        return f"{status}, though it must be refused" if case.answer == "refused" else ""
+        return f"{status}, but the request must be refused" if case.answer == "refused" else ""
     if case.answer == "accepted":
-        return f"{status}, though it is good: {answer.text[:300]}"
+        return f"{status}, but the request is valid: {answer.text[:300]}"
     if answer.headers.get("Content-Type") != "application/problem+json":
         return f"{status} {answer.headers.get('Content-Type')}: {answer.text[:100]}"
     text = answer.text
@@ -135,8 +138,8 @@ def _raw(port: int, data: bytes) -> int:
 def _still_well(http: httpx.Client, names: Json, failures: list[str], after: Case) -> None:
     answer = http.get(f"/v1/runs/{names['{run}']}")
     if answer.status_code != 200:
-        failures.append(f"after {after.name}: a good request is answered with {answer.status_code}")
-    good.cancel_queued(http)
+        failures.append(f"after {after.name}: a valid request is answered with {answer.status_code}")
+    valid_inputs.cancel_queued(http)
 
 
 if __name__ == "__main__":

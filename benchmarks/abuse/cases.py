@@ -1,4 +1,4 @@
-"""One malformed or hostile request."""
+"""A malformed or hostile request."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 @dataclass(frozen=True)
 class Case:
-    """A request that must be refused, or do no harm.
+    """A request that must be refused, or must do no harm.
 
     Attributes:
         name: what is wrong with it.
         method: of HTTP.
-        path: with its query; ``{dataset}``, ``{run}`` and ``{recording}`` stand for good ones.
+        path: with its query; ``{dataset}``, ``{run}`` and ``{recording}`` are replaced by existing ones.
         more: arguments of the HTTP client.
         raw: bytes to send on a bare socket instead.
-        answer: that it must be refused, may be, or must not be.
+        answer: "refused" if it must be refused, "any" if it may be, "accepted" if it must not be.
     """
 
     name: str

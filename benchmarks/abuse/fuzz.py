@@ -1,11 +1,11 @@
-"""schemathesis over the server's own description of its API: every phase, and thousands of cases.
+"""Runs schemathesis on the server's OpenAPI description: every phase, and thousands of cases.
 
-The check ``positive_data_acceptance`` is left out. It takes for a fault that a request valid in form is answered with
-422, as it must be where its content cannot be meant, such as a dataset that does not exist.
+The check ``positive_data_acceptance`` is excluded: it reports a request of valid form that is answered with 422, which
+is right if, for example, its dataset does not exist.
 
-Most made-up requests would end at the first name in them, so what is meant to be valid gets good values
-(:mod:`benchmarks.abuse.filling`). Events of a job that has not ended are read for ``STREAM_SECONDS`` only. What the
-fuzzer submits is cancelled while it waits; a job that fails by a mistake of the server counts as a failure as well.
+Requests that are meant to be valid get valid values (:mod:`benchmarks.abuse.valid_values`), since most generated ones
+would be refused because of their first id. Events of an unfinished job are read for ``STREAM_SECONDS`` only. Submitted
+jobs are cancelled while they wait; a job that fails by an error of the server counts as a failure too.
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ from typing import Any
 
 import httpx
 
-from benchmarks.abuse import good, uploads
-from benchmarks.common.ray_nodes import REPOSITORY
-from benchmarks.durability.works import archive
+from benchmarks.abuse import uploads, valid_inputs
+from benchmarks.common.files import REPOSITORY, archive
 
 Json = dict[str, Any]
-MISSING = "the fuzzer is not installed; install it: pip install -e .[fuzz], or do without: --no-fuzz"
+MISSING = "the fuzzer is not installed; install it with pip install -e .[fuzz], or give --no-fuzz"
 SPECIFICATION = "/openapi.json"
 MISTAKE = "the server made a mistake"
 ANSWER_SECONDS, STREAM_SECONDS, RELIEF_SECONDS, ROUND_SECONDS = 60.0, 5.0, 2.0, 7200.0
@@ -46,14 +45,17 @@ request-timeout = {STREAM_SECONDS}
 
 
 def program() -> str | None:
-    """Where schemathesis is: beside this Python, or on the path."""
+    """Path of schemathesis: beside this Python, or on the search path."""
     beside = Path(sys.executable).with_name("st")
     return str(beside) if beside.is_file() else shutil.which("st")
 
 
 def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed: int, scratch: Path) -> Json:
-    """At least ``cases`` cases, and what failed; of one ``seed`` the same ones, but for ids."""
-    folder = _given(good.values(http, named), seed, scratch / "fuzz")
+    """Run at least ``cases`` cases; number of cases and failures.
+
+    The same ``seed`` gives the same cases, apart from ids.
+    """
+    folder = _given(valid_inputs.values(http, named), seed, scratch / "fuzz")
     sent, failures = 0, list[str]()
     with _relieved(str(http.base_url)):
         for report in _rounds(st, http, cases, seed, folder):
@@ -62,30 +64,30 @@ def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed:
             print(f"fuzzed {sent} of {cases}", file=sys.stderr, flush=True)
     failures += _mistakes(http)
     if sent < cases:
-        failures.append(f"fuzz: {sent} cases in {MOST_ROUNDS} rounds; {cases} were asked for")
+        failures.append(f"fuzz: {sent} cases in {MOST_ROUNDS} rounds; {cases} are required")
     return {"fuzz_cases": sent, "fuzz_failures": len(failures), "failures": failures}
 
 
 def counted(report: Json) -> int:
-    """How many requests a round sent."""
+    """Number of requests that a round sent."""
     return int(report["test_cases"]["generated"])
 
 
 def judged(report: Json) -> list[str]:
-    """What is wrong by the report of a round; a round that ended early or left out a call is wrong as well."""
+    """Failures in the report of a round; a round that ended early or omitted an operation is a failure too."""
     found = [(one, f" in {', '.join(one['operations'])}") for one in report["failures"]]
     found += [(one, "") for one in report["errors"]]
-    said = [f"fuzz: {one['title']}, {one['count']} times{where}" for one, where in found]
+    failures = [f"fuzz: {one['title']}, {one['count']} times{where}" for one, where in found]
     calls = report["operations"] or {"tested": 0, "total": "all"}
     if not report["complete"] or report["stop_reason"] != "completed":
-        said.append(f"fuzz: ended early, {report['stop_reason']}")
+        failures.append(f"fuzz: ended early, {report['stop_reason']}")
     if calls["tested"] != calls["total"]:
-        said.append(f"fuzz: {calls['tested']} of {calls['total']} calls of the API")
-    return said
+        failures.append(f"fuzz: {calls['tested']} of {calls['total']} calls of the API")
+    return failures
 
 
 def _given(values: Json, seed: int, folder: Path) -> Path:
-    """What the hooks read, and the configuration."""
+    """Write the input of the hooks and the configuration."""
     folder.mkdir()
     (folder / "good.json").write_text(json.dumps({"good": values, "seed": seed}), encoding="utf-8")
     (folder / "tracks.zip").write_bytes(uploads.small_archive())
@@ -95,7 +97,7 @@ def _given(values: Json, seed: int, folder: Path) -> Path:
 
 
 def _rounds(st: str, http: httpx.Client, cases: int, seed: int, folder: Path) -> Iterator[Json]:
-    """Reports, until the cases are enough. Only the first has the phases that do not depend on chance."""
+    """Reports until there are enough cases. Only the first round has the deterministic phases."""
     url = str(http.base_url.join(SPECIFICATION))
     calls = sum(len(methods) for methods in http.get(SPECIFICATION).json()["paths"].values())
     missing = cases
@@ -120,7 +122,7 @@ def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Pat
     # fmt: on
     hooks = {"SCHEMATHESIS_HOOKS": "benchmarks.abuse.fuzz_hooks", "WINGFIT_FUZZ_GOOD": str(folder)}
     with log.open("wb") as stream:
-        ended = subprocess.run(  # noqa: S603  the fuzzer that was asked for
+        ended = subprocess.run(  # noqa: S603  our own arguments
             command,
             env={**os.environ, "PYTHONPATH": str(REPOSITORY), **hooks},
             cwd=folder,
@@ -133,21 +135,21 @@ def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Pat
         lines = log.read_text(encoding="utf-8", errors="replace").splitlines()[-LAST_LINES:]
         print("\n".join(line[:LONGEST_LINE] for line in lines), file=sys.stderr)
     if not report.is_file():
-        raise RuntimeError(f"schemathesis ended with {ended.returncode} and without a report; its words stand above")
-    told: Json = json.loads(report.read_text(encoding="utf-8"))
-    return told
+        raise RuntimeError(f"schemathesis ended with {ended.returncode} and wrote no report; its output is above")
+    written: Json = json.loads(report.read_text(encoding="utf-8"))
+    return written
 
 
 @contextmanager
 def _relieved(url: str) -> Iterator[None]:
-    """Within the block, what was submitted and waits is cancelled."""
+    """Cancel waiting jobs during the block."""
     done = threading.Event()
 
     def relieve() -> None:
         with httpx.Client(base_url=url, timeout=ANSWER_SECONDS) as http:
             while not done.wait(RELIEF_SECONDS):
-                with suppress(httpx.TransportError):  # of a server that is gone the fuzzer will tell
-                    good.cancel_queued(http)
+                with suppress(httpx.TransportError):  # the fuzzer reports a server that is gone
+                    valid_inputs.cancel_queued(http)
 
     thread = threading.Thread(target=relieve, daemon=True)
     thread.start()
@@ -159,7 +161,7 @@ def _relieved(url: str) -> Iterator[None]:
 
 
 def _mistakes(http: httpx.Client) -> list[str]:
-    """Jobs that failed by no fault of the request."""
+    """Jobs that failed by an error of the server."""
     failed = [one for kind in ("runs", "diagnoses") for one in _all(http, f"/v1/{kind}?state=FAILED&limit=200")]
     return [f"fuzz: {one['id']}: {one['error']}" for one in failed if MISTAKE in (one["error"] or "")]
 

@@ -1,4 +1,7 @@
-"""What schemathesis loads (``SCHEMATHESIS_HOOKS``): fills those parts of a request that are meant to be valid."""
+"""Hooks that schemathesis loads (``SCHEMATHESIS_HOOKS``).
+
+Put valid values into those parts that are meant to be valid.
+"""
 
 from __future__ import annotations
 
@@ -10,39 +13,39 @@ from typing import Any
 import schemathesis
 from schemathesis import GenerationMode
 
-from benchmarks.abuse.filling import Filling
+from benchmarks.abuse.valid_values import ValidValues
 
 GIVEN = "WINGFIT_FUZZ_GOOD"
 FORM = "multipart/form-data"
 
 
-def _filling() -> Filling:
+def _valid_values() -> ValidValues:
     folder = Path(os.environ[GIVEN])
     given = json.loads((folder / "good.json").read_text(encoding="utf-8"))
     archives = [path.read_bytes() for path in sorted(folder.glob("*.zip"))]
-    return Filling(given["good"], archives, given["seed"])
+    return ValidValues(given["good"], archives, given["seed"])
 
 
-FILLING = _filling()
+VALUES = _valid_values()
 
 
 def before_call(context: Any, case: Any, kwargs: dict[str, Any]) -> None:  # noqa: ARG001  as they call it
-    """Fill what is valid; what was made invalid on purpose stays."""
-    dice = FILLING.dice(case.method, case.path, case.path_parameters, case.query, str(case.body))
-    kind = FILLING.kind(case.path, dice)
+    """Put values into the valid parts; those that were made invalid on purpose stay."""
+    dice = VALUES.dice(case.method, case.path, case.path_parameters, case.query, str(case.body))
+    kind = VALUES.kind(case.path, dice)
     valid = _valid(case)
     if case.method == "DELETE":
-        case.path_parameters = FILLING.spared(case.path_parameters)
+        case.path_parameters = VALUES.spared(case.path_parameters)
     elif "path" in valid:
-        case.path_parameters = FILLING.parameters(case.path_parameters, kind, dice)
+        case.path_parameters = VALUES.parameters(case.path_parameters, kind, dice)
     if "query" in valid:
-        case.query = FILLING.parameters(case.query, kind, dice)
+        case.query = VALUES.parameters(case.query, kind, dice)
     if "header" in valid:
-        case.headers = FILLING.headers(case.headers, dice)
+        case.headers = VALUES.headers(case.headers, dice)
     if "body" in valid and case.media_type == FORM:
-        kwargs.update(FILLING.upload(case.body, dice))
+        kwargs.update(VALUES.upload(case.body, dice))
     elif "body" in valid:
-        case.body = FILLING.body(case.body, kind, dice)
+        case.body = VALUES.body(case.body, kind, dice)
 
 
 def _valid(case: Any) -> set[str]:

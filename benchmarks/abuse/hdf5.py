@@ -1,8 +1,4 @@
-"""NetCDF files that were damaged by a bit or a byte, and files that were crafted to take memory or time.
-
-Each is answered, soon; the server and what it starts hold little memory meanwhile; and whoever else uses the server
-does not notice.
-"""
+"""NetCDF files with a changed byte, and files that are crafted to take much memory or time."""
 
 from __future__ import annotations
 
@@ -24,6 +20,7 @@ import httpx
 import numpy as np
 
 from benchmarks.abuse import uploads
+from benchmarks.common.progress import show
 from benchmarks.common.server_process import Server, descendants
 
 Json = dict[str, Any]
@@ -34,15 +31,15 @@ AT_ONCE = 2
 HEAP = b"GCOL"
 HEAP_BYTES = 512
 MIB = 2**20
-ANSWER_SECONDS = 120.0  # beyond it there is no answer
+ANSWER_SECONDS = 120.0  # time limit of an upload
 SLOWEST_SECONDS, PEAK_MB = 20.0, 1024.0
-READ_SECONDS, UPLOAD_SECONDS = 2.0, 20.0  # longer than that is "blocked"
+READ_SECONDS, UPLOAD_SECONDS = 2.0, 20.0  # longest acceptable time of other clients' requests
 LOOK_SECONDS, OTHERS_SECONDS = 0.02, 0.2
 UPLOAD_EVERY = 25
 
 
 def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int, mutated: int = MUTATED) -> Json:
-    """Upload all of them; how long the slowest took, what was held in memory, and who else had to wait."""
+    """Upload all files; time of the slowest, peak memory, and delays of other clients."""
     files = [*crafted(), *_mutated(seed, mutated)]
     answers = _Answers(len(files))
     with _Others(str(http.base_url), names) as others, _Memory(server) as memory, ThreadPoolExecutor(AT_ONCE) as pool:
@@ -70,7 +67,7 @@ def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int,
 
 
 def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
-    """Good files with one byte changed: half of them anywhere, half in the heaps that hold their texts."""
+    """Valid files with one changed byte: half of them anywhere, half in the heaps that hold the texts."""
     rng, good = np.random.default_rng([seed, 5]), uploads.netcdf_example()
     heaps = [at for at in range(len(good)) if good.startswith(HEAP, at)]
     for number in range(count):
@@ -85,12 +82,12 @@ def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
 
 
 def crafted() -> Iterator[tuple[str, bytes]]:
-    """Files that are valid HDF5, and mean no good."""
+    """Valid HDF5 files with hostile contents."""
     for name, make in CRAFTED.items():
         yield f"crafted NetCDF, {name}", _changed(make)
     good = uploads.netcdf_example()
     for at in range(len(good)):
-        if good.startswith(HEAP, at):  # in the size of its first object; the library loops for ever in at least one
+        if good.startswith(HEAP, at):  # change the size of its first object; with some values the library never returns
             looping = bytearray(good)
             looping[at + 25] ^= 4
             yield f"crafted NetCDF, an object of the heap at {at} that never ends", bytes(looping)
@@ -110,7 +107,7 @@ def _group(file: h5py.File) -> Any:
 
 
 def _with(name: str, **options: Any) -> Make:
-    """A variable of the same shape, stored otherwise."""
+    """A variable of the same shape with other storage options."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -129,7 +126,7 @@ def _huge_attribute(file: h5py.File) -> None:
 
 
 def _bomb(times: int) -> Make:
-    """A chunk that unpacks to 500 MB and more, whatever the variable declares; ``times`` it was packed."""
+    """A chunk that unpacks to 500 MB or more, whatever the variable declares, compressed ``times`` times."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -155,7 +152,7 @@ def _zeros(mib: int) -> bytes:
 
 
 def _large(instants: int, **options: Any) -> Make:
-    """As many numbers as may be read, in a file of some kilobytes."""
+    """As many numbers as are allowed, in a file of some kilobytes."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -245,12 +242,12 @@ CRAFTED: dict[str, Make] = {
 }
 
 
-# -- what is measured --------------------------------------------------------------------------------------
+# -- measurements ------------------------------------------------------------------------------------------
 
 
 @dataclass
 class _Answers:
-    """What the uploads were answered."""
+    """Answers to the uploads."""
 
     total: int
     done: int = 0
@@ -261,7 +258,7 @@ class _Answers:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(self, name: str, status: int, seconds: float, text: str) -> None:
-        """One more."""
+        """Record an answer."""
         with self.lock:
             self.done += 1
             self.accepted += status == 201
@@ -270,7 +267,7 @@ class _Answers:
             if status not in (201, 422):
                 self.failures.append(f"{name}: {status} {text[:200]}")
             if self.done % 20 == 0 or self.done == self.total:
-                print(f"\rHDF5 files {self.done} of {self.total}  ", end="", file=sys.stderr, flush=True)
+                show(f"HDF5 files: {self.done} of {self.total}", last=self.done == self.total)
 
 
 def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:
@@ -287,14 +284,14 @@ def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:
 
 
 class _Thread:
-    """Does something again and again within a ``with`` block."""
+    """Repeats an action during a ``with`` block."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds, self._over = seconds, threading.Event()
         self._thread = threading.Thread(target=self._go, daemon=True)
 
     def look(self) -> None:
-        """Once."""
+        """Perform the action once."""
         raise NotImplementedError
 
     def _go(self) -> None:
@@ -311,14 +308,14 @@ class _Thread:
 
 
 class _Memory(_Thread):
-    """The most that the server and all that it started held at the same time."""
+    """Peak memory of the server and its descendants together."""
 
     def __init__(self, server: Server) -> None:
         super().__init__(LOOK_SECONDS)
         self._server, self.peak_mb = server, 0.0
 
     def look(self) -> None:
-        """Now."""
+        """Read the present memory."""
         held = sum(_resident_mb(pid) for pid in (self._server.pid, *descendants(self._server.pid)))
         self.peak_mb = max(self.peak_mb, held)
 
@@ -331,7 +328,7 @@ def _resident_mb(pid: int) -> float:
 
 
 class _Others(_Thread):
-    """Those who use the server meanwhile."""
+    """Other clients of the server."""
 
     def __init__(self, url: str, names: dict[str, str]) -> None:
         super().__init__(OTHERS_SECONDS)
@@ -341,7 +338,7 @@ class _Others(_Thread):
         self.failures: list[str] = []
 
     def look(self) -> None:
-        """Read, and now and then upload."""
+        """Read, and sometimes upload."""
         with httpx.Client(base_url=self._url, timeout=ANSWER_SECONDS) as http:
             for path in self._paths:
                 seconds = self._timed(path, lambda path=path: http.get(path), 200, READ_SECONDS)  # type: ignore[misc]
@@ -350,16 +347,16 @@ class _Others(_Thread):
             if self._count % UPLOAD_EVERY == 0:
                 files = {"file": ("good.zip", self._good)}
                 send = lambda: http.post("/v1/datasets", files=files)  # noqa: E731
-                self.slowest_upload = max(self.slowest_upload, self._timed("a good upload", send, 201, UPLOAD_SECONDS))
+                self.slowest_upload = max(self.slowest_upload, self._timed("a valid upload", send, 201, UPLOAD_SECONDS))
 
     def _timed(self, what: str, send: Callable[[], httpx.Response], status: int, most: float) -> float:
         began = time.monotonic()
         try:
             answered = send().status_code
         except httpx.TransportError as error:
-            self.failures.append(f"beside hostile files, {what}: {error!r}")
+            self.failures.append(f"during hostile uploads, {what}: {error!r}")
             return time.monotonic() - began
         seconds = time.monotonic() - began
         if answered != status or seconds > most:
-            self.failures.append(f"beside hostile files, {what}: {answered} after {seconds:.1f} s")
+            self.failures.append(f"during hostile uploads, {what}: {answered} after {seconds:.1f} s")
         return seconds

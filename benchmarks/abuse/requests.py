@@ -1,4 +1,4 @@
-"""Hostile bodies, queries, headers and paths, on every call."""
+"""Hostile bodies, queries, headers and paths, for every operation of the API."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ HEADERS: tuple[tuple[str, Mapping[str, str]], ...] = (
     ("range", {"Range": "bytes=0-,0-,0-,0-"}),
     ("origin", {"Origin": "http://evil.example"}),
     ("host", {"Host": "evil.example"}),
-    ("host of nothing", {"Host": ""}),
+    ("empty host", {"Host": ""}),
     ("forwarded", {"X-Forwarded-For": "127.0.0.1", "X-Forwarded-Host": "evil.example", "X-Forwarded-Proto": "x"}),
     ("override", {"X-HTTP-Method-Override": "DELETE"}),
     ("bearer", {"Authorization": "Bearer " + "x" * 7000}),
@@ -211,7 +211,7 @@ RAW = (
     ("two lengths", _POST + b"Content-Length: 2\r\nContent-Length: 5\r\n\r\n{}"),
     ("length and chunks", _CHUNKED + b"Content-Length: 2\r\n\r\n0\r\n\r\n"),
     ("negative length", _POST + b"Content-Length: -1\r\n\r\n"),
-    ("length that lies", _POST + b"Content-Length: 100\r\n\r\n{}"),
+    ("wrong length", _POST + b"Content-Length: 100\r\n\r\n{}"),
     ("endless header", _GET + b"X: " + b"x" * 200_000),
     ("many headers", _GET + b"X: 1\r\n" * 5000 + b"\r\n"),
     ("header with a null", _GET + b"X: a\0b\r\n\r\n"),
@@ -221,14 +221,14 @@ RAW = (
     ("path with a space", b"GET /v1/runs /x HTTP/1.1\r\nHost: localhost\r\n\r\n"),
     ("path of 100,000", b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n"),
     ("chunk of a huge size", _CHUNKED + b"\r\nffffffffffffffff\r\n"),
-    ("chunk that is none", _CHUNKED + b"\r\nxyz\r\n"),
+    ("invalid chunk", _CHUNKED + b"\r\nxyz\r\n"),
     ("upgrade", _GET + b"Upgrade: websocket\r\nConnection: Upgrade\r\n\r\n"),
     ("pipelined", b"GET /v1/health HTTP/1.1\r\nHost: localhost\r\n\r\n" * 200),
 )
 
 
 def cases() -> Iterator[Case]:
-    """All of them."""
+    """All requests."""
     for path, good in BODIES.items():
         yield from _bodies(path, good)
     for path in GETS:
@@ -248,11 +248,11 @@ def cases() -> Iterator[Case]:
 
 
 def _bodies(path: str, good: Json) -> Iterator[Case]:
-    if path != "/v1/session":  # of which the key is not known here
-        yield Case("as it should be", "POST", path, _sent(good), answer="accepted")
+    if path != "/v1/session":  # whose key is not known here
+        yield Case("valid body", "POST", path, _sent(good), answer="accepted")
     for field in good:
         for edge in EDGES:
-            # many are good values of some field: what matters is how they are answered
+            # some are valid values of a field, so any answer but 5xx is allowed
             yield _json(f"{field} = {str(edge)[:30]!r}", path, good | {field: edge})
     yield _json("an unknown field", path, good | {"unknown": 1})
     yield _json("every field too many", path, {f"f{k}": k for k in range(5000)})
@@ -268,5 +268,5 @@ def _json(what: str, path: str, body: Json) -> Case:
 
 
 def _sent(body: Json) -> Json:
-    text = json.dumps(body).encode()  # ASCII: a lone surrogate goes as an escape
+    text = json.dumps(body).encode()  # ASCII, so that a lone surrogate is escaped
     return {"content": text, "headers": {"Content-Type": "application/json"}}

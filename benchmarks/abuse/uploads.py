@@ -1,4 +1,4 @@
-"""Hostile archives, and good ones that were damaged."""
+"""Hostile archives, and damaged copies of valid ones."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from benchmarks.abuse.cases import Case, upload
-from benchmarks.common.ray_nodes import REPOSITORY
+from benchmarks.common.files import EXAMPLES
 from wingfit.records import load_archive, save_dataset
 
-EXAMPLE = REPOSITORY / "examples" / "robird"
+EXAMPLE = EXAMPLES / "robird"
 TRACKS = "recordings/vac-0010mbar-lag0-2.0hz.csv"
 YAML = "dataset.yaml"
 FLIPS = 60
@@ -60,10 +60,10 @@ TEXTS = (
 
 
 def cases(seed: int) -> Iterator[Case]:
-    """All of them; the same seed, the same bytes."""
-    good = _files()
+    """All uploads; the same seed gives the same bytes."""
+    good = example_files()
     yield from _archives(good)
-    yield from _damaged("zip", _zipped(good), np.random.default_rng([seed, 1]))
+    yield from _damaged("zip", zipped(good), np.random.default_rng([seed, 1]))
     yield from _damaged("netcdf", _netcdf(good), np.random.default_rng([seed, 2]), ".nc")
     yield from _cells(good)
     yield from _descriptions(good)
@@ -71,17 +71,17 @@ def cases(seed: int) -> Iterator[Case]:
 
 
 def small_archive() -> bytes:
-    """A good dataset with one recording, as a zip."""
-    return _zipped(_files())
+    """A valid dataset with one recording, as a zip archive."""
+    return zipped(example_files())
 
 
 def netcdf_example() -> bytes:
     """The same dataset as NetCDF."""
-    return _netcdf(_files())
+    return _netcdf(example_files())
 
 
-def _files() -> dict[str, bytes]:
-    """The example, with its first recording only."""
+def example_files() -> dict[str, bytes]:
+    """The files of the example dataset with its first recording only."""
     import yaml
 
     description = yaml.safe_load((EXAMPLE / YAML).read_text(encoding="utf-8"))
@@ -91,7 +91,7 @@ def _files() -> dict[str, bytes]:
     return {YAML: text.encode(), TRACKS: (EXAMPLE / TRACKS).read_bytes()}
 
 
-def _zipped(files: Mapping[str, bytes]) -> bytes:
+def zipped(files: Mapping[str, bytes]) -> bytes:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files.items():
@@ -99,8 +99,8 @@ def _zipped(files: Mapping[str, bytes]) -> bytes:
     return packed.getvalue()
 
 
-def _with(good: Mapping[str, bytes], name: str, data: bytes = b"x", mode: int = 0) -> bytes:
-    packed = io.BytesIO(_zipped(good))
+def zipped_with(good: Mapping[str, bytes], name: str, data: bytes = b"x", mode: int = 0) -> bytes:
+    packed = io.BytesIO(zipped(good))
     with zipfile.ZipFile(packed, "a") as archive:
         entry = zipfile.ZipInfo(name)
         entry.filename = entry.orig_filename = name
@@ -123,33 +123,33 @@ def _archives(good: Mapping[str, bytes]) -> Iterator[Case]:
         "con",
     )
     for name in names:
-        # a name that leads nowhere may stand in an archive: what matters is that it is never followed
-        yield upload(f"entry called {name[:20]!r}", _with(good, name), answer="any")
-    yield upload("symbolic link", _with(good, "l", b"/etc/passwd", stat.S_IFLNK | 0o777))
-    yield upload("device", _with(good, "d", b"", stat.S_IFCHR | 0o666), answer="any")
-    yield upload("bomb of one file", _zipped({**good, "recordings/z.csv": b"," * 60_000_000}))
-    yield upload("bomb of many files", _zipped({**good, **{f"r/{k}.csv": b"0" * 2_000_000 for k in range(40)}}))
-    yield upload("many entries", _zipped({f"{k}.txt": b"" for k in range(6000)}))
-    yield upload("archive in an archive", _zipped({"inner.zip": _zipped(good)}))
-    yield upload("two of one name", _with(good, YAML, good[YAML]))
-    yield upload("names apart in case only", _with(good, YAML.upper(), good[YAML]), answer="any")
-    yield upload("nothing", b"")
+        # unusual names may be accepted, but no file may be written under them
+        yield upload(f"entry called {name[:20]!r}", zipped_with(good, name), answer="any")
+    yield upload("symbolic link", zipped_with(good, "l", b"/etc/passwd", stat.S_IFLNK | 0o777))
+    yield upload("device", zipped_with(good, "d", b"", stat.S_IFCHR | 0o666), answer="any")
+    yield upload("bomb of one file", zipped({**good, "recordings/z.csv": b"," * 60_000_000}))
+    yield upload("bomb of many files", zipped({**good, **{f"r/{k}.csv": b"0" * 2_000_000 for k in range(40)}}))
+    yield upload("many entries", zipped({f"{k}.txt": b"" for k in range(6000)}))
+    yield upload("archive in an archive", zipped({"inner.zip": zipped(good)}))
+    yield upload("two of one name", zipped_with(good, YAML, good[YAML]))
+    yield upload("names that differ in case only", zipped_with(good, YAML.upper(), good[YAML]), answer="any")
+    yield upload("empty file", b"")
     yield upload("a text", b"hello")
     yield upload(
         "a pickle", b"\x80\x04\x95\x1f\x00\x00\x00\x00\x00\x00\x00\x8c\x05posix\x94\x8c\x06system\x94\x93\x94."
     )
     yield upload("a sqlite file", b"SQLite format 3\0" + b"\0" * 5000, "x.nc")
-    yield upload("an empty archive", _zipped({}))
-    yield upload("no description", _zipped({TRACKS: good[TRACKS]}))
-    yield upload("no recording", _zipped({YAML: good[YAML]}))
+    yield upload("an empty archive", zipped({}))
+    yield upload("no description", zipped({TRACKS: good[TRACKS]}))
+    yield upload("no recording", zipped({YAML: good[YAML]}))
     yield upload("a gzip", b"\x1f\x8b\x08\0\0\0\0\0\0\3" + b"\0" * 100, "x.zip")
     for offset, value, what in (
         (8, b"\1\0", "encrypted"),
         (10, b"\x0e\0", "lzma"),
-        (24, b"\xff\xff\xff\x7f", "size that lies"),
+        (24, b"\xff\xff\xff\x7f", "wrong size"),
     ):
-        yield upload(f"zip entry: {what}", _patched(_zipped(good), offset, value))
-    lie = bytearray(_zipped(good))
+        yield upload(f"zip entry: {what}", _patched(zipped(good), offset, value))
+    lie = bytearray(zipped(good))
     end = lie.rfind(b"PK\5\6")
     lie[end + 16 : end + 20] = struct.pack("<I", 0)  # all entries begin at 0
     yield upload("overlapping entries", bytes(lie))
@@ -168,7 +168,7 @@ def _netcdf(good: Mapping[str, bytes]) -> bytes:
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "good.nc"
-        save_dataset(load_archive(_zipped(good), "good.zip"), path)
+        save_dataset(load_archive(zipped(good), "good.zip"), path)
         return path.read_bytes()
 
 
@@ -215,12 +215,12 @@ def _cells(good: Mapping[str, bytes]) -> Iterator[Case]:
         ("zeros", b"\0" * 100_000),
         ("noise", np.random.default_rng(3).bytes(50_000)),
     ):
-        yield upload(f"table in {what}", _zipped({**good, TRACKS: data}))
+        yield upload(f"table in {what}", zipped({**good, TRACKS: data}))
 
 
 def _table(good: Mapping[str, bytes], what: str, lines: list[str]) -> Case:
     data = "\n".join([*lines, ""]).encode("utf-8", "surrogatepass")
-    return upload(f"table: {what}", _zipped({**good, TRACKS: data}), answer="any")
+    return upload(f"table: {what}", zipped({**good, TRACKS: data}), answer="any")
 
 
 def _descriptions(good: Mapping[str, bytes]) -> Iterator[Case]:
@@ -228,7 +228,7 @@ def _descriptions(good: Mapping[str, bytes]) -> Iterator[Case]:
     for old, new in TEXTS:
         if old in text:
             changed = text.replace(old, new, 1).encode("utf-8", "surrogatepass")
-            yield upload(f"description: {new[:30]!r}", _zipped({**good, YAML: changed}), answer="any")
+            yield upload(f"description: {new[:30]!r}", zipped({**good, YAML: changed}), answer="any")
     laughs = "a0: &a0 [x, x]\n" + "".join(f"a{k}: &a{k} [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 40))
     for what, data in (
         ("aliases of aliases", laughs.encode()),
@@ -244,11 +244,11 @@ def _descriptions(good: Mapping[str, bytes]) -> Iterator[Case]:
         ("17 MB", b"# " + b"x" * 17_000_000),
         ("an integer of 5,000 digits", b"name: x\nversion: " + b"9" * 5000),
     ):
-        yield upload(f"description: {what}", _zipped({**good, YAML: data}))
+        yield upload(f"description: {what}", zipped({**good, YAML: data}))
 
 
 def _forms(good: Mapping[str, bytes]) -> Iterator[Case]:
-    data = _zipped(good)
+    data = zipped(good)
     for filename in ("", "x", "x.exe", "../../x.zip", "x.zip\0.nc", "x" * 3000 + ".zip", "é.zip", "con.zip"):
         yield upload(f"file called {filename[:20]!r}", data, filename, answer="any")
     for name in ("", "x" * 201, "\0", "\ud800"):

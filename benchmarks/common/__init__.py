@@ -1,1 +1,1 @@
-"""Parts of several benchmarks: the machine, servers as processes, Ray nodes, figures."""
+"""Shared by several benchmarks: machine, files, jobs, progress, servers and Ray nodes as processes, figures."""

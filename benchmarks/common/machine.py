@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def cpu() -> str:
-    """Name of the processor and number of cores given to this process."""
+    """Name of the processor, and number of cores available to this process."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -22,7 +22,7 @@ def cpu() -> str:
 
 
 def commit() -> str:
-    """Commit of the working tree, with ``+`` when it has changes; empty outside a repository."""
+    """Commit of the working tree, with ``+`` if it has changes; empty outside a repository."""
     here = Path(__file__).parent
     try:
         head = subprocess.run(

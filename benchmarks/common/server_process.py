@@ -1,4 +1,4 @@
-"""A server as a process of its own, over a data folder, and the ways in which it dies."""
+"""A server as a process of its own with a data folder, and the ways to kill it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from pathlib import Path
 
 import httpx
 
-from benchmarks.common.ray_nodes import REPOSITORY, environment, free_port
+from benchmarks.common.files import REPOSITORY
+from benchmarks.common.ray_node import environment, free_port
 
 START_SECONDS = 120.0
 DIE_SECONDS = 30.0
@@ -21,7 +22,7 @@ WORKERS = 2
 
 
 class Server:
-    """A server over a data folder, on one port over all its lives."""
+    """A server with a data folder, on the same port after every restart."""
 
     def __init__(
         self,
@@ -46,7 +47,7 @@ class Server:
         self.fail_point = ""
 
     def start(self, fail_point: str = "") -> None:
-        """Start, and wait until it answers; with a fail point it may die before."""
+        """Start and wait until it answers. With a fail point it may end before."""
         self.fail_point = fail_point
         with (self.folder / "server.log").open("ab") as log:
             self._process = subprocess.Popen(
@@ -62,9 +63,9 @@ class Server:
             if self._process.poll() is not None:
                 if fail_point:
                     return
-                raise RuntimeError(f"the server ended with {self._process.returncode}: {self.tail()}")
+                raise RuntimeError(f"the server ended with exit code {self._process.returncode}: {self.tail()}")
             if time.monotonic() > deadline:
-                raise RuntimeError(f"the server does not answer: {self.tail()}")
+                raise RuntimeError(f"the server does not answer within {START_SECONDS:g} s: {self.tail()}")
             time.sleep(0.02)
 
     def answers(self) -> bool:
@@ -74,7 +75,7 @@ class Server:
         return False
 
     def peak_mb(self) -> float:
-        """Most memory that the server itself has held."""
+        """Peak memory of the server itself, MB."""
         lines = (Path("/proc") / str(self.pid) / "status").read_text().splitlines()
         return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024
 
@@ -83,7 +84,7 @@ class Server:
         return (self.folder / "server.log").read_text(errors="replace")[-2000:]
 
     def died(self, seconds: float) -> bool:
-        """Whether it dies by itself within ``seconds``."""
+        """Whether it ends by itself within ``seconds``."""
         assert self._process is not None  # noqa: S101  # started
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
@@ -91,14 +92,14 @@ class Server:
         return False
 
     def kill(self) -> None:
-        """kill -9 of the server alone."""
+        """SIGKILL to the server only."""
         assert self._process is not None  # noqa: S101  # started
         with suppress(ProcessLookupError):
             os.kill(self._process.pid, signal.SIGKILL)
         self._process.wait(DIE_SECONDS)
 
     def kill_all(self) -> None:
-        """kill -9 of the server and of all that it started, at once."""
+        """SIGKILL to the server and all its descendants."""
         victims = [self.pid, *descendants(self.pid)]
         for pid in victims:
             with suppress(ProcessLookupError):
@@ -108,16 +109,16 @@ class Server:
 
     @property
     def pid(self) -> int:
-        """Of the server."""
+        """Process id of the server."""
         assert self._process is not None  # noqa: S101  # started
         return self._process.pid
 
     def workers(self) -> list[int]:
-        """Processes that evaluate."""
+        """Process ids of the workers."""
         return [pid for pid, command in _commands(descendants(self.pid)) if _evaluates(command)]
 
     def stop(self) -> None:
-        """Ask it to end."""
+        """SIGTERM, and SIGKILL if it does not end within DIE_SECONDS."""
         assert self._process is not None  # noqa: S101  # started
         self._process.terminate()
         with suppress(subprocess.TimeoutExpired):
@@ -127,7 +128,7 @@ class Server:
 
 
 def descendants(pid: int) -> list[int]:
-    """Living processes that ``pid`` started, and that these did."""
+    """Living descendants of the process ``pid``."""
     children: dict[int, list[int]] = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError, ValueError):

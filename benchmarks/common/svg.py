@@ -13,13 +13,13 @@ Array = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 360.0, 272.0, 56.0, 12.0, 26.0, 62.0
 COLOURS = ("#222222", "#0b6fb8", "#c4500b")
-WIDTHS = (3.2, 1.4, 1.4)  # the first line shows on both sides of one that lies on it
-LETTER = 5.5  # width of a letter, about
+WIDTHS = (3.2, 1.4, 1.4)  # the first curve is wider, so that it remains visible below another one
+LETTER = 5.5  # approximate width of a letter
 
 
 @dataclass(frozen=True)
 class Line:
-    """A curve [n] with its name in the legend: crosses alone where ``crosses``, its points marked where ``dots``."""
+    """A curve [n] with its name in the legend; ``crosses``: drawn as crosses only, ``dots``: with its points marked."""
 
     name: str
     x: Array
@@ -30,7 +30,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; ``shaded`` is an interval of x, ``holds`` are values of y that the axis reaches at least."""
+    """One pair of axes; ``shaded`` is an interval of x, ``holds`` are values of y that the axis includes."""
 
     title: str
     x: str
@@ -42,7 +42,7 @@ class Panel:
 
 
 def svg(panels: Sequence[Panel], *, columns: int = 0) -> str:
-    """Panels in rows of ``columns``; side by side without."""
+    """Panels in rows of ``columns``; all in one row by default."""
     across = columns or len(panels)
     width, height = WIDTH * across, HEIGHT * -(-len(panels) // across)
     parts = [

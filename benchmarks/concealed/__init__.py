@@ -1,1 +1,1 @@
-"""Concealed trials: data with physics hidden in them, answers under seal, the diagnosis run as a user runs it."""
+"""Concealed trials: recordings with hidden physics, sealed answers, and the diagnosis run as a user runs it."""

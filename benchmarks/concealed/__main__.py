@@ -1,7 +1,7 @@
 """Concealed trials of the diagnosis.
 
-``python -m benchmarks.concealed --json`` runs the whole suite and ends with one JSON object. ``--make DIR --n K`` only
-leaves datasets for development behind, from other seeds than any suite's; answers lie beside them, for whoever looks.
+``python -m benchmarks.concealed --json`` runs the whole suite; the last line is one JSON object. ``--make DIR --n K``
+only writes K datasets for development into DIR, with their answers beside them, from seeds that no suite uses.
 """
 
 from __future__ import annotations
@@ -17,25 +17,29 @@ from benchmarks.concealed.table import side_by_side
 from benchmarks.concealed.trials import plan
 
 DEVELOPMENT = 500_000
-"""Seeds from here on are for development; a suite's are smaller."""
+"""Seeds from this one on are for development datasets; those of a suite are smaller."""
 
 
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.concealed", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
-    parser.add_argument("--quick", action="store_true", help="a sample of the trials, in at most 8 minutes")
-    parser.add_argument("--only", action="append", choices=GROUPS, default=[], help="only this group of trials")
-    parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    parser.add_argument("--seed", type=int, default=8, help=f"below {DEVELOPMENT}; the same seed, the same table")
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.add_argument("--quick", action="store_true", help="run a sample of the trials; at most 8 minutes")
+    parser.add_argument(
+        "--only", action="append", choices=GROUPS, default=[], help="run only this group of trials; may be repeated"
+    )
+    parser.add_argument("--jobs", type=int, default=2, help="number of processes")
+    parser.add_argument("--seed", type=int, default=8, help=f"below {DEVELOPMENT}; the same seed gives the same table")
     parser.add_argument(
         "--keep",
         type=Path,
-        help="keep datasets, answers and findings in this folder, and go on with those that it holds",
+        help="store datasets, answers and findings in this folder, and resume from those already there",
     )
-    parser.add_argument("--peers", action="store_true", help="also the peers of the extra [peers]")
-    parser.add_argument("--make", type=Path, help="only leave datasets for development in this folder")
-    parser.add_argument("--n", type=int, default=10, help="how many of those")
+    parser.add_argument(
+        "--peers", action="store_true", help="also run the two comparison methods; needs the extra [peers]"
+    )
+    parser.add_argument("--make", type=Path, help="only write datasets for development into this folder")
+    parser.add_argument("--n", type=int, default=10, help="number of datasets that --make writes")
     arguments = parser.parse_args()
     if not 0 <= arguments.seed < DEVELOPMENT:
         parser.error(f"--seed is {arguments.seed}; it must lie in [0, {DEVELOPMENT})")

@@ -1,4 +1,4 @@
-"""What was hidden in a dataset: plain data, written under seal before anything is diagnosed."""
+"""The answer of a trial: what was hidden in its dataset. Plain data, sealed before anything is diagnosed."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ Side = Literal["physics", "measurement"]
 
 @dataclass(frozen=True)
 class Secret:
-    """One thing that was hidden.
+    """One effect that was hidden in a dataset.
 
     Attributes:
-        name: of the effect in the library; of what the library lacks, the plant's own name.
-        listed: whether the library has it.
+        name: of the effect in the library; for an effect that the library does not have, the plant's own name.
+        listed: whether the library has the effect.
         side: physics, or a fault of the measurement.
-        strength: the plant's own measure of its size.
-        parameters: all that the plant needs to show it again.
-        span, chord: place on the wing in parts; None where it has none.
-        phase: in beats, from the start of the beat as a dataset defines it; None where it has none.
-        values: true values of the library's genes, for those that mean the same in plant and library.
+        strength: size of the effect, in the plant's own unit.
+        parameters: everything the plant needs to simulate the effect again.
+        span, chord: place on the wing, as fractions; None for an effect without a place.
+        phase: in beats from the start of the beat as a dataset defines it; None for an effect without a phase.
+        values: true values of the library's genes, for those with the same meaning in the plant and in the library.
     """
 
     name: str
@@ -45,18 +45,20 @@ class Answer:
 
     Attributes:
         trial: its name.
-        group: what it is counted among.
+        group: the group it is counted in.
         rig: "wing" or "vehicle".
-        division: of the model that the tool is given; plant: that of the plant.
+        division: discretisation of the model to be diagnosed.
+        plant: discretisation of the plant.
         secrets: what was hidden; empty in a null trial.
         genome: true values of the nominal genes.
-        target: the strength d that was aimed at; strength: the one that the scorer's refit found.
-        strength_of_division: misfit over noise that a refit leaves of the plant with nothing hidden: by the model's
-            coarser division, and by what two simulations differ.
-        noise: root mean square of the noise of one channel in the fitted recordings; noise_held_out: in the others.
-        conditions: that were recorded, by name of the recording.
-        seed: of the trial; attempt: which draw of it the plant could run; level: of the recordings' noise, by which
-            that of the quality drawn is multiplied. With these the rig can be recorded again.
+        target: strength d that was aimed at; strength: the d that the scorer's refit measured.
+        strength_of_division: misfit / noise after the nominal model is refitted to a plant with nothing hidden; caused
+            by
+            the coarser discretisation of the model and by the differences between two solvers.
+        noise: RMS noise of one channel in the fitted recordings, m or N; noise_held_out: in the held-out ones.
+        conditions: of the recordings, by name.
+        seed: of the trial; attempt: number of the draw that the plant could simulate; level: factor on the drawn noise.
+            With these three the rig can be recorded again.
     """
 
     trial: str
@@ -78,16 +80,16 @@ class Answer:
 
     @property
     def names(self) -> frozenset[str]:
-        """Names of what was hidden."""
+        """Names of the hidden effects."""
         return frozenset(secret.name for secret in self.secrets)
 
     @property
     def finer(self) -> bool:
-        """Whether the plant is divided finer than the tool's model."""
+        """Whether the plant is discretised more finely than the model to be diagnosed."""
         return self.division != self.plant
 
     def as_json(self) -> dict[str, Any]:
-        """As JSON takes it."""
+        """A dictionary that ``json`` can write."""
         return asdict(self)
 
     @classmethod

@@ -1,10 +1,10 @@
-"""Both plants behind one interface: the rig as its user describes it, what can be hidden, how it is recorded."""
+"""Test benches: a common interface to both plants, with what can be hidden in each and how each is recorded."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeVar
@@ -12,18 +12,22 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.plant import observe, observe_forces, vehicle
-from benchmarks.concealed.plant.catalogue import KINDS
-from benchmarks.concealed.plant.hidden import Effect, Hidden, Kind
-from benchmarks.concealed.plant.observe import Filming, draw_filming, film, with_noise
-from benchmarks.concealed.plant.observe_cameras import Cameras, draw_cameras
-from benchmarks.concealed.plant.observe_forces import Weighing, draw_weighing, silent, weigh
-from benchmarks.concealed.plant.observe_law import Concealed, Law, Parameters
-from benchmarks.concealed.plant.simulate import Beat
-from benchmarks.concealed.plant.simulate import simulate as simulate_wing
-from benchmarks.concealed.plant.vehicle_laws import LAWS as VEHICLE_LAWS
+from benchmarks.concealed.plant.law import Concealed, Law, Parameters
+from benchmarks.concealed.plant.measurement.balance import FAULTS as BALANCE_FAULTS
+from benchmarks.concealed.plant.measurement.balance import Weighing, draw_weighing, silent, weigh
+from benchmarks.concealed.plant.measurement.cameras import Cameras, draw_cameras
+from benchmarks.concealed.plant.measurement.film import FAULTS as CAMERA_FAULTS
+from benchmarks.concealed.plant.measurement.film import Filming, draw_filming, film, with_noise
+from benchmarks.concealed.plant.vehicle.laws import LAWS as VEHICLE_LAWS
+from benchmarks.concealed.plant.vehicle.simulate import PROPOSED
+from benchmarks.concealed.plant.vehicle.simulate import simulate as simulate_vehicle
+from benchmarks.concealed.plant.wing.simulate import Beat
+from benchmarks.concealed.plant.wing.simulate import simulate as simulate_wing
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
+from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden
+from benchmarks.concealed.plant.wing_effects.kind import Kind
 from benchmarks.concealed.strength import rms
-from benchmarks.concealed.trials import Build
+from benchmarks.concealed.trials import Build, name_of
 from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
@@ -36,17 +40,17 @@ Array = npt.NDArray[np.float64]
 Quality = TypeVar("Quality")
 Motion = TypeVar("Motion")
 
-SPREAD = 1.6  # true parameters lie within this factor of the estimates, about
+SPREAD = 1.6  # true parameters are drawn between estimate / SPREAD and estimate * SPREAD
 LEAST_NOISE_M = 2e-4
 BALANCE_BEATS = 12
-SMALLEST, LARGEST = 0.02, 4.0  # strengths, in parts of the typical one
+SMALLEST, LARGEST = 0.02, 4.0  # limits of a strength, as multiples of the typical strength
 MOST = {"marker_swap": 1.9, "tip_loss": 2.0, "dynamic_stall": 1.4, "circulation_lag": 1.0}
-"""Largest strengths in parts of the typical ones, where a law has an end that is nearer."""
-KEPT = 64  # beats of plants that are remembered
+"""Upper limits, as multiples of the typical strength, of laws that are only valid below LARGEST."""
+KEPT = 64  # simulated beats that are cached
 
 
 class Made(NamedTuple):
-    """A recording, and the root mean square of the noise in it as it is fitted, m or N."""
+    """A recording, and the RMS of its noise after the filtering that precedes a fit, m or N."""
 
     recording: Recording
     noise: float
@@ -54,7 +58,10 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bench(ABC, Generic[Motion, Quality]):
-    """A plant with its cameras or balance: ``Motion`` is a beat of it, ``Quality`` how well it is recorded."""
+    """A plant with its cameras or balance.
+
+    ``Motion`` is the type of one simulated beat, ``Quality`` that of the settings of cameras or balance.
+    """
 
     build: Build
     beats: OrderedDict[Hashable, Motion] = field(default_factory=OrderedDict, repr=False)
@@ -62,86 +69,89 @@ class Bench(ABC, Generic[Motion, Quality]):
     @property
     @abstractmethod
     def rig(self) -> Wing | Vehicle:
-        """As its user describes it, with the estimates of the nominal genes."""
+        """The rig as its user describes it, with estimates of the nominal genes."""
 
     @property
     @abstractmethod
     def faults(self) -> Mapping[str, Law]:
-        """What can be wrong with the recording."""
+        """Faults that the measurement can have, by name."""
 
     @property
     @abstractmethod
     def physics(self) -> Mapping[str, Law]:
-        """What can be hidden in the plant."""
+        """Effects that can be hidden in the plant, by name."""
 
     @abstractmethod
     def quality(self, rng: np.random.Generator) -> Quality:
-        """How well it is recorded, drawn."""
+        """Random settings of cameras or balance."""
 
     @abstractmethod
     def quieter(self, quality: Quality, level: float) -> Quality:
-        """The same quality with its noise multiplied by ``level``."""
+        """The same settings with the noise multiplied by ``level``."""
 
     @abstractmethod
     def least(self, quality: Quality) -> float:
-        """The least such level that is met in practice."""
+        """The smallest ``level`` that real equipment reaches."""
 
     @abstractmethod
     def ideal(self, quality: Quality) -> Quality:
-        """The same without noise, and with nothing missing."""
+        """The same settings without noise and without gaps."""
 
     @abstractmethod
     def fitted(self, recording: Recording) -> Recording:
-        """A recording as everybody fits it: strengths and noise are those in its band."""
+        """The recording after the filtering that precedes every fit. Strengths and noise are measured on this."""
 
     @abstractmethod
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
-        """A beat of the plant."""
+        """Simulate a beat of the plant with the effects ``hidden``."""
 
     @abstractmethod
     def shown(
         self, beat: Motion, condition: Condition, hidden: Concealed, quality: Quality, rng: np.random.Generator
     ) -> Made:
-        """A recording of a beat."""
+        """Record a beat, with the faults ``hidden`` in the measurement."""
 
     @cached_property
     def laws(self) -> dict[str, Law]:
-        """All that can be hidden."""
+        """Everything that can be hidden, by name."""
         return {**self.physics, **self.faults}
 
     @cached_property
     def model(self) -> Model:
-        """The nominal model that the tool is given, for the scorer's refit."""
+        """The nominal model that will be diagnosed; the scorer refits it."""
         spec = CalibrationSpec(without=self.build.without)
         if self.build.division:
             spec = replace(spec, division=self.build.division)
         return model_for(Dataset("nominal", self.rig, ()), spec)
 
     def model_beside(self, genome: Mapping[str, float]) -> Model:  # noqa: ARG002
-        """The same for individuals near ``genome``."""
+        """The same model, set up for individuals near ``genome``."""
         return self.model
 
     def phase(self, beat: Motion, name: str, parameters: Parameters) -> float | None:  # noqa: ARG002
-        """When in the beat, as a dataset defines it, a thing acts; None where it acts all the time."""
+        """Phase (beats) at which an effect acts, from the start of the beat as a dataset defines it.
+
+        None if it always acts.
+        """
         return parameters.get("phase")
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Between which strengths a thing may be hidden, in parts of the typical one."""
+        """Smallest and largest strength of an effect, as multiples of its typical strength."""
         return SMALLEST, MOST.get(name, LARGEST)
 
     def coarse(self) -> Bench[Motion, Quality]:
-        """The same with a plant of the model's own division; itself where it is that."""
+        """The same bench with the plant discretised like the model; itself if it already is."""
         if self.build.plant == self.build.division:
             return self
         return type(self)(replace(self.build, plant=self.build.division))
 
     def genome(self, rng: np.random.Generator) -> dict[str, float]:
-        """True values of the nominal genes; those that the model does not search are as estimated."""
+        """Random true values of the genes. Genes that the model does not search keep their estimates."""
         drawn = {gene.name: float(gene.nominal * SPREAD ** rng.uniform(-1.0, 1.0)) for gene in self.model.genes}
         return {g.name: drawn[g.name] if g.name in self.model.searched else g.nominal for g in self.model.genes}
 
     def beat(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
-        """A beat of the plant. It is remembered, for what is wrong with a camera changes none."""
+        """A beat of the plant, cached. Faults of the measurement do not change it."""
         inside = {name: values for name, values in hidden.items() if name in self.physics}
         key = (condition, tuple(genome.items()), tuple((n, tuple(v.items())) for n, v in inside.items()))
         if key not in self.beats:
@@ -158,20 +168,20 @@ class Bench(ABC, Generic[Motion, Quality]):
         quality: Quality,
         rng: np.random.Generator,
     ) -> Made:
-        """One recording."""
+        """Simulate and record one condition, with everything in ``hidden``."""
         wrong = {name: values for name, values in hidden.items() if name in self.faults}
         return self.shown(self.beat(condition, genome, hidden), condition, wrong, quality, rng)
 
 
 class Filmset(NamedTuple):
-    """How a wing is filmed, and by which cameras."""
+    """Camera settings, and the pair of cameras."""
 
     filming: Filming
     cameras: Cameras
 
 
 class WingBench(Bench[Beat, Filmset]):
-    """The flexible wing before cameras."""
+    """The flexible wing, filmed by two cameras."""
 
     @cached_property
     def rig(self) -> Wing:
@@ -179,27 +189,30 @@ class WingBench(Bench[Beat, Filmset]):
         return robird_wing()
 
     def model_beside(self, genome: Mapping[str, float]) -> FlexibleWing:
-        """It begins each search for a periodic motion at that of ``genome``: half the beats for neighbours."""
+        """The model whose search for a periodic motion starts from that of ``genome``.
+
+        Neighbours need half the beats.
+        """
         found = wing_model(Dataset("nominal", self.rig, ()), CalibrationSpec(division=self.build.division))
         return replace(found, near=tuple(genome[gene.name] for gene in found.genes))
 
     @property
     def faults(self) -> Mapping[str, Law]:
-        """Of cameras, clocks and trackers."""
-        return observe.FAULTS
+        """Faults of cameras, clocks and trackers."""
+        return CAMERA_FAULTS
 
     @property
     def physics(self) -> Mapping[str, Law]:
-        """Of the wing, its drive and the air."""
+        """Effects in the wing, its drive and the air."""
         return {name: _law(kind, self.rig) for name, kind in KINDS.items()}
 
     def limits(self, name: str) -> tuple[float, float]:
-        """As of any bench; a kind of the plant's says itself how large it may be."""
+        """As in the base class, but the plant's own effects define their upper limit themselves."""
         low, high = super().limits(name)
         return low, KINDS[name].largest / KINDS[name].typical if name in KINDS else high
 
     def phase(self, beat: Beat, name: str, parameters: Parameters) -> float | None:
-        """Of the drive phases that plant and cameras know, counted from the start of the beat."""
+        """Converts the drive phase, which plant and cameras use, to the phase counted from the start of the beat."""
         if name in beat.turns:
             return beat.phase(beat.turns[name])
         if "turn" in parameters:
@@ -207,7 +220,7 @@ class WingBench(Bench[Beat, Filmset]):
         return beat.phase(2 * np.pi * parameters["phase"]) if "phase" in parameters else None
 
     def quality(self, rng: np.random.Generator) -> Filmset:
-        """Any noise, any gaps, any pair of cameras; two to four apparent beats."""
+        """Random noise, gaps and cameras; two to four apparent beats."""
         return Filmset(draw_filming(rng), draw_cameras(self.rig, rng))
 
     def quieter(self, quality: Filmset, level: float) -> Filmset:
@@ -216,20 +229,20 @@ class WingBench(Bench[Beat, Filmset]):
         return quality._replace(filming=with_noise(quality.filming, noise))
 
     def least(self, quality: Filmset) -> float:
-        """The best trackers leave LEAST_NOISE_M."""
+        """The best trackers reach a noise of LEAST_NOISE_M."""
         return min(1.0, LEAST_NOISE_M / quality.filming.noise.level)
 
     def ideal(self, quality: Filmset) -> Filmset:
-        """All markers in all frames."""
+        """No noise, and all markers visible in all frames."""
         perfect = replace(with_noise(quality.filming, 0.0), lost=0, gap_rate=0.0)
         return quality._replace(filming=perfect)
 
     def fitted(self, recording: Recording) -> Recording:
-        """As it is."""
+        """Tracks are fitted unfiltered."""
         return recording
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Beat:
-        """With the tracks of all markers."""
+        """A beat with the tracks of all markers."""
         effects = tuple(
             Effect(name, values["strength"], {key: value for key, value in values.items() if key != "strength"})
             for name, values in hidden.items()
@@ -239,13 +252,13 @@ class WingBench(Bench[Beat, Filmset]):
     def shown(
         self, beat: Beat, condition: Condition, hidden: Concealed, quality: Filmset, rng: np.random.Generator
     ) -> Made:
-        """Filmed."""
+        """Film the beat."""
         made = film(beat.tracks, self.rig, condition, quality.filming, rng, hidden, cameras=quality.cameras)
         return Made(made.recording, made.noise)
 
 
 def _law(kind: Kind, wing: Wing) -> Law:
-    """A kind of the wing's plant, as laws of the vehicle and of cameras are told."""
+    """Describe an effect of the wing's plant by the same class as effects of the vehicle and faults of cameras."""
 
     def values(parameters: Parameters) -> Mapping[str, float]:
         shape = {name: value for name, value in parameters.items() if name != "strength"}
@@ -265,49 +278,63 @@ class VehicleBench(Bench[Array, Weighing]):
 
     @property
     def faults(self) -> Mapping[str, Law]:
-        """Of the balance."""
-        return observe_forces.FAULTS
+        """Faults of the balance."""
+        return BALANCE_FAULTS
 
     @property
     def physics(self) -> Mapping[str, Law]:
-        """Of the wings and the air; what the baseline has already cannot be hidden."""
+        """Effects in the wings and the air, except those that the nominal model already contains."""
         return VEHICLE_LAWS
 
     def quality(self, rng: np.random.Generator) -> Weighing:
-        """Any balance, over BALANCE_BEATS beats."""
+        """Random balance, over BALANCE_BEATS beats."""
         return replace(draw_weighing(rng), beats=BALANCE_BEATS)
 
     def quieter(self, quality: Weighing, level: float) -> Weighing:
-        """All that does not repeat with the beat is smaller."""
+        """Multiply everything that does not repeat with the beat."""
         smaller = {name: level * getattr(quality, name) for name in ("sensor", "rattle", "wander", "scatter", "jitter")}
         return replace(quality, **smaller)
 
     def least(self, quality: Weighing) -> float:  # noqa: ARG002
-        """A third: averaging nine times as many beats."""
+        """A third: the mean of nine times as many beats."""
         return 1 / 3
 
     def ideal(self, quality: Weighing) -> Weighing:
-        """Without any noise."""
+        """No noise."""
         return silent(quality)
 
     def fitted(self, recording: Recording) -> Recording:
-        """Low-passed at the seed's multiple of the flap frequency (Armanini et al. 2016, 3.4), as forces always are."""
+        """Forces are low-passed at the multiple of the flap frequency used by Armanini et al. (2016), section 3.4."""
         return as_fitted(CalibrationSpec(), recording)
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
-        """Forces [n, 2] over a beat."""
-        terms = tuple(term for term in vehicle.PROPOSED if term not in self.build.without)
-        return vehicle.simulate(self.rig, genome, condition, hidden, terms=terms)
+        """Forces [n, 2] (N) over a beat."""
+        terms = tuple(term for term in PROPOSED if term not in self.build.without)
+        return simulate_vehicle(self.rig, genome, condition, hidden, terms=terms)
 
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator
     ) -> Made:
-        """Weighed."""
+        """Record the forces with the balance."""
         made = weigh(beat, self.rig, condition, quality, rng, hidden)
         noise = self.fitted(replace(made.recording, values=made.recording.values - made.clean)).values
         return Made(made.recording, rms(noise.ravel()))
 
 
 def bench_of(build: Build) -> Bench[Beat, Filmset] | Bench[Array, Weighing]:
-    """The bench for a rig."""
+    """The bench for a build."""
     return VehicleBench(build) if build.rig == "vehicle" else WingBench(build)
+
+
+def record_all(
+    bench: Bench[Motion, Quality],
+    conditions: Sequence[Condition],
+    genome: Mapping[str, float],
+    hidden: Concealed,
+    seed: int,
+) -> Iterator[Recording]:
+    """A recording under each of ``conditions``, all with the same settings; the same seed gives the same bits."""
+    quality = bench.quality(np.random.default_rng([seed, 2]))
+    for number, condition in enumerate(conditions):
+        made = bench.recording(condition, genome, hidden, quality, np.random.default_rng([seed, 3, number]))
+        yield replace(made.recording, name=name_of(condition))

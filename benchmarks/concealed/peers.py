@@ -1,10 +1,9 @@
-"""Two general methods on the same trials: sparse regression of the residual, and a Gaussian process for it.
+"""Two general methods on the same trials: sparse regression of the residual, and a Gaussian process.
 
-Both get what a diagnosis has before it begins to reason: the residual of the refitted nominal model, and what each
-effect of the library does to the recordings. pysindy (de Silva et al. 2020; Kaptanoglu et al. 2022) is used as its
-documentation does: sequentially thresholded least squares, the threshold by leaving recordings out one by one.
-scikit-learn's Gaussian process is a model discrepancy (Kennedy and O'Hagan 2001); it can tell that something is
-lacking and predict it, but has no names.
+Both get what a diagnosis starts from: the residual of the refitted nominal model, and the change that each effect of
+the library makes to the recordings. pysindy (de Silva et al. 2020; Kaptanoglu et al. 2022) is used as documented:
+sequentially thresholded least squares with a cross-validated threshold. scikit-learn's Gaussian process models the
+discrepancy (Kennedy and O'Hagan 2001): it can detect and predict missing physics, but not name it.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from benchmarks.concealed.answer import Answer
+from benchmarks.concealed.run_diagnosis import Task
 from benchmarks.concealed.score import WORSE, Mark, blank, side_of
 from benchmarks.concealed.strength import Refit, rms, stacked
-from benchmarks.concealed.tool import Task
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.diagnosis.subject import Suspect
@@ -31,15 +30,15 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
 
-NUDGE = 0.3  # of an effect's typical size, at which its features are taken
-THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a coefficient, in parts of the residual's norm
-POINTS = 400  # that the Gaussian process is conditioned on; its cost grows as the cube
-ROUNDS = 2  # of the refit: the slopes are measured twice
+NUDGE = 0.3  # fraction of an effect's typical size at which its feature is evaluated
+THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)  # of a coefficient, as fractions of the residual's norm
+POINTS = 400  # samples that the Gaussian process is conditioned on; its cost grows with their cube
+ROUNDS = 2  # of the refit; each computes a new Jacobian
 
 
 @dataclass(frozen=True)
 class PeerOutcome:
-    """What a peer made of one dataset: effects with their weights, largest first, and its held-out misfit, m or N."""
+    """Result of a comparison method: effects with weights, largest first, and RMS held-out misfit, m or N."""
 
     peer: str
     trial: str
@@ -52,9 +51,11 @@ class PeerOutcome:
 
 @dataclass(frozen=True)
 class Material:
-    """Residuals of fitted and held-out recordings, [D] and [H], and features of the suspects [D, E], [H, E].
+    """Input of the comparison methods.
 
-    All without what the nominal genes can do. ``owner`` [D] is the recording of a sample, ``names`` [E] the effect.
+    Residuals [D] of the fitted and [H] of the held-out recordings, and features [D, E], [H, E] of the suspected
+    effects, all projected on the complement of what the nominal genes can change. ``owner`` [D] is the number of each
+    sample's recording, ``names`` [E] the effect of each feature.
     """
 
     residual: Array
@@ -68,10 +69,10 @@ class Material:
 
 
 def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
-    """Both peers on a dataset, in this process."""
+    """Run both methods on a dataset, in this process."""
     material, start = gathered(task), time.perf_counter()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of optimisers that reach their last iteration
+        warnings.simplefilter("ignore")  # optimisers that reach their last iteration
         sparse = sparse_regression(task.trial, material)
         middle = time.perf_counter()
         process = gaussian_process(task.trial, material)
@@ -79,7 +80,7 @@ def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
 
 
 def gathered(task: Task) -> Material:
-    """Refit the nominal model, and take the features."""
+    """Refit the nominal model, and compute residuals and features."""
     dataset = load_dataset(task.dataset)
     spec = CalibrationSpec(without=task.without)
     spec = replace(spec, division=task.division) if task.division else spec
@@ -90,18 +91,18 @@ def gathered(task: Task) -> Material:
     values = {g.name: float(g.from_unit(u)) for g, u in zip(refit.genes, np.clip(unit, 0.0, 1.0), strict=True)}
     suspects = subject_of(dataset, spec).suspects
     there = replace(refit, start={**refit.start, **values})
-    if isinstance(model, FlexibleWing):  # whose periodic motions are found sooner beside one that is known
+    if isinstance(model, FlexibleWing):  # starting from a known periodic motion is faster
         there = replace(there, model=model.beside([there.start[gene.name] for gene in model.genes]))
     names, seen = features(there, suspects, dataset.recordings)
     split = len(residual)
     order = np.concatenate([stacked(fitted), stacked(held_out)])
     other = stacked(held_out) - Refit(model, there.start, held_out).nominal
-    told = np.isfinite(-residual)
-    basis, _ = np.linalg.qr(there.tangent[told])
-    own, changes = -residual[told], seen[:split][told]
+    known = np.isfinite(-residual)
+    basis, _ = np.linalg.qr(there.tangent[known])
+    own, changes = -residual[known], seen[:split][known]
     later = np.isfinite(order[split:])
     coordinates = np.concatenate([_places(one) for one in (*fitted, *held_out)])
-    owner = np.repeat(np.arange(len(fitted)), [one.values.size for one in fitted])[told]
+    owner = np.repeat(np.arange(len(fitted)), [one.values.size for one in fitted])[known]
     return Material(
         own - basis @ (basis.T @ own),
         changes - basis @ (basis.T @ changes),
@@ -109,7 +110,7 @@ def gathered(task: Task) -> Material:
         names,
         other[later],
         seen[split:][later],
-        coordinates[:split][told],
+        coordinates[:split][known],
         coordinates[split:][later],
     )
 
@@ -117,7 +118,7 @@ def gathered(task: Task) -> Material:
 def features(
     refit: Refit, suspects: tuple[Suspect, ...], recordings: tuple[Recording, ...]
 ) -> tuple[tuple[str, ...], Array]:
-    """Change [D, E] of the recordings, fitted ones first, by each size of each suspect, and whose size it is."""
+    """Change [D, E] of the recordings (fitted ones first) per size parameter, and the suspect of each column."""
     ordered = (*refit.recordings, *(one for one in recordings if one.name not in {r.name for r in refit.recordings}))
     names, columns = [], []
     for suspect in suspects:
@@ -138,7 +139,7 @@ def features(
 
 
 def _places(recording: Recording) -> Array:
-    """Coordinates [T C, 8] of every sample: phase, channel, condition."""
+    """Coordinates [T C, 8] of every sample: phase, channel and condition."""
     condition, channels = recording.condition, recording.values.shape[1]
     angle = 2 * np.pi * condition.flap_frequency * recording.times
     when = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -153,7 +154,7 @@ def _places(recording: Recording) -> Array:
 
 
 def sparse_regression(trial: str, material: Material) -> PeerOutcome:
-    """Sequentially thresholded least squares with the threshold that best predicts recordings left out."""
+    """Sequentially thresholded least squares; the threshold is chosen by leave-one-recording-out prediction."""
     norms = np.linalg.norm(material.features, axis=0)
     usable = norms > 1e-3 * norms.max()
     names = [name for name, use in zip(material.names, usable, strict=True) if use]
@@ -184,7 +185,7 @@ def _thresholded(x: Array, y: Array, threshold: float) -> Array:
 
 
 def gaussian_process(trial: str, material: Material) -> PeerOutcome:
-    """A process over phase, channel and condition; detected where it explains more than its parameters cost (BIC)."""
+    """Gaussian process over phase, channel and condition; "detected" if it improves the BIC."""
     rng = np.random.default_rng(len(material.residual))
     some = rng.permutation(len(material.residual))[:POINTS]
     size = rms(material.residual) or 1.0
@@ -201,7 +202,7 @@ def gaussian_process(trial: str, material: Material) -> PeerOutcome:
 
 
 def mark(outcome: PeerOutcome, answer: Answer) -> Mark:
-    """The marks of a peer, as those of the tool."""
+    """Score a comparison method as the diagnosis is scored."""
     verdict = "adequate" if not outcome.detected else "named" if outcome.named else "unnamed"
     plain = replace(blank(answer, verdict), alarm=outcome.detected, named=outcome.named, top=outcome.named[:1])
     held_out, worse = outcome.after / answer.noise_held_out, outcome.after > WORSE * outcome.before

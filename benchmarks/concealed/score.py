@@ -1,4 +1,4 @@
-"""Marks for one finding against the answer of its trial. The rules in words: docs/concealed.md."""
+"""Score one finding against the answer of its trial. The rules are explained in docs/concealed.md."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.wing.genes import wing_genes
 
-WORSE = 1.01  # a held-out misfit that is larger by less is the same
+WORSE = 1.01  # ratio of held-out misfits above which the second counts as worse
 NAMING = ("named", "measurement fault")
-SHARES = frozenset(gene.name for gene in wing_genes({}) if gene.share_of)  # only their ratios mean anything
+SHARES = frozenset(gene.name for gene in wing_genes({}) if gene.share_of)  # only their ratios are identifiable
 
 
 @dataclass(frozen=True)
 class Mark:
-    """How one trial went. What does not apply to a trial is None.
+    """Score of one trial. Entries that do not apply to a trial are None.
 
     Attributes:
         trial, group, rig: as in the answer.
-        truth: names of what was hidden.
-        target, strength: d that was aimed at, and found by the scorer's refit.
-        verdict, named: as in the finding; "failed" where the diagnosis gave none.
+        truth: names of the hidden effects.
+        target, strength: d aimed at, and d measured by the scorer's refit.
+        verdict, named: as in the finding; "failed" if the diagnosis gave none.
         top: effects of the most probable hypothesis other than the nominal model.
-        alarm: something is said to be lacking.
-        first: what was hidden is the most probable hypothesis; exact: the verdict names it and nothing else.
-        found: number of hidden effects among those credited (pairs).
-        wrong: the verdict names an effect that is not there.
-        side: physics or measurement, by the verdict; None where it takes no side.
-        right_side: whether that is right.
-        held_out: misfit over floor on held-out recordings; worse: larger than the refitted nominal model's.
-        span, chord, phase: distances from the truth in parts of R and c, and in degrees.
-        covered, intervals: 90 % intervals that hold the truth, and their number.
+        alarm: the verdict is not "adequate".
+        first: the most probable hypothesis is the truth; exact: the verdict names the truth and nothing else.
+        found: number of hidden effects among those named, or among ``top`` if none is named.
+        wrong: the verdict names an effect that was not hidden.
+        side: physics or measurement, according to the verdict; None if it does not decide.
+        right_side: whether that is correct.
+        held_out: misfit / noise on held-out recordings; worse: larger than with the refitted nominal model.
+        span, chord, phase: distance from the true place, in units of R and c, and in degrees.
+        covered, intervals: number of 90 % intervals that contain the truth, and number of intervals.
         finer, division, plant: as in the answer.
-        remark: why there is no finding, or what else a reader of failures wants.
+        remark: why there is no finding, or other notes for the list of failures.
     """
 
     trial: str
@@ -70,7 +70,7 @@ class Mark:
 
 
 def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
-    """A mark with nothing but the answer in it, everything missed."""
+    """A score with the entries of the answer, and everything else counted as missed."""
     missed = bool(answer.secrets)
     return Mark(
         trial=answer.trial,
@@ -92,7 +92,7 @@ def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
 
 
 def failed(answer: Answer, remark: str) -> Mark:
-    """The mark of a diagnosis that gave no finding: the worst in all that the trial counts in."""
+    """The score of a diagnosis that gave no finding: the worst value of every entry."""
     span, chord, phase = (_apart(_true(answer, along), None) for along in ("span", "chord", "phase"))
     intervals = sum(len(secret.values) for secret in answer.secrets) if answer.secrets else len(_nominal(answer))
     worst = replace(blank(answer, "failed", remark), alarm=True, wrong=True, intervals=intervals)
@@ -102,7 +102,7 @@ def failed(answer: Answer, remark: str) -> Mark:
 
 
 def mark(finding: Finding, answer: Answer) -> Mark:
-    """Marks of a diagnosis."""
+    """Score a finding."""
     top = tuple(leading.effects) if (leading := _leading(finding)) else ()
     named = finding.named if finding.verdict in NAMING else ()
     credited = set(named or top)
@@ -134,7 +134,7 @@ def _leading(finding: Finding) -> Hypothesis | None:
 
 
 def _side(finding: Finding) -> Side | None:
-    """The side that a verdict takes; one that leaves a set open takes it where the whole set is on one side."""
+    """The side that a verdict takes; an ambiguous verdict takes one if all effects of its set are on that side."""
     if finding.verdict not in (*NAMING, "ambiguous") or not finding.named:
         return None
     sides = {side_of(name) for name in finding.named}
@@ -148,10 +148,10 @@ def side_of(effect: str) -> Side:
 
 
 def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]:
-    """Held-out misfit over floor, and whether it is worse than the refitted nominal model's.
+    """Held-out misfit / noise, and whether the misfit is worse than that of the refitted nominal model.
 
-    The floor is the noise that was put into those very recordings, and nothing else: a diagnosis may go to a finer
-    division, so what the first one leaves is no excuse.
+    Only the noise that was added to these recordings counts as noise, not the error of the first discretisation: a
+    diagnosis may choose a finer one.
     """
     held_out = [one for one in finding.recordings if one.held_out]
     if not held_out:
@@ -162,10 +162,10 @@ def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]
 
 
 def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
-    """How many intervals hold the truth, of those that can: effects that were found, and nominal genes of a null.
+    """Number of intervals that contain the truth, and number of intervals for which a truth exists.
 
-    A plant of finer division has no true value of the coarser model's genes, nor has one with physics that the model
-    lacks: only a null trial at equal division has.
+    These are the genes of hidden effects that were named and, in null trials with equal discretisation, the nominal
+    genes. With a finer plant or with missing physics the nominal genes of the model have no true value.
     """
     true = _nominal(answer)
     if finding.verdict in NAMING:
@@ -173,19 +173,19 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
             if secret.name in finding.named:
                 true.update(secret.values)
     inside = [_holds(gene, true[gene.name]) for gene in finding.genes if gene.name in true]
-    told = [one for one in inside if one is not None]
-    return sum(told), len(told)
+    known = [one for one in inside if one is not None]
+    return sum(known), len(known)
 
 
 def _nominal(answer: Answer) -> dict[str, float]:
-    """True values of the nominal genes, where a model can have them."""
+    """True values of the nominal genes if they exist, else empty."""
     if answer.secrets or answer.finer:
         return {}
     return {name: value for name, value in answer.genome.items() if name not in SHARES}
 
 
 def _true(answer: Answer, along: str) -> float | None:
-    """Where the only thing that is hidden acts along the span, the chord or the beat; None if there is no one place."""
+    """True place of a single hidden effect along the span, the chord or the beat; None if there is no single place."""
     value: float | None = getattr(answer.secrets[0], along) if len(answer.secrets) == 1 else None
     return value
 
@@ -196,7 +196,7 @@ def _holds(gene: GeneValue, true: float) -> bool | None:
 
 
 def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | None, float | None]:
-    """How far the place that is told lies from the true one; infinitely, where none is told."""
+    """Distances (span, chord, phase) between reported and true place; infinite if no place is reported."""
     where = finding.where
     span = _place(finding, answer, "station") or (where.span if where else None)
     chord = _place(finding, answer, "chord") or (where.chord if where else None)
@@ -209,7 +209,7 @@ def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | 
 
 
 def _place(finding: Finding, answer: Answer, parameter: str) -> Interval | None:
-    """The place by a gene of the effect that is named, where it has one."""
+    """The place according to a gene of the named effect, if it has such a gene."""
     secret = answer.secrets[0]
     if finding.verdict not in NAMING or secret.name not in finding.named:
         return None
@@ -218,13 +218,13 @@ def _place(finding: Finding, answer: Answer, parameter: str) -> Interval | None:
 
 
 def _apart(
-    true: float | None, told: Interval | None, distance: Callable[[float, float], float] = lambda a, b: abs(a - b)
+    true: float | None, reported: Interval | None, distance: Callable[[float, float], float] = lambda a, b: abs(a - b)
 ) -> float | None:
     if true is None:
         return None
-    return math.inf if told is None else distance(told.value, true)
+    return math.inf if reported is None else distance(reported.value, true)
 
 
 def beats_apart(a: float, b: float) -> float:
-    """Distance of two phases in beats, the shorter way round."""
+    """Distance of two phases, in beats, at most 0.5."""
     return abs((a - b + 0.5) % 1.0 - 0.5)

@@ -1,6 +1,6 @@
-"""Answers under seal: each in a file of its own, its hash in a manifest that is closed before the first diagnosis.
+"""Sealed answers: one file each, with their hashes in a manifest that is closed before the first diagnosis.
 
-The hash covers a random number as well, so that nobody can find the answer by hashing guesses.
+Each file contains a random number too, so that an answer cannot be found by hashing guesses.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ MANIFEST = "manifest.json"
 
 
 class BrokenSealError(ValueError):
-    """An answer is not the one that was sealed."""
+    """An answer differs from the one that was sealed."""
 
 
 def seal(answer: Answer, folder: Path) -> str:
-    """Write ``answer`` into ``folder`` and return its sha256."""
+    """Write ``answer`` into ``folder`` and return its SHA-256."""
     salt = np.random.default_rng([answer.seed, 7]).bytes(16).hex()
     text = json.dumps({"salt": salt, "answer": answer.as_json()}, sort_keys=True, indent=1)
     folder.mkdir(parents=True, exist_ok=True)
@@ -31,14 +31,14 @@ def seal(answer: Answer, folder: Path) -> str:
 
 
 def digest(text: str) -> str:
-    """sha256 of a sealed answer."""
+    """SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def close(hashes: Mapping[str, str], folder: Path) -> str:
-    """Write the manifest of all hashes; its own hash is returned, to be told before the diagnosis.
+    """Write the manifest of all hashes and return its own hash, which is printed before the diagnosis.
 
-    BrokenSealError where the folder has been closed before and an answer has changed since.
+    BrokenSealError if the folder was closed before and an answer has changed since.
     """
     path = folder / MANIFEST
     before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
@@ -50,17 +50,25 @@ def close(hashes: Mapping[str, str], folder: Path) -> str:
 
 
 def open_seal(trial: str, folder: Path, manifest: str) -> Answer:
-    """The answer of ``trial``; BrokenSealError where it, or the manifest, is not what ``manifest`` (a hash) closed."""
+    """The answer of ``trial``.
+
+    BrokenSealError if the answer does not match the manifest in ``folder``, or that does not match the hash
+    ``manifest``.
+    """
     listed = (folder / MANIFEST).read_text(encoding="utf-8")
     if digest(listed) != manifest:
-        raise BrokenSealError(f"the manifest has sha256 {digest(listed)}, closed was {manifest}; run the trials again")
+        raise BrokenSealError(
+            f"the manifest has sha256 {digest(listed)}, but {manifest} was closed; run the trials again"
+        )
     expected = json.loads(listed).get(trial)
     text = (folder / f"{trial}.json").read_text(encoding="utf-8")
     if digest(text) != expected:
-        raise BrokenSealError(f"the answer of {trial} has sha256 {digest(text)}, sealed was {expected}; run it again")
+        raise BrokenSealError(
+            f"the answer of {trial} has sha256 {digest(text)}, but {expected} was sealed; run it again"
+        )
     return Answer.from_json(json.loads(text)["answer"])
 
 
 def read(path: Path) -> Answer:
-    """A sealed answer for the plant's own use: to record its rig once more."""
+    """An answer for the plant's own use, to record its rig again."""
     return Answer.from_json(json.loads(path.read_text(encoding="utf-8"))["answer"])

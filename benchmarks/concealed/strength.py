@@ -1,6 +1,6 @@
-"""Strength of what is hidden: d, the misfit after the best refit of the nominal model over the noise.
+"""Strength d of a hidden effect: misfit after the best refit of the nominal model, divided by the noise.
 
-The scorer's own refit, of data without noise; nothing of it is the diagnosis's.
+The scorer's own refit, of noise-free data. It shares nothing with the diagnosis.
 """
 
 from __future__ import annotations
@@ -19,18 +19,24 @@ from wingfit.sim.model import Model
 
 Array = npt.NDArray[np.float64]
 
-STEP = 0.01  # of a gene's box, of finite differences
-DAMPINGS = (0.0, 1e-3, 1e-2, 1e-1, 1.0)  # of Gauss-Newton, tried at once with a part of the first moves:
+STEP = 0.01  # of finite differences, as a fraction of a gene's range
+DAMPINGS = (
+    0.0,
+    1e-3,
+    1e-2,
+    1e-1,
+    1.0,
+)  # of Gauss-Newton, tried together, with shortened steps for the first PARTS of them
 PART, PARTS = 0.4, 3
-STEPS = 5  # with slopes that are not measured anew
-SETTLED = 0.02  # relative gain in root mean square below which a refit ends
-FAR = 4.0  # times a strength: as far as one step of a search goes
-CLOSE = 0.2  # relative error of d that a search for a strength is content with
+STEPS = 5  # at most, between two finite-difference Jacobians
+SETTLED = 0.02  # relative decrease of the RMS residual below which a refit ends
+FAR = 4.0  # largest factor between two strengths in one step of the search
+CLOSE = 0.2  # relative error of d at which the search for a strength ends
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The nominal model about the true values ``start`` of its genes, for refits to recordings.
+    """Refits the nominal model to recordings, near the true values ``start`` of its genes.
 
     Genes that the model does not search keep their true values.
     """
@@ -41,16 +47,19 @@ class Refit:
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Those that are refitted."""
+        """The genes that are refitted, F of them."""
         return tuple(gene for gene in self.model.genes if gene.name in self.model.searched)
 
     @cached_property
     def unit(self) -> Array:
-        """[F] where they are at first, in parts of their boxes."""
+        """[F] true values in unit coordinates (0 to 1 over a gene's range)."""
         return np.array([float(gene.to_unit(self.start[gene.name])) for gene in self.genes])
 
     def observed(self, units: Array, recordings: Sequence[Recording]) -> Array:
-        """What [B, F] is recorded as, [B, D]; NaN throughout for one that cannot be simulated."""
+        """Recorded values [B, D] of individuals [B, F] (unit coordinates).
+
+        NaN for an individual that cannot be simulated.
+        """
         base = np.array([self.start.get(gene.name, gene.nominal) for gene in self.model.genes])
         genomes = np.tile(base, (len(units), 1))
         names = [gene.name for gene in self.model.genes]
@@ -67,16 +76,16 @@ class Refit:
 
     @cached_property
     def nominal(self) -> Array:
-        """[D] of the true values; RuntimeError where they cannot be simulated."""
+        """[D] at the true values; RuntimeError if they cannot be simulated."""
         return np.asarray(_whole(self.observed(self.unit[None], self.recordings))[0])
 
     @cached_property
     def tangent(self) -> Array:
-        """[D, F] about the true values."""
+        """Jacobian [D, F] at the true values."""
         return self.tangent_at(self.unit, self.recordings)
 
     def tangent_at(self, unit: Array, recordings: Sequence[Recording]) -> Array:
-        """[D, F] about ``unit`` [F], by central differences per part of the box; RuntimeError as :attr:`nominal`."""
+        """Jacobian [D, F] at ``unit`` [F] by central differences; RuntimeError as in :attr:`nominal`."""
         moves = STEP * np.eye(len(self.genes))
         around = np.clip(np.vstack([unit + moves, unit - moves]), 0.0, 1.0)
         seen = _whole(self.observed(around, recordings))
@@ -85,35 +94,38 @@ class Refit:
         return np.asarray(((seen[:n] - seen[n:]) / width[:, None]).T)
 
     def _slopes(self, unit: Array, recordings: Sequence[Recording], seen: Array) -> Array:
-        """The same by differences to one side from what is ``seen`` [D] at ``unit``: enough to be led by."""
+        """Jacobian [D, F] by one-sided differences from the values ``seen`` [D] at ``unit``.
+
+        Accurate enough for steps.
+        """
         sign = np.where(unit > 1.0 - STEP, -1.0, 1.0)
         around = self.observed(unit + STEP * np.diag(sign), recordings)
         return np.asarray(((_whole(around) - seen) * sign[:, None] / STEP).T)
 
     def linear(self, change: Array) -> float:
-        """Root mean square that is left of a change [D] of the recordings, as far as the genes answer linearly.
+        """RMS residual of a linearised refit to a change [D] of the recordings, genes within their ranges.
 
-        They stay inside their boxes. It costs no simulation once the tangent is known.
+        It needs no simulation once the Jacobian is known.
         """
-        told = np.isfinite(change)
-        slopes = self.tangent[told]
-        return rms(slopes @ _bounded(slopes, -change[told], self.unit, 0.0) - change[told])
+        known = np.isfinite(change)
+        slopes = self.tangent[known]
+        return rms(slopes @ _bounded(slopes, -change[known], self.unit, 0.0) - change[known])
 
     def full(self, change: Array, *, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[float, Array]:
-        """The same by a refit inside the genes' boxes, and the genes [F] that it ends with, in parts of their boxes.
+        """RMS residual of a full refit, and the genes [F] (unit coordinates) where it ends.
 
-        The refitted data are what the nominal model shows, with ``change`` added; so a coarser division of the model
-        counts for nothing here. It begins at the best of the true values and all ``near`` [F].
+        The data are the nominal model's own values plus ``change``, so a coarse discretisation of the model has no
+        influence. The refit starts from the best of the true values and all ``near`` [F].
         """
         unit, residual = self.refitted(self.nominal + change, rounds, near)
         return rms(residual), unit
 
     def refitted(self, target: Array, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[Array, Array]:
-        """Genes [F] in parts of their boxes and the residual [D] of a refit to ``target`` [D].
+        """Genes [F] (unit coordinates) and residual [D] of a refit to ``target`` [D].
 
-        Damped Gauss-Newton steps, of several the best; the slopes learn from every step (Broyden 1965), and are
-        measured anew before each of the ``rounds`` (about the true values they are known already), as far as the model
-        moves there.
+        Gauss-Newton with several dampings at once, of which the best is taken. The Jacobian is updated after every step
+        (Broyden 1965), and is evaluated again at the start of each of ``rounds``; at the true values it is already
+        known.
         """
         recordings = with_values(self.recordings, target)
         starts = np.stack([self.unit, *near])
@@ -134,15 +146,15 @@ class Refit:
     def _descended(
         self, recordings: Sequence[Recording], target: Array, unit: Array, residual: Array, slopes: Array
     ) -> tuple[Array, Array]:
-        told = np.isfinite(target)
+        known = np.isfinite(target)
         for _ in range(STEPS):
-            whole = np.array([_bounded(slopes, residual[told], unit, damping) for damping in DAMPINGS])
+            whole = np.array([_bounded(slopes, residual[known], unit, damping) for damping in DAMPINGS])
             moves = np.concatenate([whole, PART * whole[:PARTS]])
             found = self.observed(unit + moves, recordings) - target
-            for k in _order(found, told)[::-1]:  # the best last: what it shows holds exactly
-                slopes = _learned(slopes, moves[k], (found[k] - residual)[told])
-            best, before = _best(found, told), rms(residual)
-            if not _left(found[best], told) < before:
+            for k in _order(found, known)[::-1]:  # the best last: the updated Jacobian reproduces its change exactly
+                slopes = _learned(slopes, moves[k], (found[k] - residual)[known])
+            best, before = _best(found, known), rms(residual)
+            if not _left(found[best], known) < before:
                 break
             unit, residual = unit + moves[best], found[best]
             if rms(residual) > (1 - SETTLED) * before:
@@ -150,24 +162,24 @@ class Refit:
         return unit, residual
 
 
-def _left(residual: Array, told: npt.NDArray[np.bool_]) -> float:
-    """Root mean square; infinite for what could not be simulated."""
-    return rms(residual) if np.isfinite(residual[told]).all() else math.inf
+def _left(residual: Array, known: npt.NDArray[np.bool_]) -> float:
+    """RMS residual; infinite for an individual that could not be simulated."""
+    return rms(residual) if np.isfinite(residual[known]).all() else math.inf
 
 
-def _order(residuals: Array, told: npt.NDArray[np.bool_]) -> list[int]:
-    """Rows of ``residuals`` that could be simulated, the smallest first."""
-    left = [_left(one, told) for one in residuals]
+def _order(residuals: Array, known: npt.NDArray[np.bool_]) -> list[int]:
+    """Rows of ``residuals`` that could be simulated, smallest RMS first."""
+    left = [_left(one, known) for one in residuals]
     return [int(k) for k in np.argsort(left) if left[k] < math.inf]
 
 
-def _best(residuals: Array, told: npt.NDArray[np.bool_]) -> int:
-    return next(iter(_order(residuals, told)), 0)
+def _best(residuals: Array, known: npt.NDArray[np.bool_]) -> int:
+    return next(iter(_order(residuals, known)), 0)
 
 
 def _whole(seen: Array) -> Array:
     if np.isnan(seen).all(axis=1).any():
-        raise RuntimeError("the nominal model has no periodic motion about these genes: draw others")
+        raise RuntimeError("the nominal model has no periodic motion near these genes; draw others")
     return seen
 
 
@@ -186,7 +198,7 @@ def _bounded(slopes: Array, residual: Array, unit: Array, damping: float) -> Arr
 
 
 def with_values(recordings: Sequence[Recording], values: Array) -> tuple[Recording, ...]:
-    """Recordings with other values, [D] in all."""
+    """The recordings with the values [D] in place of their own."""
     ends = np.cumsum([one.values.size for one in recordings])[:-1]
     parts = np.split(values, ends)
     return tuple(
@@ -195,24 +207,24 @@ def with_values(recordings: Sequence[Recording], values: Array) -> tuple[Recordi
 
 
 def stacked(recordings: Sequence[Recording]) -> Array:
-    """Values of all channels of recordings, [D]."""
+    """Values of all channels of all recordings, [D]."""
     return np.concatenate([one.values.ravel() for one in recordings])
 
 
 def rms(values: Array) -> float:
-    """Root mean square of what there is."""
-    told = values[np.isfinite(values)]
-    return math.sqrt(float(told @ told) / len(told)) if len(told) else 0.0
+    """Root mean square of the finite values; 0 if there are none."""
+    finite = values[np.isfinite(values)]
+    return math.sqrt(float(finite @ finite) / len(finite)) if len(finite) else 0.0
 
 
 def strength_for(
     target: float, misfit: Callable[[float], float], start: float, limits: tuple[float, float], tries: int = 4
 ) -> tuple[float, float]:
-    """The strength at which ``misfit`` is about ``target``, and the misfit there: secants between logarithms.
+    """The strength at which ``misfit`` is near ``target``, and the misfit there, by a secant method in logarithms.
 
-    Where the limits do not allow it, that limit. A misfit grows about in proportion to a strength; where it does not
-    answer at all the largest strength is taken. An ArithmeticError of ``misfit`` says that the rig cannot run so: the
-    way there is halved. One at ``start`` passes through.
+    If the limits exclude it, the limit is returned; if the misfit does not depend on the strength, the largest
+    strength. An ArithmeticError of ``misfit`` means that the rig cannot be simulated at that strength, and the step is
+    halved; one at ``start`` is passed on.
     """
     low, high = limits
     at = min(max(start, low), high)

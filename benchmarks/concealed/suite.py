@@ -1,7 +1,7 @@
-"""The whole suite: make and seal, diagnose, record what was advised, open the seals, score.
+"""The whole suite: record and seal, diagnose, record the advised conditions, open the answers, score.
 
-Processes that make datasets and processes that diagnose are different ones, and the first phase has ended, with the
-manifest of hashes closed and told, before the second begins.
+Recording and diagnosing run in different processes. The first phase is complete, with the manifest of hashes closed and
+its own hash printed, before the second begins.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from benchmarks.concealed import laboratory, seal
+from benchmarks.common.progress import show_count
+from benchmarks.concealed import record_trial, seal
 from benchmarks.concealed.answer import Answer
+from benchmarks.concealed.run_diagnosis import Outcome, Task, run
 from benchmarks.concealed.score import Mark, failed, mark
 from benchmarks.concealed.table import Advised, Table
-from benchmarks.concealed.tool import Outcome, Task, run
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
 from wingfit.records import Condition, load_dataset
 from wingfit.report import finding_from_json, finding_json
@@ -37,18 +38,18 @@ Out = TypeVar("Out")
 
 SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 SETTLED = ("named", "measurement fault")
-CASES = 40  # ambiguous ones that are followed up, at most
+CASES = 40  # most ambiguous trials that are followed up
 
 
 @dataclass(frozen=True)
 class Folders:
-    """Where a suite keeps what: datasets for the tool, answers under seal, findings."""
+    """Where a suite stores datasets, sealed answers and findings."""
 
     root: Path
 
     @property
     def datasets(self) -> Path:
-        """All that the tool sees."""
+        """Datasets: all that the diagnosis sees."""
         return self.root / "datasets"
 
     @property
@@ -58,26 +59,26 @@ class Folders:
 
     @property
     def findings(self) -> Path:
-        """What the tool said, as JSON."""
+        """Findings of the diagnosis, as JSON."""
         return self.root / "findings"
 
     @property
     def peers(self) -> Path:
-        """What the peers made of them, as JSON."""
+        """Results of the comparison methods, as JSON."""
         return self.root / "peers"
 
     def answer(self, trial: str) -> Path:
-        """Sealed."""
+        """Path of a sealed answer."""
         return self.sealed / f"{trial}.json"
 
     def dataset(self, label: str) -> Path:
-        """Of a trial, or of its repetition."""
+        """Path of the dataset of a trial, or of its repetition with one more recording."""
         return self.datasets / f"{label}.nc"
 
 
 @contextmanager
 def pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """Fresh processes of one thread each."""
+    """New processes with one thread each."""
     before = {name: os.environ.get(name) for name in SINGLE_THREAD}
     os.environ.update(dict.fromkeys(SINGLE_THREAD, "1"))
     try:
@@ -98,61 +99,57 @@ def each(
     label: str,
     keep: Callable[[Out], None] | None = None,
 ) -> list[Out]:
-    """Results in the order of ``items``, with progress and the time that is left on standard error.
+    """Results in the order of ``items``; progress and remaining time go to standard error.
 
-    ``keep`` is called with each as it comes.
+    ``keep`` is called with each result as soon as it is there.
     """
-    start, running = time.perf_counter(), [executor.submit(work, item) for item in items]
+    start, running = time.monotonic(), [executor.submit(work, item) for item in items]
     done: set[Future[Out]] = set()
     for future in as_completed(running):
         done.add(future)
         if keep:
             keep(future.result())
-        _tell(label, len(done), len(running), time.perf_counter() - start)
+        show_count(label, len(done), len(running), start)
     return [future.result() for future in running]
 
 
-def _tell(label: str, done: int, total: int, seconds: float) -> None:
-    left = seconds / done * (total - done)
-    end = "\n" if done == total else ""
-    note = f"{label}: {done} of {total}, {seconds:.0f} s, about {left:.0f} s left"
-    print(f"\r{note:70}", end=end, file=sys.stderr, flush=True)
-
-
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
-    """Write the datasets and seal the answers; returns the hash of the manifest.
+    """Record the datasets and seal the answers; returns the hash of the manifest.
 
-    Trials that the folder holds already, of the same seed, are not made again.
+    Trials that the folder already holds, made with the same seed, are not made again.
     """
     folders.datasets.mkdir(parents=True, exist_ok=True)
-    lacking = [trial for trial in trials if not _made(trial, folders)]
+    missing = [trial for trial in trials if not _made(trial, folders)]
     with pool(jobs) as executor:
-        orders = [laboratory.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in lacking]
-        each(executor, laboratory.make, orders, "recording and sealing")
+        orders = [record_trial.Order(trial, folders.dataset(trial.name), folders.sealed) for trial in missing]
+        each(executor, record_trial.make, orders, "recording and sealing")
     hashes = {trial.name: seal.digest(folders.answer(trial.name).read_text(encoding="utf-8")) for trial in trials}
     return seal.close(hashes, folders.sealed)
 
 
 def _made(trial: Trial, folders: Folders) -> bool:
-    """Whether the folder holds it; ValueError where what it holds under its name is another suite's."""
+    """Whether the folder holds the trial; ValueError if a trial of another suite has its name there."""
     if not (folders.answer(trial.name).exists() and folders.dataset(trial.name).exists()):
         return False
-    kept = seal.read(folders.answer(trial.name))
-    told, asked = (kept.seed, kept.names, kept.plant, kept.target), (trial.seed, frozenset(trial.hidden))
-    if told != (*asked, trial.build.plant, trial.target):
+    earlier = seal.read(folders.answer(trial.name))
+    stored, requested = (
+        (earlier.seed, earlier.names, earlier.plant, earlier.target),
+        (trial.seed, frozenset(trial.hidden)),
+    )
+    if stored != (*requested, trial.build.plant, trial.target):
         raise ValueError(
-            f"{folders.root} holds another {trial.name} (seed {kept.seed}) than is asked for (seed {trial.seed}): "
-            "name an empty folder, or the suite that it was made for"
+            f"{folders.root} holds {trial.name} with seed {earlier.seed}, but seed {trial.seed} is requested: "
+            "give an empty folder, or run the suite that it was made for"
         )
     return True
 
 
 def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = False) -> dict[str, Table]:
-    """Run the suite in the folder ``root``: tables by method, this project's first."""
+    """Run the suite in the folder ``root``; one table per method, that of the diagnosis first."""
     start, folders = time.perf_counter(), Folders(root)
     folders.findings.mkdir(parents=True, exist_ok=True)
     manifest = make(trials, folders, jobs)
-    print(f"answers sealed, sha256 of the manifest {manifest}", file=sys.stderr)
+    print(f"answers sealed; SHA-256 of the manifest: {manifest}", file=sys.stderr)
     with pool(jobs) as tool:
         outcomes = diagnosed(tool, [(trial, trial.name) for trial in trials], folders, "diagnosing")
         first = {outcome.trial: outcome for outcome in outcomes}
@@ -163,38 +160,38 @@ def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = Fal
     answers = {trial.name: seal.open_seal(trial.name, folders.sealed, manifest) for trial in trials}
     marks = tuple(_marked(first[trial.name], answers[trial.name]) for trial in trials)
     advised = tuple(_advised(one, first[one.name], second, answers[one.name].names) for one in followed)
-    asked = sum(trial.group == "advice" for trial in trials)
+    advice_trials = sum(trial.group == "advice" for trial in trials)
     return {
-        "wingfit": Table(marks, advised, asked, seconds),
+        "wingfit": Table(marks, advised, advice_trials, seconds),
         **{name: _table_of_peer(found, answers) for name, found in others.items()},
     }
 
 
 def _peers(trials: Sequence[Trial], folders: Folders, jobs: int) -> dict[str, list[PeerOutcome]]:
-    """What the peers make of the same datasets."""
+    """Results of the comparison methods on the same datasets."""
     from benchmarks.concealed.peers import run as run_peers  # needs the extra [peers]
 
     folders.peers.mkdir(exist_ok=True)
     tasks = [task(trial, trial.name, folders) for trial in trials]
-    kept = {one.trial: found for one in tasks if (found := _kept_of_peers(one, folders)) is not None}
+    stored = {one.trial: found for one in tasks if (found := _stored_peers(one, folders)) is not None}
 
     def keep(found: tuple[PeerOutcome, ...]) -> None:
-        kept[found[0].trial] = found
+        stored[found[0].trial] = found
         path = folders.peers / f"{found[0].trial}.json"
         path.with_suffix(".part").write_text(json.dumps([asdict(one) for one in found]), encoding="utf-8")
         path.with_suffix(".part").replace(path)
 
     with pool(jobs) as executor:
-        each(executor, run_peers, [one for one in tasks if one.trial not in kept], "peers", keep)
-    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*(kept[one.trial] for one in tasks), strict=True)}
+        each(executor, run_peers, [one for one in tasks if one.trial not in stored], "peers", keep)
+    return {outcomes[0].peer: list(outcomes) for outcomes in zip(*(stored[one.trial] for one in tasks), strict=True)}
 
 
-def _kept_of_peers(asked: Task, folders: Folders) -> tuple[PeerOutcome, ...] | None:
-    """What the peers made of the very dataset in an earlier run."""
+def _stored_peers(request: Task, folders: Folders) -> tuple[PeerOutcome, ...] | None:
+    """Results of the comparison methods from an earlier run on the same dataset; None if there are none."""
     from benchmarks.concealed.peers import PeerOutcome as Outcome
 
-    path = folders.peers / f"{asked.trial}.json"
-    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+    path = folders.peers / f"{request.trial}.json"
+    if not path.exists() or path.stat().st_mtime < request.dataset.stat().st_mtime:
         return None
     stored = json.loads(path.read_text(encoding="utf-8"))
     return tuple(Outcome(**(one | {"named": tuple(one["named"])})) for one in stored)
@@ -208,31 +205,34 @@ def _table_of_peer(outcomes: Sequence[PeerOutcome], answers: Mapping[str, Answer
 
 
 def diagnosed(tool: Executor, labelled: Sequence[tuple[Trial, str]], folders: Folders, what: str) -> list[Outcome]:
-    """Diagnose the datasets of trials under their labels, and keep the findings."""
+    """Diagnose the datasets with these labels and store the findings."""
     tasks = [task(trial, label, folders) for trial, label in labelled]
-    kept = {one.trial: found for one in tasks if (found := _kept(one, folders)) is not None}
+    stored = {one.trial: found for one in tasks if (found := _stored(one, folders)) is not None}
 
     def keep(outcome: Outcome) -> None:
-        kept[outcome.trial] = outcome
+        stored[outcome.trial] = outcome
         path = folders.findings / f"{outcome.trial}.json"
-        told = finding_json(outcome.finding) if outcome.finding else {"failed": outcome.reason}
-        path.with_suffix(".part").write_text(json.dumps(told), encoding="utf-8")
+        content = finding_json(outcome.finding) if outcome.finding else {"failed": outcome.reason}
+        path.with_suffix(".part").write_text(json.dumps(content), encoding="utf-8")
         path.with_suffix(".part").replace(path)
 
-    each(tool, run, [one for one in tasks if one.trial not in kept], what, keep)
-    return [kept[one.trial] for one in tasks]
+    each(tool, run, [one for one in tasks if one.trial not in stored], what, keep)
+    return [stored[one.trial] for one in tasks]
 
 
-def _kept(asked: Task, folders: Folders) -> Outcome | None:
-    """The finding of an earlier run, if it was about the very dataset; a failed one is tried again."""
-    path = folders.findings / f"{asked.trial}.json"
-    if not path.exists() or path.stat().st_mtime < asked.dataset.stat().st_mtime:
+def _stored(request: Task, folders: Folders) -> Outcome | None:
+    """The finding of an earlier run on the same dataset.
+
+    None if there is none or if it failed, so that it is tried again.
+    """
+    path = folders.findings / f"{request.trial}.json"
+    if not path.exists() or path.stat().st_mtime < request.dataset.stat().st_mtime:
         return None
     stored = json.loads(path.read_text(encoding="utf-8"))
     if "failed" in stored:
         return None
     finding = finding_from_json(stored)
-    return Outcome(asked.trial, finding, "", finding.seconds)
+    return Outcome(request.trial, finding, "", finding.seconds)
 
 
 def task(trial: Trial, label: str, folders: Folders) -> Task:
@@ -242,7 +242,7 @@ def task(trial: Trial, label: str, folders: Folders) -> Task:
 
 
 def _open(trial: Trial, outcome: Outcome) -> bool:
-    """Whether the tool itself says that it cannot decide between effects, of which one may be hidden by itself."""
+    """Whether the diagnosis is ambiguous in a trial that hides a single effect."""
     known = trial.group in ("listed", "measurement", "advice")
     return known and outcome.finding is not None and outcome.finding.verdict == "ambiguous"
 
@@ -250,7 +250,10 @@ def _open(trial: Trial, outcome: Outcome) -> bool:
 def follow_up(
     tool: Executor, trials: Sequence[Trial], first: dict[str, Outcome], folders: Folders, jobs: int
 ) -> dict[str, Outcome]:
-    """Record each trial's rig once more, as advised and at random, and diagnose again; outcomes by label."""
+    """Record each rig once more, under the advised and under a random condition, and diagnose again.
+
+    Outcomes by label.
+    """
     wanted = [
         (trial, label, condition)
         for trial in trials
@@ -262,22 +265,22 @@ def follow_up(
     ]
     with pool(jobs) as executor:
         orders = [
-            laboratory.Addition(trial, condition, folders.dataset(trial.name), folders.dataset(label), folders.sealed)
+            record_trial.Addition(trial, condition, folders.dataset(trial.name), folders.dataset(label), folders.sealed)
             for trial, label, condition in wanted
         ]
-        each(executor, laboratory.add, orders, "recording what was advised")
+        each(executor, record_trial.add, orders, "recording the advised conditions")
     again = diagnosed(tool, [(trial, label) for trial, label, _ in wanted], folders, "diagnosing again")
     return {outcome.trial: outcome for outcome in again}
 
 
 def _by_chance(trial: Trial, folders: Folders) -> Condition:
-    """One of the rig's conditions that the dataset does not have."""
+    """A random condition of the rig that the dataset does not have."""
     known = {one.name for one in load_dataset(folders.dataset(trial.name)).recordings}
     return any_condition(trial, known, np.random.default_rng([trial.seed, 9]))
 
 
 def _advice(outcome: Outcome) -> Condition | None:
-    """The condition that a finding recommends first; None where it recommends none."""
+    """The first condition that a finding recommends; None if it recommends none."""
     if outcome.finding is None or not outcome.finding.advice:
         return None
     best = outcome.finding.advice[0]

@@ -1,4 +1,4 @@
-"""All marks in one table, with counts and Wilson intervals, and the figures that are told as JSON."""
+"""All scores in one table, with counts and Wilson intervals, and the figures of the JSON object."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.concealed.score import Mark
 
 NORMAL_90 = 1.6448536269514722
 BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
-"""Trials count for the d that they have, not for the one that was aimed at; below the first bin they count nowhere."""
+"""Bins of the measured d (not of the d aimed at). Trials below the first bin are too weak to count."""
 WEAK = BINS[2][0]
 
 
@@ -26,12 +26,12 @@ class Rate:
 
     @property
     def percent(self) -> float | None:
-        """Per cent; None of nothing."""
+        """Rate in per cent; None if n is 0."""
         return round(100 * self.hits / self.n, 1) if self.n else None
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Between which per cent the true rate lies."""
+        """Confidence interval of the rate, per cent; None if n is 0."""
         if not self.n:
             return None
         z, p, n = NORMAL_90, self.hits / self.n, self.n
@@ -47,32 +47,34 @@ class Rate:
 
 
 def rate(marks: Iterable[Mark], good: Callable[[Mark], bool | None]) -> Rate:
-    """How many are ``good``, of those of which that can be said."""
-    told = [bool(found) for one in marks if (found := good(one)) is not None]
-    return Rate(sum(told), len(told))
+    """Rate of the scores that are ``good``, among those for which ``good`` is not None."""
+    known = [bool(found) for one in marks if (found := good(one)) is not None]
+    return Rate(sum(known), len(known))
 
 
 def of(marks: Iterable[Mark], group: str) -> list[Mark]:
-    """Marks of a group of trials."""
+    """Scores of one group of trials."""
     return [one for one in marks if one.group == group]
 
 
 def at(marks: Iterable[Mark], d: int) -> list[Mark]:
-    """Those whose strength lies in the bin of ``d``."""
+    """Scores whose strength lies in bin ``d``."""
     low, high = BINS[d]
     return [one for one in marks if low <= one.strength < high]
 
 
 def seen(marks: Iterable[Mark]) -> list[Mark]:
-    """Those that are strong enough to count."""
+    """Scores of trials that are strong enough to count."""
     return [one for one in marks if one.strength >= WEAK]
 
 
 @dataclass(frozen=True)
 class Advised:
-    """An ambiguous case: whether a recording under the advised condition settled it, and one under a random one.
+    """An ambiguous trial, and whether one more recording resolved it.
 
-    ``verdict`` is that of the first diagnosis; ``advice`` tells the condition, None where none was advised.
+    Under the advised condition, and under a random one.
+
+    ``verdict`` is that of the first diagnosis; ``advice`` is the advised condition, None if none was advised.
     """
 
     trial: str
@@ -86,11 +88,14 @@ class Advised:
 
 @dataclass(frozen=True)
 class Table:
-    """Everything that the trials showed. ``advised`` holds the ambiguous cases only, of ``asked`` trials."""
+    """All scores.
+
+    ``advised`` holds the ambiguous trials only, out of ``advice_trials`` trials that were made to be ambiguous.
+    """
 
     marks: tuple[Mark, ...]
     advised: tuple[Advised, ...]
-    asked: int
+    advice_trials: int
     seconds: float
 
     @property
@@ -128,18 +133,18 @@ class Table:
 
     @property
     def hiding(self) -> list[Mark]:
-        """Trials in which something was hidden."""
+        """Scores of trials with a hidden effect."""
         return [one for one in self.marks if one.truth]
 
     @property
     def coverage(self) -> Rate:
-        """Of all 90 % intervals whose truth is known."""
+        """Rate at which 90 % intervals contain the truth, over all trials."""
         return Rate(sum(one.covered for one in self.marks), sum(one.intervals for one in self.marks))
 
     @property
     def failures(self) -> list[dict[str, Any]]:
-        """Every trial that went wrong, and how."""
-        told = [(one, what) for one in self.marks if (what := wrongs(one))]
+        """Every trial with a wrong result, and what is wrong."""
+        known = [(one, what) for one in self.marks if (what := wrongs(one))]
         wrong = [
             {
                 "trial": one.trial,
@@ -152,16 +157,16 @@ class Table:
                 "top": list(one.top),
                 "what": what,
             }
-            for one, what in told
+            for one, what in known
         ]
         return wrong + [
-            {**asdict(one), "group": "advice", "what": "advice did not settle it"}
+            {**asdict(one), "group": "advice", "what": "the advised recording did not resolve it"}
             for one in self.advised
             if not one.resolved
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The figures under their agreed keys."""
+        """The figures under the names documented in docs/concealed.md."""
         rates, marks = self.rates, self.marks
         return {
             "null": {"n": len(of(marks, "null")), "false_alarms": rates["null: false alarms"].hits},
@@ -205,7 +210,7 @@ class Table:
         }
 
     def rows(self) -> dict[str, str]:
-        """The table for people: what is told, by its name."""
+        """The table for readers: each figure by its name."""
         figures = self.as_json()
         place = figures["place"]
         return {
@@ -213,14 +218,14 @@ class Table:
             "held-out misfit over floor": f"median {figures['heldout_over_floor_median']}",
             "place": f"medians {place['span_R']} R, {place['chord_c']} c, {place['phase_deg']} degrees",
             f"too weak to count (d < {WEAK})": str(len(self.hiding) - len(seen(self.hiding))),
-            "advice: open at first": f"{len(self.advised)}; {self.asked} trials were made for it",
+            "advice: ambiguous at first": f"{len(self.advised)} of {self.advice_trials} trials",
             "failures": str(len(figures["failures"])),
             "seconds of a trial": f"median {median(m.seconds for m in self.marks)}",
         }
 
 
 def side_by_side(tables: Mapping[str, Table]) -> str:
-    """Tables of several methods in columns, under their names."""
+    """Tables of several methods in columns, under the names of the methods."""
     columns = {name: table.rows() for name, table in tables.items()}
     names = dict.fromkeys(row for column in columns.values() for row in column)
     lines = [["", *columns], *([name, *(column.get(name, "") for column in columns.values())] for name in names)]
@@ -230,57 +235,57 @@ def side_by_side(tables: Mapping[str, Table]) -> str:
 
 
 def wrongs(one: Mark) -> str:
-    """What is wrong with a trial, in words; "" where nothing is."""
+    """What is wrong with a trial's result; "" if nothing is."""
     if one.verdict == "failed":
         return f"no finding: {one.remark}"
-    said = list[str]()
+    mistakes = list[str]()
     if not one.truth:
         return "false alarm" if one.alarm else ""
     if one.strength < WEAK and one.group != "pairs":
         pass
     elif one.group == "unlisted":
-        said += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
+        mistakes += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
     elif one.group == "measurement":
-        said += ["wrong side"] * (not one.right_side)
+        mistakes += ["wrong side"] * (not one.right_side)
     elif one.group == "pairs":
-        said += ["not both"] * ((one.found or 0) < len(one.truth))
+        mistakes += ["not both"] * ((one.found or 0) < len(one.truth))
     else:
-        said += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
-    said += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
-    return "; ".join(said)
+        mistakes += ["not first"] * (not one.first) + ["not exactly named"] * (not one.exact)
+    mistakes += ["wrong name"] * one.wrong + ["held-out misfit grew"] * bool(one.worse)
+    return "; ".join(mistakes)
 
 
 def of_rig(one: Mark) -> str:
-    """The rig of a trial with the divisions of tool and plant, for people."""
+    """The rig of a trial with the discretisations of model and plant."""
     return f"{one.rig} {one.division} of {one.plant}".removesuffix("  of ")
 
 
 def right(one: Mark) -> bool | None:
-    """Whether a trial that is strong enough went as its group asks; None of those that are too weak to count."""
+    """Whether the result of a trial is right for its group; None if the trial is too weak to count."""
     return None if one.truth and one.strength < WEAK else not wrongs(one)
 
 
 BY_RIG: tuple[tuple[str, str, Callable[[Mark], bool | None]], ...] = (
-    ("null", "nulls without alarm", lambda m: not m.alarm),
-    ("listed", "listed all right", right),
-    ("unlisted", "unlisted unnamed", lambda m: None if m.strength < WEAK else m.verdict == "unnamed"),
-    ("measurement", "measurement right side", lambda m: None if m.strength < WEAK else m.right_side),
-    ("pairs", "pairs both", lambda m: m.found == 2),
+    ("null", "nulls without false alarm", lambda m: not m.alarm),
+    ("listed", "listed, correct", right),
+    ("unlisted", "unlisted, left unnamed", lambda m: None if m.strength < WEAK else m.verdict == "unnamed"),
+    ("measurement", "measurement, right side", lambda m: None if m.strength < WEAK else m.right_side),
+    ("pairs", "pairs, both found", lambda m: m.found == 2),
 )
 
 
 def kinds(marks: Sequence[Mark]) -> list[str]:
-    """What was hidden in any of them."""
+    """Names of the effects hidden in any of the trials, sorted."""
     return sorted({name for one in marks for name in one.truth})
 
 
 def of_kind(marks: Iterable[Mark], name: str) -> list[Mark]:
-    """Those in which ``name`` was hidden."""
+    """Scores of trials in which ``name`` was hidden."""
     return [one for one in marks if name in one.truth]
 
 
 def median(values: Iterable[float | None]) -> float | None:
-    """Of those that there are; None of none, and where it is not finite."""
-    told = [value for value in values if value is not None]
-    middle = float(np.median(told)) if told else math.inf
+    """Median of the finite values; None if there are none."""
+    known = [value for value in values if value is not None]
+    middle = float(np.median(known)) if known else math.inf
     return round(middle, 4) if math.isfinite(middle) else None

@@ -1,4 +1,4 @@
-"""Which trials there are: what is hidden in which rig, how strongly, and under which conditions it is recorded."""
+"""The plan of the trials: what is hidden in which rig, how strongly, and under which conditions it is recorded."""
 
 from __future__ import annotations
 
@@ -36,9 +36,10 @@ FLIGHT = (
 
 @dataclass(frozen=True)
 class Build:
-    """A rig: "wing" with the division of the tool's model and that of the plant, or "vehicle" (both are "").
+    """A rig, with the discretisations of model and plant.
 
-    ``without`` are terms that neither the vehicle's model nor its plant has, beside what is hidden.
+    "wing" has the ``division`` of the model and that of the ``plant``; for "vehicle" both are "". ``without`` names
+    terms that neither the vehicle's model nor its plant has, in addition to what is hidden.
     """
 
     rig: Literal["wing", "vehicle"]
@@ -48,28 +49,28 @@ class Build:
 
 
 EQUAL, FINER = Build("wing", "4", "4"), Build("wing", "4", "8x1")
-BEYOND = Build("wing", "4", "10x1")  # no division that a diagnosis goes to by itself is this one
+BEYOND = Build("wing", "4", "10x1")  # a discretisation that no diagnosis refines to by itself
 ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
 WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
-VEHICLES = (VEHICLE, BARE)  # a model without the fling is no sign of what is hidden: every other one lacks it
+VEHICLES = (VEHICLE, BARE)  # half of the models omit the fling, so that its absence does not reveal what is hidden
 SMALL = (FINER, EQUAL, BEYOND, FINER, EQUAL, BEYOND, EQUAL, FINER, BEYOND, EQUAL, FINER, EQUAL)
 WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial before it is made.
+    """One trial before it is recorded.
 
     Attributes:
-        name: says nothing about what it holds.
-        group: what it is counted among.
-        build: of tool and plant.
-        hidden: names of what is hidden, as the plants call it; empty in a null trial.
-        target: strength d that is aimed at, of each effect that is hidden.
-        poor: whether its conditions are few and alike, so that much cannot be told apart.
-        seed: everything about it is drawn from this.
+        name: does not reveal what is hidden.
+        group: the group it is counted in.
+        build: rig, model and plant.
+        hidden: names of the hidden effects, as the plants call them; empty in a null trial.
+        target: strength d aimed at, of each hidden effect.
+        poor: whether its conditions are few and similar, so that several effects may explain the data.
+        seed: of everything that is drawn for this trial.
     """
 
     name: str
@@ -81,8 +82,8 @@ class Trial:
     seed: int
 
 
-# What each rig's trials hide. Left out is what nothing can see beside noise of this size, and what no data of the kind
-# can tell from something else: docs/concealed.md.
+# What the trials of each rig hide. Effects that cannot be detected in noise of this size, or cannot be distinguished
+# from others with data of this kind, are excluded (docs/concealed.md).
 LISTED_WING = (
     "hinge_offset",
     "phase_lag_error",
@@ -117,19 +118,22 @@ PAIRS_WING = (
     ("camera_shift", "added_mass"),
 )
 PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "balance_tilt"))
-# Hidden in few conditions that are alike, so that another explanation may be as good: delays look like lags, tilted
-# hinges like turned cameras.
+# Hidden in few similar conditions, so that other hypotheses may fit equally well: delays look like lags, tilted hinges
+# like rotated cameras.
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
 OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
 COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 21, "advice": 20}
 QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
-SPARSE = 9  # every ninth null has as few recordings as an open case
-QUICK_KINDS = 3  # every third kind of the listed and the unlisted ones is in the sample
+SPARSE = 9  # every ninth null trial has as few recordings as an ambiguous one
+QUICK_KINDS = 3  # the quick sample contains every third of the listed and of the unlisted effects
 
 
 def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[Trial, ...]:
-    """All trials of a suite in an order, and under names, that tell nothing; the same seed plans the same ones."""
+    """All trials of a suite; neither their order nor their names reveal anything.
+
+    The same seed gives the same trials.
+    """
     counts = QUICK if quick else COUNTS
     thinned = QUICK_KINDS if quick else 1
     drafts = [draft for group in GROUPS for draft in _group(group, counts[group], thinned)]
@@ -139,7 +143,10 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 
 
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
-    """Drafts of a group: ``n`` in all, or of each ``thinned``-th kind of the listed and the unlisted."""
+    """Unnamed trials of a group.
+
+    ``n`` in all or, for listed and unlisted effects, ``n`` of each ``thinned``-th effect.
+    """
     if group == "null":
         builds = [one for pair in zip((*SMALL, ELEVEN_FINER), cycle(VEHICLES), strict=False) for one in pair]
         large = (WHOLE, WHOLE_FINER)[: n // 50]
@@ -164,7 +171,7 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
 
 
 def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -> Iterator[Trial]:
-    """``n`` trials of each of ``names``, over all targets and builds."""
+    """``n`` trials of each of ``names``, with targets and builds in turn."""
     turn = count()
     for first, name in enumerate(names):
         for k in range(n):
@@ -174,10 +181,10 @@ def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -
 def _mixed(
     group: Group, wing: Sequence[tuple[str, ...]], vehicle: Sequence[tuple[str, ...]], n: int
 ) -> Iterator[Trial]:
-    """``n`` trials, the kinds in turn, of wings and of vehicles in proportion to their kinds."""
+    """``n`` trials with the effects in turn; wings and vehicles in proportion to their numbers of effects."""
     kinds = [(names, True) for names in wing] + [(names, False) for names in vehicle]
     step = next(step for step in range(4, len(kinds) + 4) if math.gcd(step, len(kinds)) == 1)
-    for k in range(n):  # with a stride, so that the first few are of both rigs
+    for k in range(n):  # with a stride, so that the first few contain both rigs
         names, flexible = kinds[(k * step + len(kinds) - 1) % len(kinds)]
         builds = WINGS if flexible else VEHICLES
         build = builds[(k // len(kinds) + k) % len(builds)]
@@ -196,7 +203,7 @@ def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, 
 
 
 def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    """Three recordings in the chamber and two in the tunnel; held out are one of each, at another frequency or lag."""
+    """Three recordings in the chamber and two in the tunnel, and one held out of each, at another frequency or lag."""
     slow, fast = rng.permutation(FREQUENCIES[:2])[0], rng.permutation(FREQUENCIES[3:])[0]
     lags, speeds = rng.permutation(LAGS), np.sort(rng.permutation(SPEEDS)[:3])
     middle = FREQUENCIES[2]
@@ -212,7 +219,7 @@ def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
 
 
 def _alike(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    """Two recordings at one frequency, pressure or airspeed, and a third like them that is held out."""
+    """Two recordings at one frequency and one pressure or airspeed, and a similar one that is held out."""
     frequency, lags = float(rng.choice(FREQUENCIES[1:4])), rng.permutation(LAGS)
     if rng.uniform() < 0.5:
         pressure = float(rng.choice([THIN_PA, THICK_PA]))
@@ -229,7 +236,7 @@ def _flights(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bo
 
 
 def any_condition(trial: Trial, known: Collection[str], rng: np.random.Generator) -> Condition:
-    """A condition of the rig's, drawn at random from those that do not have the name of one ``known``."""
+    """A random condition of the rig whose name is not in ``known``."""
     return next(one for one in iter(lambda: _drawn(trial, rng), None) if name_of(one) not in known)
 
 
@@ -243,17 +250,17 @@ def _drawn(trial: Trial, rng: np.random.Generator) -> Condition:
 
 
 def chamber(pressure: float, lag: float, frequency: float) -> Condition:
-    """In the vacuum chamber."""
+    """A condition in the vacuum chamber; Pa, rad, Hz."""
     return Condition(float(frequency), float(lag), pressure, ROOM_K)
 
 
 def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
-    """In the wind tunnel."""
+    """A condition in the wind tunnel; rad, Hz, m/s."""
     return Condition(float(frequency), float(lag), AIR_PA, ROOM_K, float(airspeed), INCIDENCE)
 
 
 def flight(number: int) -> Condition:
-    """Of the DelFly."""
+    """A flight condition of the DelFly, by its row in FLIGHT."""
     speed, pitch, frequency = FLIGHT[number]
     return Condition(frequency, 0.0, AIR_PA, ROOM_K, speed, math.radians(pitch))
 

@@ -1,9 +1,8 @@
-"""``python -m benchmarks.durability --json``: deaths of the server, of workers, of nodes and of all at once.
+"""``python -m benchmarks.durability --json``: kills the server, workers, nodes, or all of them, again and again.
 
-Workers are also stopped (SIGSTOP), as a machine that swaps or a debugger does: each must be replaced.
-
-Visitors upload, submit, watch, pause, resume and cancel meanwhile, and note every answer. In the end all that was
-acknowledged must be there, every run must have ended as an undisturbed one does, and the database must be whole.
+Workers are also stopped (SIGSTOP), as by a swapping machine or a debugger; each must be replaced. Meanwhile clients
+upload, submit, watch, pause, resume and cancel, and record every answer. At the end everything that was acknowledged
+must be stored, every run must have the result of an undisturbed run, and the database must be intact.
 """
 
 from __future__ import annotations
@@ -25,49 +24,54 @@ import httpx
 import numpy as np
 
 from benchmarks.common import machine
+from benchmarks.common.files import archive
+from benchmarks.common.jobs import FINAL, succeeded
+from benchmarks.common.progress import show_count
 from benchmarks.common.server_process import WORKERS, Server
+from benchmarks.durability.clients import Client, finding, outcome, settle, settle_diagnosis
 from benchmarks.durability.cluster import Cluster
 from benchmarks.durability.ledger import Ledger
-from benchmarks.durability.visitors import FINAL, Visitor, finding, outcome, settle, settle_diagnosis
-from benchmarks.durability.works import DIAGNOSED, DIAGNOSIS, WORKS, archive
+from benchmarks.durability.workloads import DIAGNOSED, DIAGNOSIS, WORKS
 from wingfit.service.storage.database import FILE_NAME
 
 Json = dict[str, Any]
 KILLS = {"server": 300, "workers": 60, "hung": 20, "nodes": 20, "stack": 20}
-VISITORS = 2
+CLIENTS = 2
 LONGEST_LIFE = 2.5  # s
-# A diagnosis begins again with every life of the server: it must not stand in the way of the runs.
-# And it says nothing against a job that the server was killed from outside while it ran.
+# A diagnosis starts again whenever the server restarts: it must not block the runs.
+# Kills from outside must not count as failures of the job.
 ROOMY = {"WINGFIT_MAX_RUNS": "4", "WINGFIT_MAX_STARTS": "1000"}
 OF_DIAGNOSES = "diagnosis"
 PLACES = ("commit", "committed", "answer")
 QUIET_SECONDS = 600.0
-# Longer than any unit of these works may take before its worker is taken to hang.
+# Longer than any unit of these workloads may take before its worker counts as hung.
 REPLACED_SECONDS = 300.0
 EVALUATORS = {"server": "in_process", "workers": "processes", "hung": "processes", "nodes": "ray", "stack": "ray"}
 
 
 def main() -> None:
-    """Run all kinds of deaths, and print one JSON object as the last line."""
+    """Kill in all ways, and print one JSON object as the last line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.durability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument(
-        "--kills", type=int, help="of the server, and of the others in proportion; of the kind of --only"
+        "--kills",
+        type=int,
+        help="number of kills of the server, with the others in proportion; with --only, of that kind",
     )
-    parser.add_argument("--only", choices=sorted(KILLS), help="one kind of death")
+    parser.add_argument("--only", choices=sorted(KILLS), help="kill in this way only")
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
-    began, most = time.monotonic(), KILLS[asked.only or "server"]
-    part = 1.0 if asked.kills is None else asked.kills / most
-    kinds = [asked.only] if asked.only else list(KILLS)
+    options = parser.parse_args()
+    began, most = time.monotonic(), KILLS[options.only or "server"]
+    part = 1.0 if options.kills is None else options.kills / most
+    kinds = [options.only] if options.only else list(KILLS)
     with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
         expected = undisturbed(Path(scratch) / "undisturbed")
         found = {
-            kind: season(kind, max(1, round(part * KILLS[kind])), asked.seed, Path(scratch) / kind, expected)
+            kind: season(kind, max(1, round(part * KILLS[kind])), options.seed, Path(scratch) / kind, expected)
             for kind in kinds
         }
     results, identical = (sum(one[name] for one in found.values()) for name in ("results", "identical"))
-    told = {
+    figures = {
         "kills": {kind: one["kills"] for kind, one in found.items()},
         "hung": found["hung"]["kills"] if "hung" in found else 0,
         "hung_recovered": found["hung"]["recovered"] if "hung" in found else 0,
@@ -80,13 +84,13 @@ def main() -> None:
         "processor": machine.cpu(),
         "commit": machine.commit(),
     }
-    print(json.dumps(told))
-    whole = not told["lost"] and not told["stuck"] and told["integrity"] == "ok" and identical == results
-    sys.exit(0 if whole and told["hung"] == told["hung_recovered"] else 1)
+    print(json.dumps(figures))
+    whole = not figures["lost"] and not figures["stuck"] and figures["integrity"] == "ok" and identical == results
+    sys.exit(0 if whole and figures["hung"] == figures["hung_recovered"] else 1)
 
 
 def undisturbed(folder: Path) -> dict[str, Json]:
-    """How each work ends where nothing dies."""
+    """Results of every workload on a server that is not disturbed."""
     folder.mkdir()
     server, ends = Server(folder, "in_process"), {}
     server.start()
@@ -96,45 +100,35 @@ def undisturbed(folder: Path) -> dict[str, Json]:
             for example in {work.example for work in WORKS}
         }
         for work in WORKS:
-            run = _ended(http, "runs", work.body | {"dataset_id": uploaded[work.example]})
+            run = succeeded(http, "runs", work.body | {"dataset_id": uploaded[work.example]})
             ends[work.name] = outcome(run, lambda path: http.get(path).json())
-        diagnosis = _ended(http, "diagnoses", DIAGNOSIS | {"dataset_id": uploaded[DIAGNOSED]})
+        diagnosis = succeeded(http, "diagnoses", DIAGNOSIS | {"dataset_id": uploaded[DIAGNOSED]})
         ends[OF_DIAGNOSES] = finding(diagnosis, lambda path: http.get(path).json())
     server.stop()
     return ends
 
 
-def _ended(http: httpx.Client, kind: str, body: Json) -> str:
-    """Id of a run or a diagnosis that was submitted and has succeeded."""
-    job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
-    while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:
-        time.sleep(0.05)
-    if now["state"] != "SUCCEEDED":
-        raise RuntimeError(f"{now['name']} {now['state']}: {now['error']}")
-    return job
-
-
 def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
-    """Deaths of one kind under visitors, then quiet, then the reckoning."""
+    """Kills of one kind while clients use the server, then a quiet phase, then the checks."""
     folder.mkdir()
     cluster = Cluster(folder) if EVALUATORS[kind] == "ray" else None
     token, address = (cluster.token, cluster.address) if cluster else (None, "")
     server = Server(folder, EVALUATORS[kind], token, address, ROOMY)
     server.start()
     ledger, rng = Ledger(), np.random.default_rng([seed, kills])
-    visitors = [Visitor(number, seed, server.port, ledger, expected) for number in range(VISITORS)]
-    for visitor in visitors:
-        visitor.start()
+    clients = [Client(number, seed, server.port, ledger, expected) for number in range(CLIENTS)]
+    for client in clients:
+        client.start()
     began, recovered = time.monotonic(), 0
     for number in range(kills):
         recovered += DEATHS[kind](server, cluster, rng) is not False
-        failed = next((visitor.error for visitor in visitors if visitor.error), None)
+        failed = next((client.error for client in clients if client.error), None)
         if failed:
             raise failed
-        _progress(kind, number + 1, kills, began)
-    for visitor in visitors:
-        visitor.leave()
-        visitor.join(60)
+        show_count(f"killing: {kind}", number + 1, kills, began)
+    for client in clients:
+        client.leave()
+        client.join(60)
     if server.fail_point:
         server.kill()
         server.start()
@@ -157,11 +151,11 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
     }
 
 
-# -- deaths -------------------------------------------------------------------------------------------------
+# -- kills --------------------------------------------------------------------------------------------------
 
 
 def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
-    """At any time, or at a commit or an answer, as was settled at its birth; then a new life."""
+    """Kill the server, at a random time or at a fail point chosen at its start, and restart it."""
     server.died(4 * LONGEST_LIFE if server.fail_point else rng.uniform(0.0, LONGEST_LIFE))
     server.kill()
     armed = f"{PLACES[rng.integers(len(PLACES))]}:{rng.integers(1, 60)}"
@@ -169,13 +163,13 @@ def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> N
 
 
 def _of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
-    """Of one that evaluates, while the server lives."""
+    """Kill a worker while the server lives."""
     with suppress(ProcessLookupError):
         os.kill(_some_worker(server, rng), signal.SIGKILL)
 
 
 def _stop_of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> bool:
-    """One that evaluates is stopped; whether it is replaced."""
+    """Stop a worker; whether it is replaced."""
     worker = _some_worker(server, rng)
     try:
         os.kill(worker, signal.SIGSTOP)
@@ -200,7 +194,7 @@ def _some_worker(server: Server, rng: np.random.Generator) -> int:
 
 
 def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
-    """Of the only node that computes; another one joins."""
+    """Kill the only node that computes, and start another."""
     assert cluster is not None  # noqa: S101  # of this kind
     time.sleep(rng.uniform(1.0, 2 * LONGEST_LIFE))
     cluster.kill_node()
@@ -208,7 +202,7 @@ def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> No
 
 
 def _of_all(server: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
-    """Of server, head and node at once."""
+    """Kill server, head and node together."""
     assert cluster is not None  # noqa: S101  # of this kind
     time.sleep(rng.uniform(1.0, 4 * LONGEST_LIFE))
     server.kill_all()
@@ -226,11 +220,11 @@ DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], bool |
 }
 
 
-# -- the reckoning ------------------------------------------------------------------------------------------
+# -- checks -------------------------------------------------------------------------------------------------
 
 
 def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
-    """Let everything end undisturbed, and judge it; the number of runs that do not end."""
+    """Let everything end undisturbed and check it; the number of jobs that do not end."""
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
 
         def fetch(path: str) -> Json | None:
@@ -284,12 +278,6 @@ def _integrity(path: Path) -> str:
     finally:
         connection.close()
     return "ok" if found == "ok" and not broken else f"{found}, {len(broken)} broken references"
-
-
-def _progress(kind: str, done: int, total: int, began: float) -> None:
-    left = (time.monotonic() - began) / done * (total - done)
-    end = "\n" if done == total else ""
-    print(f"\rdeaths of {kind}: {done} of {total}, about {left:.0f} s left   ", end=end, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A Ray cluster as Compose starts it, and its deaths."""
+"""A Ray cluster as in the Compose deployment, and ways to kill its nodes."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from benchmarks.common.ray_nodes import Node, free_port
+from benchmarks.common.ray_node import Node, free_port
 
 START_SECONDS = 120.0
 
 
 class Cluster:
-    """A Ray head and one more node that computes."""
+    """A Ray head, and one more node that computes."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.token, self._lives = folder, folder / "token", 0
@@ -24,11 +24,11 @@ class Cluster:
 
     @property
     def address(self) -> str:
-        """Of the head."""
+        """Address of the head."""
         return f"127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        """Start both."""
+        """Start both nodes."""
         self._lives += 1
         log = self.folder / f"head-{self._lives}.log"
         self.head = Node(
@@ -38,18 +38,18 @@ class Cluster:
         self.start_node()
 
     def start_node(self) -> None:
-        """Start the one that computes."""
+        """Start the node that computes."""
         self._lives += 1
         log = self.folder / f"node-{self._lives}.log"
         self.node = Node(self.token, log, f"--address={self.address}")
         _until(lambda: "Ray runtime started" in log.read_text(errors="replace"), log)
 
     def kill_node(self) -> None:
-        """Pull its plug."""
+        """Kill the node that computes."""
         self.node.remove()
 
     def kill(self) -> None:
-        """Pull the plug of both."""
+        """Kill both nodes."""
         for node in (self.node, self.head):
             node.remove()
 
@@ -58,5 +58,7 @@ def _until(what: Callable[[], bool], log: Path) -> None:
     deadline = time.monotonic() + START_SECONDS
     while not what():
         if time.monotonic() > deadline:
-            raise RuntimeError(f"Ray does not start: {log.read_text(errors='replace')[-2000:]}")
+            raise RuntimeError(
+                f"Ray does not start within {START_SECONDS:g} s: {log.read_text(errors='replace')[-2000:]}"
+            )
         time.sleep(0.1)

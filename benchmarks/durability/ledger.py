@@ -1,4 +1,4 @@
-"""What was acknowledged, by whom it must still be known, and what of it was lost."""
+"""Record of what the server acknowledged, and of what was lost."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ class KnownRun:
     """A run whose submission was acknowledged.
 
     Attributes:
-        work: name of what it computes.
-        generations: of its history, by sequence, as they were first seen.
-        endings: what may become of it: SUCCEEDED; also CANCELLED once that was asked, and that alone once acknowledged.
-        final: its state, once seen to have ended.
+        work: name of its workload.
+        generations: of its history, by sequence number, as first seen.
+        endings: allowed final states: SUCCEEDED; also CANCELLED once that was requested, only CANCELLED once
+            acknowledged.
+        final: its final state, once seen.
     """
 
     work: str
@@ -29,12 +30,12 @@ class KnownRun:
 
 @dataclass
 class Ledger:
-    """All that was acknowledged so far; safe to use from several threads."""
+    """Everything that was acknowledged so far; thread-safe."""
 
     datasets: dict[str, str] = field(default_factory=dict)
     runs: dict[str, KnownRun] = field(default_factory=dict)
     diagnoses: dict[str, str | None] = field(default_factory=dict)
-    """State of each once seen to have ended."""
+    """Final state of each, once seen."""
     lost: list[str] = field(default_factory=list)
     acknowledged: int = 0
     results: int = 0
@@ -43,17 +44,17 @@ class Ledger:
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def lose(self, what: str) -> None:
-        """Something that was acknowledged is not as it was."""
+        """Record that something acknowledged was lost or changed."""
         with self.lock:
             self.lost.append(what)
 
     def acknowledge(self) -> None:
-        """Count one more answer that must be kept."""
+        """Count one more acknowledged request."""
         with self.lock:
             self.acknowledged += 1
 
     def history(self, run: str, items: list[Json]) -> None:
-        """Compare a history with what was seen of it before, and remember it."""
+        """Compare a history with the one seen before, and store it."""
         with self.lock:
             seen = self.runs[run].generations
             now = {item["sequence"]: without_times(item) for item in items}
@@ -64,7 +65,7 @@ class Ledger:
             seen.update(now)
 
     def result(self, run: str, found: Json, expected: Json) -> None:
-        """Compare how a run or a diagnosis ended with how an undisturbed one did."""
+        """Compare the result of a run or diagnosis with the undisturbed one."""
         with self.lock:
             self.results += 1
             self.identical += found == expected
@@ -73,5 +74,5 @@ class Ledger:
 
 
 def without_times(item: Json) -> Json:
-    """``item`` without what a clock says."""
+    """``item`` without its times."""
     return {key: value for key, value in item.items() if key not in TIMES}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.durability.works import EXAMPLES
+from benchmarks.common.files import EXAMPLES
 from wingfit.client.client import Client
 
 Json = dict[str, Any]

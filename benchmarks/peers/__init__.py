@@ -1,1 +1,1 @@
-"""The same wing in other engines: an independent right-hand side for scipy, and Exudyn."""
+"""The same wing in other engines: independently written equations for scipy, and Exudyn."""

@@ -11,16 +11,21 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 
 
 def main() -> None:
-    """Print one line for all engines that were asked for."""
+    """Print one line for each requested engine."""
     from benchmarks.peers import compare
 
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers", description=__doc__)
-    parser.add_argument("--division", default="24", help="bodies, as a preset, 6x4 or 3,3,3,2")
+    parser.add_argument("--division", default="24", help="discretisation: a preset such as 24, or 6x4, or 3,3,3,2")
     parser.add_argument("--medium", choices=list(compare.CONDITIONS), default="vacuum")
-    parser.add_argument("--engine", choices=list(compare.CASES), action="append", help="default: scipy and exudyn")
+    parser.add_argument(
+        "--engine",
+        choices=list(compare.CASES),
+        action="append",
+        help="engine, may be repeated (default: scipy and exudyn)",
+    )
     parser.add_argument("--tolerance-mm", type=float, default=0.1, help="largest error of a marker")
-    parser.add_argument("--seconds", type=float, default=600.0, help="time allowed to each engine")
-    parser.add_argument("--json", action="store_true", help="one line of JSON")
+    parser.add_argument("--seconds", type=float, default=600.0, help="time limit of each engine, s")
+    parser.add_argument("--json", action="store_true", help="print one line of JSON")
     given = parser.parse_args()
     engines = given.engine or ["scipy", "exudyn"]
     rows = [compare.case(e, given.division, given.medium, given.tolerance_mm, given.seconds) for e in engines]

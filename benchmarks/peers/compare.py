@@ -1,8 +1,4 @@
-"""What a beat of the wing costs in each engine, at a stated error against that engine's own converged run.
-
-Times are process times of one thread; linear algebra libraries must be held to one thread before numpy is imported
-(``OPENBLAS_NUM_THREADS=1``), as ``python -m benchmarks.peers`` does: their idle threads would be counted too.
-"""
+"""Cost of a beat of the wing in each engine, at a given error against that engine's own converged run."""
 
 from __future__ import annotations
 
@@ -32,25 +28,25 @@ def nominal(division: str, medium: Medium) -> PeerWing:
 
 
 def scipy_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """scipy's LSODA, BDF or Radau, whichever is cheapest, on compiled equations with the Jacobian's sparsity."""
+    """scipy's LSODA, BDF or Radau, whichever is cheapest, on compiled equations with the sparsity of the Jacobian."""
     return case("scipy", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Exudyn with its own spring law, compiled throughout; in air the strips' compiled loads are called from Python.
+    """Exudyn with its own compiled spring law; in air, the compiled loads of strips are called from Python.
 
-    In the chamber Exudyn is spared the last 1 % of the air and with it the calls from Python.
+    In the chamber the last 1 % of the air is neglected in Exudyn, which avoids the calls from Python.
     """
     return case("exudyn", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_same_law_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Exudyn with our spring law, every connector called from Python: slow, for agreement and not for speed."""
+    """Exudyn with our spring law, every connector called from Python: slow, a check of agreement and not of speed."""
     return case("exudyn_same_law", division, medium, tolerance_mm, seconds)
 
 
 def case(engine: str, division: str, medium: Medium, tolerance_mm: float, seconds: float) -> dict[str, Any]:
-    """One line of the comparison: engine, bodies, medium, tolerance, and the fields of Cost."""
+    """One row of the comparison: engine, bodies, medium, tolerance, and the fields of Cost."""
     if engine not in CASES:
         raise ValueError(f"engine {engine!r} is unknown; give one of {', '.join(CASES)}")
     if not tolerance_mm > 0:

@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 V3 = tuple[float, float, float]
 
 SIZE = 13  # numbers per body
-P, Q, V, W = 0, 3, 7, 10  # where position, quaternion, velocity, angular velocity start
+P, Q, V, W = 0, 3, 7, 10  # offsets of position, quaternion, velocity, angular velocity
 _TURN = math.sin(math.radians(15.0))
 _STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
@@ -110,14 +110,14 @@ def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -
 
 @allocating
 def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: Array) -> None:
-    """Add what springs and dampers do to bodies and rods."""
+    """Add the loads of springs and dampers on bodies and rods."""
     for c in range(len(wing.first)):
         i, j = wing.first[c], wing.second[c]
         arm_a, arm_b = _turned(R, i, _row(wing.a, c)), _turned(R, j, _row(wing.b, c))
         reach = _plus(_plus(_row(p, j), -1.0, _row(p, i)), 1.0, arm_b)  # from A's centre to B's origin
         s = _plus(reach, -1.0, arm_a)
         k_a, k_b, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        # relative twist, B's origin against the point of A's frame that is there now
+        # relative twist: B's origin relative to the coincident point of A's frame
         turning = _plus(_row(w, j), -1.0, _row(w, i))
         moving = _plus(_row(v, j), 1.0, _cross(_row(w, j), arm_b))
         moving = _plus(_plus(moving, -1.0, _row(v, i)), -1.0, _cross(_row(w, i), reach))
@@ -147,7 +147,7 @@ def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) 
     x = min(max(along / (_TURN * speed), -1.0), 1.0)
     side = 0.5 * x * (3.0 - x * x)
     alpha = math.atan2(across, along * side)
-    pressure = 0.5 * wing.air * speed * wing.area[strip]  # times speed once more, in the directions below
+    pressure = 0.5 * wing.air * speed * wing.area[strip]  # the directions below contain one more factor of speed
     lift = pressure * side * (wing.coefficients[0] * alpha + wing.coefficients[1])
     drag = pressure * (wing.coefficients[2] * abs(alpha) + wing.coefficients[3])
     zero = (0.0, 0.0, 0.0)
@@ -245,21 +245,21 @@ def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
 
 
 def right_hand_side(wing: PeerWing, t: float, y: Array) -> Array:
-    """As ``scipy.integrate`` wants it: ``y`` [13 N] or, vectorised, [13 N, k]."""
+    """For ``scipy.integrate``: ``y`` [13 N] or, vectorised, [13 N, k]."""
     if y.ndim == 1:
         return np.asarray(rates_of_rows(wing, t, y[None])[0])
     return np.asarray(rates_of_rows(wing, t, np.ascontiguousarray(y.T)).T)
 
 
 def at_rest(wing: PeerWing) -> Array:
-    """State [13 N] of the undeformed wing, not moving."""
+    """State [13 N] of the undeformed wing at rest."""
     y = np.zeros((len(wing.mass), SIZE))
     y[:, P:Q], y[:, Q] = wing.rest, 1.0
     return y.ravel()
 
 
 def sparsity(wing: PeerWing) -> csc_matrix:
-    """Which rates depend on which numbers of the state: neighbours through connectors, a strip through its air."""
+    """Sparsity of the Jacobian: neighbours couple through connectors, the bodies of a strip through the air."""
     n = len(wing.mass)
     near = np.eye(n, dtype=bool)
     for i, j in zip(wing.first, wing.second, strict=True):

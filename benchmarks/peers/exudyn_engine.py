@@ -26,15 +26,15 @@ from wingfit.sim.kernels.jit import allocating
 Array = npt.NDArray[np.float64]
 Law = Literal["angles", "logarithm", "energy"]
 
-SAMPLES = 60  # of the motion over each beat
-_ROD_MASS, _ROD_INERTIA = 0.1, 1e-4  # kg, kg m^2: of no consequence, the rods' motion being prescribed
+SAMPLES = 60  # stored instants per beat
+_ROD_MASS, _ROD_INERTIA = 0.1, 1e-4  # kg, kg m^2: without influence, because the rods' motion is prescribed
 
 
 def load_exudyn() -> Any:
-    """The package, in its fast build without range checks; ImportError names the extra."""
+    """The package, in its fast build without range checks; ImportError names the extra to install."""
     sys.exudynFast = True  # type: ignore[attr-defined]
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it greets
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting
             import exudyn
     except ImportError as missing:
         raise ImportError("exudyn is not installed; install the extra: pip install 'wingfit[peers]'") from missing
@@ -43,7 +43,7 @@ def load_exudyn() -> Any:
 
 @dataclass(frozen=True)
 class Settings:
-    """How Exudyn integrates.
+    """Settings of Exudyn's integrator.
 
     Attributes:
         steps: per beat, a multiple of SAMPLES.
@@ -60,12 +60,12 @@ class Settings:
 
     def __post_init__(self) -> None:
         if self.steps < SAMPLES or self.steps % SAMPLES:
-            raise ValueError(f"{self.steps} steps a beat do not meet the {SAMPLES} samples; give a multiple of them")
+            raise ValueError(f"{self.steps} steps a beat is not a multiple of {SAMPLES} samples; give a multiple")
 
 
 @dataclass(frozen=True)
 class ExudynRun:
-    """SAMPLES a beat from rest.
+    """Beats from rest, SAMPLES instants each.
 
     Attributes:
         times: [T] s.
@@ -92,7 +92,7 @@ def simulate(wing: PeerWing, settings: Settings, *, beats: int = 2, until: float
     marks: list[float] = []
 
     def watch(_: Any, t: float) -> bool:
-        if not marks or t > (len(marks) + 0.5 / settings.steps) * period:  # t is the end of the step to come
+        if not marks or t > (len(marks) + 0.5 / settings.steps) * period:  # t is the end of the next step
             marks.append(time.process_time())
         return time.monotonic() < until
 
@@ -106,7 +106,7 @@ def simulate(wing: PeerWing, settings: Settings, *, beats: int = 2, until: float
     done = system.SolveDynamic(_solver_settings(exu, settings, beats, period), showHints=False)
     marks.append(time.process_time())
     if time.monotonic() >= until:
-        raise OutOfTimeError("stopped before its end")
+        raise OutOfTimeError("stopped at the time limit")
     if not done:
         raise ArithmeticError(f"Exudyn gave up with {settings}")
     rows = np.array([system.GetSensorStoredData(s) for s in sensors])
@@ -130,7 +130,7 @@ def _solver_settings(exu: Any, settings: Settings, beats: int, period: float) ->
 
 
 def _add_bodies(items: Any, system: Any, wing: PeerWing) -> tuple[list[Any], list[Any]]:
-    """Nodes and objects of the N bodies, under gravity, then of the two driven rods."""
+    """Nodes and objects of the N bodies, under gravity, and of the two driven rods."""
     nodes, bodies = [], []
     for mass, inertia, place in zip(wing.mass, wing.inertia, wing.rest, strict=True):
         J = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[1, 2], inertia[0, 2], inertia[0, 1]]
@@ -253,9 +253,9 @@ def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
 
 
 def _add_air(exu: Any, system: Any, wing: PeerWing, nodes: list[Any]) -> None:
-    """One object over all bodies whose force is the air's: evaluated at every iteration, so nothing lags.
+    """One object over all bodies whose force is that of the air, evaluated at every iteration.
 
-    Its Jacobian is left out: the air is soft beside the springs, and Newton's method converges without.
+    Its Jacobian is omitted: the air is soft compared with the springs, and Newton's method converges without it.
     """
     size = 6 * len(nodes)
     nothing = exu.MatrixContainer()
@@ -292,9 +292,9 @@ def cheapest(
     converged: int = 3840,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cost of a beat after the ramp at the longest step whose markers stay within ``tolerance_mm``.
+    """Cost of the beat after the ramp at the longest step whose markers stay within ``tolerance_mm``.
 
-    Measured against the same law's converged run; of Newton tolerances that suffice, the cheaper counts.
+    Measured against the converged run with the same law; of sufficient Newton tolerances the cheaper one is used.
     """
     until = time.monotonic() + seconds
     method, note = f"generalised alpha, {law}", f"not found within {seconds:g} s; allow more time"

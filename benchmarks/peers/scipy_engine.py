@@ -1,4 +1,4 @@
-"""scipy's stiff integrators on the independent right-hand side, stepped here so that each beat is timed by itself."""
+"""scipy's stiff integrators on the independent equations, stepped one by one so that each beat is timed."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from benchmarks.peers.wing import PeerWing
 Array = npt.NDArray[np.float64]
 
 METHODS = {"Radau": Radau, "BDF": BDF, "LSODA": LSODA}
-_LENGTH = 0.1  # m, a chord: makes the absolute tolerances of rotations and displacements comparable
+_LENGTH = 0.1  # m, about a chord: relates the absolute tolerances of rotations and displacements
 
 
 class OutOfTimeError(RuntimeError):
-    """The run was stopped because it would have taken longer than allowed."""
+    """The run was stopped at its time limit."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """From rest through some beats.
+    """Some beats from rest.
 
     Attributes:
-        times: [T] end of every step, s, with the start.
+        times: [T] start, and end of every step, s.
         states: [T, 13 N].
         cpu: [beats] process time of each beat, s.
-        between: the integrator's own interpolation, when it was kept.
+        between: the integrator's interpolation, if it was kept.
     """
 
     times: Array
@@ -49,7 +49,7 @@ def simulate(
     keep: bool = False,
     clock: Callable[[], None] = lambda: None,
 ) -> Run:
-    """Integrate from rest with relative tolerance ``tolerance`` and absolute ones to match, each number in its scale.
+    """Integrate from rest with relative tolerance ``tolerance``, and absolute ones scaled by typical values.
 
     ``clock`` is called after every step and may raise :class:`OutOfTimeError`. ``keep`` keeps the interpolation.
     """
@@ -84,7 +84,10 @@ def _solver(wing: PeerWing, method: str, tolerance: float, end: float) -> OdeSol
 
 @dataclass(frozen=True)
 class Cost:
-    """What one beat costs at a stated error; ``cpu_ms_per_beat`` None when it was not found, ``note`` says why."""
+    """Cost of one beat at a given error.
+
+    If there is no result, ``cpu_ms_per_beat`` is None and ``note`` gives the reason.
+    """
 
     cpu_ms_per_beat: float | None
     error_mm: float | None
@@ -107,7 +110,7 @@ def deadline(seconds: float) -> Callable[[], None]:
 def error_against(wing: PeerWing, run: Run, reference: Run) -> float:
     """Largest distance (m) of a marker from the reference at the steps of the last beat.
 
-    At the peer's own steps, so that its interpolation is not held against it.
+    It is evaluated at the peer's own steps, without its interpolation error.
     """
     if reference.between is None:
         raise ValueError("the reference was run without its interpolation; simulate it with keep=True")
@@ -125,10 +128,10 @@ def cheapest(
     converged: float = 1e-6,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cheapest beat after the ramp whose markers stay within ``tolerance_mm`` of the converged run (Radau's).
+    """Cheapest beat after the ramp whose markers stay within ``tolerance_mm`` of the converged run (Radau).
 
-    Each method takes the loosest tolerance that suffices together with the next tighter one, and the cheaper of the
-    two: BDF and LSODA are erratic, so one alone may suffice by luck, and the looser may take more steps.
+    For each method, the loosest sufficient tolerance whose next tighter one suffices as well, and the cheaper of the
+    two: the errors of BDF and LSODA are erratic, so a single tolerance may suffice by chance.
     """
     clock = deadline(seconds)
     try:
@@ -157,7 +160,7 @@ def _sufficient(
     reference: Run,
     clock: Callable[[], None],
 ) -> list[Cost]:
-    """The two loosest neighbouring tolerances that suffice, as far as there are such."""
+    """The two loosest neighbouring tolerances that suffice, if there are any."""
     found: list[Cost] = []
     for tolerance in tolerances:
         try:

@@ -1,6 +1,6 @@
-"""What the peers are given: masses, connectors, air coefficients and drive of one individual, as plain arrays.
+"""Input of the other engines: masses, connectors, air coefficients and drive of one individual, as plain arrays.
 
-Data only. Every force is evaluated again by the peer that uses it.
+Data only. Every force is evaluated by the engine's own code.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class PeerWing(NamedTuple):
         mass: [N] kg.
         inertia: [N, 3, 3] kg m^2 about the centre of mass, body axes.
         rest: [N, 3] centres of mass at rest, m; all bodies are aligned with the world there.
-        first, second: [C] bodies that a connector joins.
-        a, b: [C, 3] its place on either, from the body's centre (a rod's: from the hinge), m.
+        first, second: [C] bodies that a connector connects.
+        a, b: [C, 3] its place on each, from the body's centre (for a rod: from the hinge), m.
         stiffness, damping: [C, 6] about x, y, z (N m/rad), then along x, y, z (N/m), of the first body's axes.
         strip: [S + 1] first body of each strip.
         weight: [N] share of the strip's area; ``centroid`` [N, 2] of the planform, from the body's centre, m.
@@ -78,7 +78,7 @@ class PeerWing(NamedTuple):
 def peer_wing(
     structure: Structure, genes: tuple[Gene, ...], genome: Array, condition: Condition, ramp_beats: int = 1
 ) -> PeerWing:
-    """Gather what ``genome`` [G] under ``condition`` is made of."""
+    """The arrays of ``genome`` [G] under ``condition``."""
     group, w = lanes(structure, genes, genome[None]), structure.wiring
     incidence, hinge = condition.angle_of_attack, structure.wing.hinge
     mean, harmonics = _drive_series(structure)
@@ -114,7 +114,7 @@ def peer_wing(
 
 
 def _drive_series(structure: Structure) -> tuple[float, Array]:
-    """Mean and harmonics [H, 2] of the flap angle, so that compiled code can evaluate it at any time."""
+    """Mean and harmonics [H, 2] of the flap angle, for evaluation in compiled code."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     spectrum = np.fft.rfft(flap_angle(structure.wing.drive, psi)[:, 0]) / _SAMPLES
     head = 2 * spectrum[1 : _HARMONICS + 1]
@@ -123,7 +123,7 @@ def _drive_series(structure: Structure) -> tuple[float, Array]:
 
 @allocating
 def rod_motion(wing: PeerWing, t: float, rod: int) -> tuple[float, float]:
-    """Angle (rad) and rate (rad/s) of a rod at time ``t`` (s): the periodic drive, let in by a quintic ramp."""
+    """Angle (rad) and rate (rad/s) of a rod at time ``t`` (s): the periodic drive times a quintic ramp."""
     psi = wing.omega * t - wing.lag[rod]
     angle, slope = wing.mean, 0.0
     c1, s1 = np.cos(psi), np.sin(psi)

@@ -1,4 +1,4 @@
-"""What the printed tables say without any recording (Armanini et al. 2016, Tables 3-5 and 8)."""
+"""Results that follow from the printed tables alone (Armanini et al. 2016, Tables 3-5 and 8)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wingfit.sim.virtual_rigs.balance import TRIALS, delfly, true_beat
 
 
 def tables_law() -> GlobalModel:
-    """Eq. 23 by plain least squares on the source's own Table 8."""
+    """Eq. 23 by unweighted least squares on Table 8."""
     local = [
         LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(t.coefficients, 0.0), (), (), 0.0, True, ())
         for t in TRIALS
@@ -25,7 +25,7 @@ def tables_law() -> GlobalModel:
 
 
 def closest_law_percent(name: str) -> float:
-    """Least that the largest relative error of any affine law can be on the source's Table 8: minimax, per cent."""
+    """Smallest possible maximum of the relative error of an affine law on Table 8 (minimax), per cent."""
     values = np.array([trial.coefficients[name] for trial in TRIALS])
     design = (
         np.array([[1.0, t.condition.flap_frequency, t.condition.angle_of_attack] for t in TRIALS]) / values[:, None]
@@ -41,7 +41,7 @@ def closest_law_percent(name: str) -> float:
 
 
 def lift_by_root_pitch() -> dict[str, list[float]]:
-    """Mean lift (N) under each condition with the coefficients of Table 8, for both readings of the twist's root."""
+    """Mean lift (N) under each condition with the coefficients of Table 8, for both readings of the root's twist."""
     found = {}
     for name, root in (("0", 0.0), ("90_deg", np.pi / 2)):
         vehicle = delfly()

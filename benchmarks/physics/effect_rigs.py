@@ -1,4 +1,4 @@
-"""The rigs that effects are measured on: the Robird's wing and the DelFly, over their campaigns, without noise."""
+"""The rigs on which effects are measured: the Robird's wing and the DelFly with their campaigns, without noise."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ AnyModel = FlexibleWing | BladeElementWing
 
 RIGS: tuple[Kind, ...] = ("wing", "vehicle")
 DIVISION = "11"
-STEPS = Numerics(steps=144, periodic=4e-6, max_beats=40)  # differences of motions must be smooth in the genes
-QUICK = (1, 5, 7)  # of the campaign's conditions
+STEPS = Numerics(
+    steps=144, periodic=4e-6, max_beats=40
+)  # fixed steps, so that differences of motions are smooth in the genes
+QUICK = (1, 5, 7)  # indices of conditions
 FRAMES = 2 * (FRAMES_PER_BEAT + 1)
 FORCE_BEATS, PER_BEAT = 3, 64
 
@@ -34,7 +36,7 @@ FORCE_BEATS, PER_BEAT = 3, 64
 class Rig:
     """A rig with its conditions.
 
-    ``unit`` turns m or N into what is told; ``axes`` are those of the forces.
+    ``unit`` converts m or N to the unit of the table (mm or mN); ``axes`` are those of the forces.
     """
 
     kind: Kind
@@ -44,12 +46,15 @@ class Rig:
     quick: bool
 
     def stands_for(self, effect: Effect) -> str:
-        """The term of the vehicle's model that the effect is a name for; without it the effect is put in."""
+        """The term of the vehicle's model that is the effect itself; the reference model omits this term."""
         known = self.kind == "vehicle" and effect.name in BladeElementWing(delfly()).terms
         return effect.name if known else ""
 
     def model(self, effect: Effect | None, *, without: str = "") -> AnyModel:
-        """The model with ``effect``; a vehicle without the term that it stands for, or without another."""
+        """The model with ``effect``.
+
+        A vehicle without the term that the effect represents, and without the term ``without``.
+        """
         names = (effect.name,) if effect else ()
         if isinstance(self.description, Wing):
             return FlexibleWing(self.description, DIVISION, numerics=STEPS, effects=names)
@@ -58,38 +63,38 @@ class Rig:
         return replace(bare, terms=tuple(term for term in bare.terms if term not in left_out), effects=names)
 
     def by_default(self, effect: Effect | None, without: str) -> AnyModel:
-        """The model as a user has it, solved to the default accuracy."""
+        """The model with default settings and accuracy."""
         model = self.model(effect, without=without)
         return replace(model, numerics=Numerics()) if isinstance(model, FlexibleWing) else model
 
     def recordings(self, without: str = "") -> tuple[Recording, ...]:
-        """What the nominal rig is recorded as under every condition."""
+        """Recordings of the nominal rig under every condition."""
         return _recorded(self, without)
 
     def timed(self) -> tuple[Recording, ...]:
-        """Recordings that a batch's cost is measured on."""
+        """Recordings for measuring the cost of a batch."""
         return _recorded(self, "")[:: 4 if self.kind == "wing" else 3]
 
     def rms(self, difference: Array) -> float:
-        """Root mean square of the distance of a marker, or of a force along an axis, over [D] values."""
+        """RMS distance of a marker, or RMS force along an axis, over [D] values."""
         per = difference.reshape(-1, 3 if self.kind == "wing" else 1)
         return float(np.sqrt((per**2).sum(axis=1).mean()))
 
     def changed(self, recordings: tuple[Recording, ...], difference: Array) -> tuple[Recording, ...]:
-        """The recordings with [D] added."""
+        """The recordings with ``difference`` [D] added."""
         ends = np.cumsum([recording.values.size for recording in recordings])
         parts = np.split(difference, ends[:-1])
         pairs = zip(recordings, parts, strict=True)
         return tuple(replace(one, values=one.values + part.reshape(one.values.shape)) for one, part in pairs)
 
     def parts(self, recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
-        """Recordings that share a genome: all of a wing; each by itself of a vehicle, as the seed fits it."""
+        """Recordings that share a genome: all of a wing; for a vehicle each one alone, as in Armanini et al. (2016)."""
         return [recordings] if self.kind == "wing" else [(recording,) for recording in recordings]
 
 
 @cache
 def rig_of(kind: str, quick: bool) -> Rig:
-    """The rig called ``kind``."""
+    """The rig of this kind."""
     if kind == "wing":
         return Rig("wing", robird_wing(), 1e3, (), quick)
     return Rig("vehicle", delfly(), 1e3, ("x", "z"), quick)
@@ -108,7 +113,7 @@ def _recorded(rig: Rig, without: str) -> tuple[Recording, ...]:
 
 @cache
 def recorded(rig: Rig, condition: Condition) -> Recording:
-    """What the nominal wing is recorded as under any ``condition``."""
+    """Recording of the nominal wing under ``condition``."""
     model = rig.model(None)
     return _filled(model, np.array([[gene.nominal for gene in model.genes]]), _strobed(rig, condition))
 
@@ -128,7 +133,7 @@ def _forces(number: int) -> Recording:
 
 
 def _filled(model: AnyModel, nominal: Array, blank: Recording) -> Recording:
-    """What the nominal rig is recorded as; tracks are placed by themselves, from a first look at their own beat."""
+    """Recording of the nominal rig. The start of a track's beat is estimated from the track itself."""
     if isinstance(model, BladeElementWing):
         return replace(blank, values=model.observe(nominal, blank).channels[0])
     beat = model.beat(nominal[0], blank)

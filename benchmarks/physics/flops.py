@@ -1,10 +1,4 @@
-"""What a step of the integrator computes, counted, and how fast this core can compute at best.
-
-The kernels' own Python source runs on numbers that count: ``python -m benchmarks.physics.flops --division 24`` prints
-the operations of one step. One of + - * / and a square root on a lane counts 1, a fused multiply-add therefore 2. Not
-counted are signs, magnitudes, minima, the arc tangents of the air, what is done once for all lanes, and products with 1
-or -1, which the compiler drops. It also computes once what the source says twice: about 3 % of the count.
-"""
+"""Operations of an integrator step, counted, and the peak performance of this core."""
 
 from __future__ import annotations
 
@@ -37,16 +31,16 @@ SUMS = (6, 12)  # accumulators that fill the registers of a core with AVX2 and o
 
 
 class Counter:
-    """Operations on lanes so far."""
+    """Number of operations on lanes so far."""
 
     def __init__(self) -> None:
         self.operations = 0
 
 
 class Counted:
-    """A group of lanes that counts what is done to it."""
+    """A group of lanes that counts the operations on it."""
 
-    __array_ufunc__ = None  # numpy's numbers leave arithmetic with lanes to this class
+    __array_ufunc__ = None  # numpy scalars use the arithmetic of this class
 
     def __init__(self, value: Array, counter: Counter) -> None:
         self.value, self.counter = value, counter
@@ -92,12 +86,12 @@ def _is_one(x: Counted | float) -> bool:
 
 
 def counting(function: Callable[..., Any], counter: Counter) -> Callable[..., Any]:
-    """A kernel, with all that it calls, as plain Python on lanes that count."""
+    """A kernel, and all that it calls, as plain Python on counting lanes."""
     return _Interpreter(counter).plain(function)
 
 
 class _Interpreter:
-    """Compiled functions back to their source, lane accessors replaced by those of :class:`Counted`."""
+    """Replaces compiled functions by their Python source, and lane accessors by those of :class:`Counted`."""
 
     def __init__(self, counter: Counter) -> None:
         self.counter = counter
@@ -131,7 +125,7 @@ class _Interpreter:
             return self.plain(thing)
         try:
             known = self.accessors.get(thing)
-        except TypeError:  # cannot be hashed: an array of constants
+        except TypeError:  # not hashable: an array of constants
             return thing
         if known is None and type(thing).__module__.startswith("numba."):
             raise NotImplementedError(
@@ -153,14 +147,14 @@ def _refused(*_: Any) -> None:
 
 
 class StepCount(NamedTuple):
-    """Operations of one step for a group of lanes, and how far its state is from the compiled step's, relative."""
+    """Operations of one step of a group of lanes, and the relative difference of its state from the compiled step's."""
 
     operations: int
     difference: float
 
 
 def count_step(division: str) -> StepCount:
-    """Count one step of :func:`wingfit.sim.kernels.integrate.advance` on the Robird's wing, moving, in air."""
+    """Count one step of :func:`wingfit.sim.kernels.integrate.advance` on the Robird's wing, moving in air."""
     model, condition = FlexibleWing(robird_wing(), division), tunnel(0.05, 3.0, 6.0)
     structure, numerics, steps = model.structure, Numerics(), 96
     nominal = np.array([[gene.nominal for gene in model.genes]])
@@ -176,7 +170,7 @@ def count_step(division: str) -> StepCount:
 
 
 def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, state: State, trace: Trace) -> None:
-    """``integrate`` over the rows of ``table``; no lane may diverge."""
+    """Apply ``integrate`` to the rows of ``table``; no lane may diverge."""
     alive = np.ones(LANES, bool)
     integrate(*model, table, new_work(*model), state, trace, alive)
     if not alive.all():
@@ -184,7 +178,7 @@ def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, sta
 
 
 def peak_gflops(repeats: int = 7, rounds: int = 2_000_000) -> float:
-    """Fused multiply-adds that one core does at best, in 1e9 operations a second, two for each."""
+    """Peak rate of fused multiply-adds on one core, in 1e9 operations a second, two for each."""
     best = 0.0
     for sums, function in zip(SUMS, (_few, _many), strict=True):
         data = np.zeros((sums + 2, LANES))
@@ -238,7 +232,7 @@ def _many(data: Array, rounds: int) -> None:
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.physics.flops", description=__doc__)
-    parser.add_argument("--division", default="24", help="bodies, as a preset, 6x4 or 3,3,3,2")
+    parser.add_argument("--division", default="24", help="discretisation: a preset such as 24, or 6x4, or 3,3,3,2")
     division = parser.parse_args().division
     counted = count_step(division)
     print(f"{counted.operations / LANES:.0f} operations a step and individual, {division} bodies")

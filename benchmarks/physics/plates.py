@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,20 +12,17 @@ from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes
 from wingfit.sim.kernels.connectors import connect, relative_pose, tangent
 from wingfit.sim.solver.scene import at_rest
-from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import lanes, wing_genes
-from wingfit.sim.wing.structure import Structure, build
+from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
 
-def straight_rod(name: str, x: float, y_tip: float, diameter: float, density: float = 0.0, glue: float = 0.0) -> Rod:
-    """A rod along the span from the root at y = 0."""
-    return Rod(name, x, 0.0, x, y_tip, diameter, density, glue)
-
-
 def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], markers: tuple[Marker, ...] = ()) -> Wing:
-    """A rectangle from the origin, massless until given :class:`Materials`, both rods driven but at rest."""
+    """A rectangle with a corner at the origin, massless without :class:`Materials`.
+
+    Both rods are driven, but at rest.
+    """
     stations = tuple(Station(y, 0.0, chord, thickness) for y in (0.0, span))
     tip = Marker("tip", (chord / 2, span - 1e-9, 0.0), 0.0)
     marks = (*markers, tip)
@@ -36,10 +32,6 @@ def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], ma
     )  # fmt: skip
 
 
-def cut(wing: Wing, division: str) -> Structure:
-    return build(wing, Division.parse(division))
-
-
 def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
     """Lanes of one genome, given by name."""
     genes = wing_genes({})
@@ -47,7 +39,7 @@ def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
 
 
 def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array:
-    """[6 n, 6 n] of the bodies about the rest pose, the driving rods held; rotations first in each body."""
+    """[6 n, 6 n] stiffness of the bodies at rest, with fixed driving rods; rotations come first in each body."""
     w, n = structure.wiring, len(structure.bodies)
     group, state = loaded(structure, genome), at_rest(structure)
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
@@ -62,7 +54,7 @@ def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array
 
 
 def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) -> Array:
-    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], nothing moving."""
+    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], without motion."""
     w = structure.wiring
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
     relative_pose(w.first, w.second, w.a, w.b, R, p, Q, d)
@@ -79,8 +71,3 @@ def displacement(K: Array, load: Array, held: tuple[int, ...] = ()) -> Array:
     u = np.zeros(len(K))
     u[free] = np.linalg.solve(K[np.ix_(free, free)], load.ravel()[free])
     return u.reshape(-1, 6)
-
-
-def with_materials(wing: Wing, foam: float, skin: float) -> Wing:
-    """The wing with foam of a density (kg/m^3) and skin (kg/m^2)."""
-    return replace(wing, materials=Materials(foam, skin))

@@ -1,4 +1,4 @@
-"""Beams as wings of foam alone, and the chain of rigid bodies that they become, bent far by a load at the tip."""
+"""Beams as wings of foam, and the chain of rigid bodies that approximates them, under a large load at the tip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 
 def cut_beam(beam: Beam, division: str) -> Structure:
-    """The beam as a wing of foam alone, its middle line straight, both driven rods entering there without substance."""
+    """The beam as a foam wing with a straight centre line; both driven rods have no stiffness and no mass."""
     middle, (c0, c1), (h0, h1) = beam.chord[0] / 2, beam.chord, beam.thickness
     rods = tuple(Rod(n, middle, 0.0, middle, beam.length, 0.0, 0.0, 0.0) for n in ("front", "rear"))
     stations = tuple(Station(y, middle - c / 2, c, h) for y, c, h in ((0.0, c0, h0), (beam.length, c1, h1)))
@@ -36,10 +36,10 @@ def genome(beam: Beam) -> dict[str, float]:
 
 
 class _Chain:
-    """Chain of rigid bodies on their springs under a dead force at the tip, in joint coordinates.
+    """Chain of rigid bodies on their springs under a constant force at the tip, in joint coordinates.
 
     u [n, 6] of each joint: rotation vector, and displacement in the inner body's axes. (In the bodies' own coordinates
-    every rotation would stretch the chain, and Newton's method would have to follow a curved, stiff valley.)
+    every rotation stretches the stiff chain, and Newton's method converges slowly.)
     """
 
     def __init__(self, beam: Beam, strips: int) -> None:
@@ -48,7 +48,7 @@ class _Chain:
         self.n, self.state = strips, at_rest(self.structure)
         self.tip = np.array([0.0, beam.length - self.state.p[strips - 1, 1, 0], 0.0])
         w = self.structure.wiring
-        # arms of the one joint at the inner side of each body; at the root the first rod's, the second lies on it
+        # arms of the joint at the inner side of each body; at the root that of the first rod (the second coincides)
         inner = np.array([np.flatnonzero(w.second == k)[0] for k in range(strips)])
         self.a, self.b = w.a[inner], w.b[inner]
 
@@ -65,7 +65,7 @@ class _Chain:
         return R, p
 
     def unbalanced(self, u: Array, load: float) -> Array:
-        """Wrenches [W, 6 n] (body axes) that remain at ``u`` [W, 6 n]; the compiled forces, LANES at a time."""
+        """Unbalanced wrenches [W, 6 n] (body axes) at ``u`` [W, 6 n], from the compiled forces, LANES at a time."""
         found = []
         R_all, p_all = self.poses(u[np.arange(-(-len(u) // LANES) * LANES) % len(u)])
         for k in range(0, len(u), LANES):
@@ -74,12 +74,12 @@ class _Chain:
             wrench = spring_wrenches(self.structure, self.springs, R, p)
             found.append(np.moveaxis(wrench[: self.n], -1, 0).reshape(LANES, -1))
         rest = np.concatenate(found)[: len(u)]
-        force = R_all[: len(u), self.n - 1, 2] * load  # upward in the world, seen from the last body
+        force = R_all[: len(u), self.n - 1, 2] * load  # upward in the world, in axes of the last body
         rest[:, -6:] += np.concatenate([np.cross(self.tip, force), force], axis=1)
         return rest
 
     def settle(self, load: float) -> tuple[Array, Array]:
-        """Pose in equilibrium, by Newton's method; its matrix by central differences of the compiled forces."""
+        """Equilibrium pose by Newton's method, with a Jacobian by central differences of the compiled forces."""
         size, h, u = 6 * self.n, 1e-5, np.zeros(6 * self.n)
         for _ in range(40):
             sides = self.unbalanced(u + h * np.concatenate([np.eye(size), -np.eye(size)]), load)
@@ -93,7 +93,7 @@ class _Chain:
 
 
 def spring_chain(beam: Beam, strips: int, load: float) -> tuple[float, float, float]:
-    """What `beam_theory.elastica` gives, of the chain; ``load`` is P L^2 / E I of the uniform beam."""
+    """The results of `beam_theory.elastica` for the chain; ``load`` is P L^2 / E I of the uniform beam."""
     chain = _Chain(beam, strips)
     inertia = beam.chord[0] * beam.thickness[0] ** 3 / 12
     R, p = chain.settle(load * beam.young * inertia / beam.length**2)

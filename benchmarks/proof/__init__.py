@@ -1,1 +1,4 @@
-"""The two stories that began the project, played from concealed data to the report: ``python -m benchmarks.proof``."""
+"""The two case studies that motivated the project, from concealed data to the report.
+
+``python -m benchmarks.proof``.
+"""

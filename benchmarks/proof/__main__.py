@@ -1,7 +1,7 @@
-"""Both stories in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
+"""Both case studies in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
 
-Concealed data are recorded from a plant that shares no code with the simulator, the tool diagnoses the files, and each
-story ends with a report to look at. What a story claims is checked; the exit status is 1 where a claim does not hold.
+Data are recorded from a plant that shares no code with the simulator, with hidden physics. The files are diagnosed, and
+each study ends with a report. Its claims are checked; the exit status is 1 if one does not hold.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from pathlib import Path
 
 from benchmarks.common.machine import commit, cpu
 from benchmarks.proof import delfly, robird
-from benchmarks.proof.told import Story, opened
+from benchmarks.proof.story import Story, opened
 from wingfit.cli.base.output import note, say
 
 FOLDER = Path("build") / "proof"
 WORKERS = 2
 TITLES = {
-    "robird": "(a) The Robird: an axis displaced and a linkage of another shape, concealed",
-    "delfly": "(b) The DelFly: clap-and-peel concealed from a model after Berman and Wang",
+    "robird": "(a) The Robird: a displaced axis and a linkage of another shape are hidden",
+    "delfly": "(b) The DelFly: clap-and-peel is hidden from a model after Berman and Wang",
 }
 
 
 def main(words: list[str] | None = None) -> int:
-    """Play; 0 when every claim holds."""
+    """Run the studies; 0 if every claim holds."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.proof", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
-    parser.add_argument("--only", choices=tuple(TITLES), help="only this story")
+    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
+    parser.add_argument("--only", choices=tuple(TITLES), help="run only this study")
     parser.add_argument("--out", type=Path, default=FOLDER, help="folder for datasets and reports")
-    parser.add_argument("--seed", type=int, default=1, help="of parameters, cameras, balance and noise")
-    parser.add_argument("--workers", type=int, default=WORKERS, help="processes")
-    parser.add_argument("--search-s", type=float, default=robird.SEARCH_S, help="most seconds of the thesis's search")
-    parser.add_argument("--no-browser", action="store_true", help="only print where the reports are")
+    parser.add_argument("--seed", type=int, default=1, help="seed of parameters, cameras, balance and noise")
+    parser.add_argument("--workers", type=int, default=WORKERS, help="number of worker processes")
+    parser.add_argument("--search-s", type=float, default=robird.SEARCH_S, help="time limit of the thesis's search, s")
+    parser.add_argument("--no-browser", action="store_true", help="do not open the reports in a browser")
     options = parser.parse_args(words)
     options.out.mkdir(parents=True, exist_ok=True)
     plays: dict[str, Callable[[], Story]] = {
@@ -47,22 +47,22 @@ def main(words: list[str] | None = None) -> int:
         say(TITLES[name])
         start = time.monotonic()
         stories[name] = plays[name]()
-        tell(stories[name], time.monotonic() - start, browser=not options.no_browser)
+        show(stories[name], time.monotonic() - start, browser=not options.no_browser)
     if options.json:
         figures = {name: story.as_json() for name, story in stories.items()}
         print(json.dumps({**figures, "seconds": time.monotonic() - began, "cpu": cpu(), "commit": commit()}))
     return 0 if all(claim.holds for story in stories.values() for claim in story.claims) else 1
 
 
-def tell(story: Story, seconds: float, *, browser: bool) -> None:
-    """Print a story, its claims, and where its report is; open that where there is a browser."""
+def show(story: Story, seconds: float, *, browser: bool) -> None:
+    """Print a study, its claims and the path of its report; open the report if there is a browser."""
     for line in story.lines:
         say(line)
     for claim in story.claims:
         say(f"{'yes' if claim.holds else 'NO '}  {claim.words}")
     say(f"report: {story.report} ({seconds:.0f} s in all)")
     if browser and not opened(story.report):
-        note("there is no browser here; open the report yourself")
+        note("no browser is available; open the report yourself")
     say("")
 
 

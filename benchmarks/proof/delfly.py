@@ -1,6 +1,6 @@
-"""The DelFly's story: wings that clap and peel, and a model after Berman and Wang (2007) that knows no other wing.
+"""The DelFly study: wings that clap and peel, and a model after Berman and Wang (2007) without wing-wing interaction.
 
-Conditions are those of Armanini et al. (2016), Table 4, with the coefficients found there test by test (Table 8).
+Conditions are those of Armanini et al. (2016), Table 4, with the coefficients estimated there for each test (Table 8).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.concealed.bench import VehicleBench
 from benchmarks.concealed.trials import Build
 from benchmarks.delfly import LIFT_CORRELATION, fit
-from benchmarks.proof.told import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
+from benchmarks.proof.story import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import agreements
 from wingfit.calibration.preparation import as_fitted
@@ -30,7 +30,7 @@ from wingfit.workers import make_evaluator
 BASELINE = "berman_wang"
 FLING = "clap_and_peel"
 ALSO_RIGHT = ("varying_coefficients",)
-"""Named beside the fling it is right: the coefficients that are hidden differ from test to test."""
+"""Correct if named in addition to the fling: the true coefficients differ from test to test."""
 AXES = ("x", "z")
 FLING_ENDS = 0.4  # t*
 AS_IN_TABLE_7 = float(np.mean(LIFT_CORRELATION))
@@ -38,7 +38,7 @@ AS_IN_TABLE_7 = float(np.mean(LIFT_CORRELATION))
 
 @dataclass(frozen=True)
 class Lift:
-    """Correlation of modelled with recorded lift in one test, before and after."""
+    """Correlation of modelled with recorded lift in one test, before and after the diagnosis."""
 
     name: str
     held_out: bool
@@ -52,7 +52,10 @@ def campaign(
     held_out: tuple[str, ...] = HELD_OUT,
     without: tuple[str, ...] = (),
 ) -> Dataset:
-    """Weigh the plant with coefficients of each test, ``without`` some of its terms; the same seed, the same bits."""
+    """Record the plant with the coefficients of each test, ``without`` some terms.
+
+    The same seed gives the same bits.
+    """
     bench = VehicleBench(Build("vehicle", without=without))
     balance = bench.quality(np.random.default_rng([seed, 2]))
     recordings = []
@@ -66,18 +69,18 @@ def campaign(
 def located(
     dataset: Dataset, evaluator: Evaluator, trials: tuple[Trial, ...] = TRIALS
 ) -> dict[str, tuple[float, float] | None]:
-    """Part of the beat (t*) without which the baseline, fitted to each test by itself as the source does, fits."""
+    """Range of the beat (t*) where the nominal model misfits, when fitted to each test separately as in the source."""
     spec, model = CalibrationSpec(preset=BASELINE), vehicle_model(dataset, CalibrationSpec(preset=BASELINE))
     tests = {trial.name: trial for trial in trials}
     return {
-        one.name: fit(model, as_fitted(spec, one), tests[one.name], evaluator).missing_interval
+        one.name: fit(model, as_fitted(spec, one), tests[one.name], evaluator).misfit_range
         for one in dataset.recordings
         if one.name not in dataset.held_out
     }
 
 
 def lifts(dataset: Dataset, finding: Finding, evaluator: Evaluator) -> tuple[Lift, ...]:
-    """Lift of the baseline, calibrated on all fitted tests together, and of what was found, against each test's."""
+    """Lift agreement in each test: of the nominal model calibrated on all fitted tests, and of the diagnosed model."""
     spec = CalibrationSpec(preset=BASELINE, mode="joint", axes=AXES)
     *_, last = calibrate(spec, dataset, evaluator)
     before = _lift(dataset, spec, last.genome)
@@ -102,20 +105,20 @@ def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) 
 
 
 def play(folder: Path, seed: int, workers: int) -> Story:
-    """Weigh, locate, diagnose, tell; everything written goes to ``folder``."""
+    """Record, locate, diagnose; datasets and report are written to ``folder``."""
     dataset = campaign(seed)
     finding, page = diagnosed(saved(dataset, folder), {"preset": BASELINE}, workers)
     evaluator = make_evaluator("in_process")
     try:
-        return told(finding, located(dataset, evaluator), lifts(dataset, finding, evaluator), page)
+        return story_of(finding, located(dataset, evaluator), lifts(dataset, finding, evaluator), page)
     finally:
         evaluator.close()
 
 
-def told(
+def story_of(
     finding: Finding, places: Mapping[str, tuple[float, float] | None], lift: tuple[Lift, ...], page: Path
 ) -> Story:
-    """The story in figures and in words; ``places`` by test, t*."""
+    """Figures, text and claims of the study; ``places`` by test, t*."""
     best, floors = leader(finding), over_floor(finding)
     found = [place for place in places.values() if place is not None]
     widest = (min(p[0] for p in found), max(p[1] for p in found)) if found else None
@@ -155,21 +158,21 @@ def told(
         "diagnosis_seconds": finding.seconds,
     }
     claims = (
-        Claim("the tool says that the misfit lies at t* < 0.4", phase is not None and phase[1] < FLING_ENDS),
+        Claim("the diagnosis locates the misfit at t* < 0.4", phase is not None and phase[1] < FLING_ENDS),
         Claim(
-            "so does the baseline fitted to each test by itself",
+            "so does the nominal model fitted to each test separately",
             bool(places) and all(place is not None and place[1] < FLING_ENDS for place in places.values()),
         ),
-        Claim("the tool names wing-wing interaction", FLING in finding.named),
-        Claim("it names nothing that is not there", set(finding.named) <= {FLING, *ALSO_RIGHT}),
+        Claim("the diagnosis names wing-wing interaction", FLING in finding.named),
+        Claim("it names no effect that was not hidden", set(finding.named) <= {FLING, *ALSO_RIGHT}),
         Claim(f"lift correlation rises to Table 7's mean ({AS_IN_TABLE_7:.2f})", before < AS_IN_TABLE_7 <= after),
-        Claim("and it rises in the held-out tests", all(one.after > one.before for one in lift if one.held_out)),
+        Claim("it also rises in every held-out test", all(one.after > one.before for one in lift if one.held_out)),
     )
     return Story(figures, _lines(finding, widest, lift, before, after), claims, page)
 
 
 def _ends(interval: Interval) -> tuple[float, float]:
-    """An end that nothing bounds may lie a beat away."""
+    """Bounds of an interval; a missing bound may be a beat away."""
     low, high = interval.low, interval.high
     return interval.value - 1.0 if low is None else low, interval.value + 1.0 if high is None else high
 
@@ -187,14 +190,14 @@ def _table_7(lift: tuple[Lift, ...]) -> list[float]:
 def _lines(
     finding: Finding, widest: tuple[float, float] | None, lift: tuple[Lift, ...], before: float, after: float
 ) -> tuple[str, ...]:
-    where = "nowhere" if widest is None else f"at t* {widest[0]:.2f} to {widest[1]:.2f}"
+    where = "(not located)" if widest is None else f"at t* {widest[0]:.2f} to {widest[1]:.2f}"
     rows = (
         f"  {one.name}{' (held out)' if one.held_out else '':11} {one.before:7.3f} {one.after:7.3f} {source:12.2f}"
         for one, source in zip(lift, _table_7(lift), strict=True)
     )
     return (
-        f"the baseline after Berman and Wang, fitted to each test, lacks something {where}",
-        f"the tool, {finding.seconds:.0f} s: {finding.verdict}: {', '.join(finding.named) or 'nothing'}",
+        f"the model after Berman and Wang, fitted to each test, misfits {where}",
+        f"diagnosis, {finding.seconds:.0f} s: {finding.verdict}: {', '.join(finding.named) or 'nothing'}",
         finding.summary,
         "  correlation of lift   before   after   in the source",
         *rows,

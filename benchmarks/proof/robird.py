@@ -1,24 +1,24 @@
-"""The Robird's story: the drive is not where, and not what, its description says.
+"""The Robird study: neither the place of the drive's axis nor the linkage is as described.
 
-van der Grinten's search stalled at about 2 cm of mean distance between simulated and recorded markers, and he named
-the place of the drive's axis as a likely cause. Here the plant's axis is displaced and its linkage has a longer frame,
-and neither is told.
+van der Grinten's search stalled at a mean distance of about 2 cm between simulated and recorded markers, and he named
+the place of the drive's axis as a likely cause. Here the plant's axis is displaced and its linkage has a longer frame;
+both are hidden.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.bench import WingBench
-from benchmarks.concealed.plant.observe_law import Concealed
+from benchmarks.concealed.bench import WingBench, record_all
+from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
-from benchmarks.proof.told import (
+from benchmarks.proof.story import (
     Claim,
     Story,
     beside_truth,
@@ -36,15 +36,15 @@ from wingfit.calibration.search import calibrate
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.cli.base.output import progress
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import Condition, Dataset
+from wingfit.records import Condition, Dataset, Recording
 from wingfit.workers import make_evaluator
 
 DIVISION = "11"
 HIDDEN: Concealed = {
     "hinge_offset": {"strength": 0.055, "direction": -0.8},  # m, rad from y to z
-    "drive_harmonics": {"strength": 0.06},  # part by which the frame of the linkage is longer
+    "drive_harmonics": {"strength": 0.06},  # relative increase of the linkage's frame
 }
-"""Markers are moved by 2 cm on average, as in the thesis."""
+"""They displace the markers by 2 cm on average, as in the thesis."""
 FITTED: tuple[Condition, ...] = (
     chamber(THIN_PA, LAGS[0], 2.0),
     chamber(THIN_PA, LAGS[1], 3.5),
@@ -53,26 +53,29 @@ FITTED: tuple[Condition, ...] = (
     tunnel(LAGS[0], 4.0, 7.5),
 )
 HELD_OUT: tuple[Condition, ...] = (chamber(THIN_PA, LAGS[2], 2.5), tunnel(LAGS[2], 2.5, 5.0))
-"""At a frequency, and with a lag and an airspeed, that no fitted recording has together."""
+"""Combinations of frequency, lag and airspeed that no fitted recording has."""
 
-SEARCH_S = 240.0  # of the thesis's search, which is stopped then if it has not stalled
-RECENT, LITTLE = 10, 0.02  # generations that gain less than this part have stalled
-CENTIMETRES = 0.01  # m of mean distance: less is no stall "at centimetres"
-AT_FLOOR = 1.15  # held-out misfit over the floor that counts as the floor
+SEARCH_S = 240.0  # time limit of the thesis's search, if it has not stalled before
+RECENT, LITTLE = (
+    10,
+    0.02,
+)  # a search has stalled if the misfit falls by less than LITTLE (relative) in RECENT generations
+CENTIMETRES = 0.01  # m: smallest mean distance that counts as a stall "at centimetres"
+AT_FLOOR = 1.15  # ratio to the floor below which a held-out misfit counts as at the floor
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """A dataset, true values of the nominal ``genome``, and of the library's genes for what was hidden."""
+    """A dataset, the true nominal ``genome``, and the true values of the library's genes for the hidden effects."""
 
     dataset: Dataset
     genome: Mapping[str, float]
     truth: Mapping[str, float]
 
     def left_by_truth(self) -> float:
-        """Root mean square (m) that the true values leave on the held-out recordings, in the library's form.
+        """RMS misfit (m) of the true values on the held-out recordings, with the library's form of the effects.
 
-        Not zero but for noise: the library's drive has three harmonics in error, the plant's has all.
+        Larger than the noise: the library's drive has three wrong harmonics, the plant's has all.
         """
         spec = CalibrationSpec(division=DIVISION, effects=tuple({name.partition(".")[0] for name in self.truth}))
         model = wing_model(self.dataset, spec)
@@ -84,9 +87,9 @@ class Campaign:
 
 @dataclass(frozen=True)
 class Stall:
-    """Where the thesis's search ended; ``stalled`` by itself, or stopped for want of time.
+    """The end of the thesis's search: it ``stalled``, or was stopped at the time limit.
 
-    ``gain`` is the part by which the best misfit fell over the last RECENT generations of its last stage.
+    ``gain`` is the relative decrease of the best misfit over the last RECENT generations of its last stage.
     """
 
     result: Result
@@ -98,17 +101,14 @@ class Stall:
 
 
 def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
-    """Film the plant, with parameters that are drawn, under all conditions; the same seed, the same bits."""
+    """Film the plant with random parameters under all conditions; the same seed gives the same bits."""
     bench = WingBench(Build("wing", DIVISION, DIVISION))
     genome = bench.genome(np.random.default_rng([seed, 1]))
-    filmset = bench.quality(np.random.default_rng([seed, 2]))
-    recordings, conditions = [], (*FITTED, *HELD_OUT)
+    recordings, conditions = list[Recording](), (*FITTED, *HELD_OUT)
     with progress("robird: filming the plant") as tell:
-        for number, condition in enumerate(conditions):
-            rng = np.random.default_rng([seed, 3, number])
-            made = bench.recording(condition, genome, hidden, filmset, rng)
-            recordings.append(replace(made.recording, name=name_of(condition)))
-            tell((number + 1) / len(conditions), None, name_of(condition))
+        for recording in record_all(bench, conditions, genome, hidden, seed):
+            recordings.append(recording)
+            tell(len(recordings) / len(conditions), None, recording.name)
     truth = {gene: value for name, one in hidden.items() for gene, value in bench.laws[name].values(one).items()}
     dataset = Dataset("robird", bench.rig, tuple(recordings), tuple(name_of(condition) for condition in HELD_OUT))
     return Campaign(dataset, genome, truth)
@@ -117,7 +117,7 @@ def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
 def stall(
     dataset: Dataset, evaluator: Evaluator, seconds: float = SEARCH_S, spec: CalibrationSpec | None = None
 ) -> Stall:
-    """Search the nominal model as the thesis does (population 50, structure in vacuum first), until it stalls."""
+    """Search the nominal model as in the thesis (population 50, structure in vacuum first) until it stalls."""
     spec, began = spec or CalibrationSpec(division=DIVISION), time.monotonic()
     last, stalled, stages, best = None, True, list[str](), list[float]()
     with progress(f"{dataset.name}: the thesis's search") as tell:
@@ -137,13 +137,13 @@ def stall(
 
 
 def gained(stages: Sequence[str], best: Sequence[float]) -> float:
-    """Part by which ``best`` fell over the last RECENT generations, of those of the last of ``stages``."""
+    """Relative decrease of ``best`` over the last RECENT generations of the last of ``stages``."""
     recent = [one for stage, one in zip(stages, best, strict=True) if stage == stages[-1]][-RECENT - 1 :]
     return 1.0 - recent[-1] / recent[0]
 
 
 def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> Story:
-    """Record, search, diagnose, tell; everything written goes to ``folder``."""
+    """Record, search, diagnose; dataset and report are written to ``folder``."""
     made = campaign(seed)
     path = saved(made.dataset, folder)
     evaluator = make_evaluator("processes", workers)
@@ -152,11 +152,11 @@ def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> St
     finally:
         evaluator.close()
     finding, page = diagnosed(path, {"division": DIVISION}, workers)
-    return told(made, search, finding, page)
+    return story_of(made, search, finding, page)
 
 
-def told(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
-    """The story in figures and in words."""
+def story_of(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
+    """Figures, text and claims of the study."""
     best, kinds, floors = leader(finding), families(finding), over_floor(finding)
     rows = beside_truth({gene.name: gene for gene in finding.genes}, made.truth)
     after, truth = floors["heldout_over_floor"], made.left_by_truth()
@@ -191,10 +191,10 @@ def told(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
             "the thesis's search stalls at centimetres",
             search.result.after >= CENTIMETRES and (search.stalled or search.gain < LITTLE),
         ),
-        Claim("the tool says that it is the actuation", bool(kinds) and set(kinds) == {"actuation"}),
+        Claim("the diagnosis finds the cause in the actuation", bool(kinds) and set(kinds) == {"actuation"}),
         Claim("it names the displaced axis and the drive profile", set(finding.named) == set(HIDDEN)),
         Claim("the held-out misfit falls to the floor", after is not None and after <= AT_FLOOR),
-        Claim("it falls to what the true values leave", left is not None and left <= AT_FLOOR * truth),
+        Claim("it falls to the misfit of the true values", left is not None and left <= AT_FLOOR * truth),
     )
     return Story(figures, _lines(search, finding, rows, left, truth), claims, page)
 
@@ -207,23 +207,23 @@ def _lines(
     return (
         f"the thesis's search begins at {1e3 * result.before:.1f} mm of mean distance and {how} at "
         f"{1e3 * result.after:.1f} mm ({search.generations} generations of 50, {search.seconds:.0f} s)",
-        f"the tool, {finding.seconds:.0f} s: {finding.verdict}: {', '.join(finding.named) or 'nothing'}",
+        f"diagnosis, {finding.seconds:.0f} s: {finding.verdict}: {', '.join(finding.named) or 'nothing'}",
         finding.summary,
         *(_row(row) for row in rows),
-        f"  held out, root mean square: {_told(left)} with what was found; the true values leave {_told(truth)}",
+        f"  held-out RMS: {_millimetres(left)} with the diagnosed model, {_millimetres(truth)} with the true values",
     )
 
 
 def _row(row: Mapping[str, Any]) -> str:
     if row["found"] is None:
-        return f"  {row['gene']:24} true {row['true']:+.4f}   not among what is named"
-    ends = ", ".join("open" if end is None else f"{end:+.4f}" for end in (row["low"], row["high"]))
-    return f"  {row['gene']:24} true {row['true']:+.4f}   found {row['found']:+.4f}   90 % interval [{ends}]"
+        return f"  {row['gene']:24} true {row['true']:+.4f}   not named"
+    ends = ", ".join("not bounded" if end is None else f"{end:+.4f}" for end in (row["low"], row["high"]))
+    return f"  {row['gene']:24} true {row['true']:+.4f}   estimated {row['found']:+.4f}   90 % interval [{ends}]"
 
 
 def _mm(metres: float | None) -> float | None:
     return None if metres is None else 1e3 * metres
 
 
-def _told(metres: float | None) -> str:
+def _millimetres(metres: float | None) -> str:
     return "unknown" if metres is None else f"{1e3 * metres:.2f} mm"

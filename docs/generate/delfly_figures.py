@@ -39,7 +39,7 @@ def lift_panels(seed: int = 1) -> list[Panel]:
             Line("with clap-and-peel", found[0].phase, found[0].modelled["lift"]),
             Line("without", found[1].phase, found[1].modelled["lift"]),
         )
-        panels.append(Panel(f"Test 4, low-pass {cutoff:g} Hz", "t*", "lift, N", lines, fitted[1].missing_interval))
+        panels.append(Panel(f"Test 4, low-pass {cutoff:g} Hz", "t*", "lift, N", lines, fitted[1].misfit_range))
     kept = (found[0].frequency > 0) & (found[0].frequency < 100)
     spectra = (found[0].recorded_spectrum, found[0].modelled_spectrum, found[1].modelled_spectrum)
     lines = tuple(

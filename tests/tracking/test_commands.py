@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from tests.tracking.signals import noise, passive_pitch, split_cycle, wing_markers
+from tests.oracles.wing_kinematics import noise, passive_pitch, split_cycle, wing_markers
 from tests.tracking.test_free_flight import CENTRE, MARKERS, pitched, seen_from, times
 from wingfit.cli.forces.free_flight import forces
 from wingfit.cli.forces.kinematics import kinematics

@@ -10,7 +10,7 @@ import pytest
 from scipy import signal
 from scipy.spatial.transform import Rotation
 
-from tests.tracking.signals import noise
+from tests.oracles.wing_kinematics import noise
 from wingfit.records import LowPass
 from wingfit.records.description.vehicle_file import VehicleRecordingFile
 from wingfit.tracking.free_flight import Body, FreeFlight, free_flight, recording

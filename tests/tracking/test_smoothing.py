@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.tracking.signals import noise, split_cycle
+from tests.oracles.wing_kinematics import noise, split_cycle
 from wingfit.tracking.smoothing import PeriodicFit, basis, fit_periodic
 
 FREQUENCY = 12.5

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.tracking.signals import noise, passive_pitch, split_cycle, wing_markers
+from tests.oracles.wing_kinematics import noise, passive_pitch, split_cycle, wing_markers
 from wingfit.records import FourierPitch, PassivePitch
 from wingfit.tracking.smoothing import fit_periodic
 from wingfit.tracking.wing_kinematics import (

@@ -1,6 +1,6 @@
 """Digests of all bits of small computations, as JSON: ``python -m tests.workers.digests [THREADS] [NAME ...]``.
 
-Of all computations, or of those named. BLAS has as many threads as the environment gives it, or THREADS.
+NAME selects computations (default: all), THREADS sets the number of BLAS threads (default: that of the environment).
 ``--unguarded`` switches the guard off, to see which digests depend on it.
 """
 

@@ -1,8 +1,4 @@
-"""What the API process does on a cluster, for the two-node test: joins, evaluates on command, tells what came out.
-
-Run as ``python -m tests.workers.driver ADDRESS``; each line on standard input is JSON [folder for notes, seconds per
-unit, individuals], answered by a line with the digest of the evaluation; no individuals: with the number of workers.
-"""
+"""The API process on a cluster, for the two-node test: joins, evaluates on command, and prints results."""
 
 from __future__ import annotations
 
@@ -30,7 +26,7 @@ def digest(evaluation: Evaluation) -> str:
 
 
 def tell(answer: str) -> None:
-    """Answer, told apart from what Ray prints."""
+    """Print an answer with a mark, because Ray prints too."""
     print(ANSWER + json.dumps(answer), flush=True)
 
 

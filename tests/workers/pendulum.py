@@ -1,4 +1,4 @@
-"""A real, small rig to test evaluators with: one marker on a damped pendulum at small angles."""
+"""A small rig for tests of evaluators: one marker on a damped pendulum at small angles."""
 
 from __future__ import annotations
 

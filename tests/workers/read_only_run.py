@@ -10,9 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from benchmarks.common.ray_nodes import REPOSITORY, environment, free_port
-from benchmarks.common.server_process import Server
-from benchmarks.durability.works import EXAMPLES
+from tests.oracles.processes import EXAMPLES, REPOSITORY, Server, environment, free_port
 from wingfit.client.client import Client
 
 FOLDER = Path("/tmp/run")  # noqa: S108  a file system of its own
@@ -58,7 +56,7 @@ def _start_ray(token: Path, address: str) -> None:
 
 
 def _refused() -> list[str]:
-    """Folders of which one would expect that they can be written, and cannot."""
+    """Usually writable folders that are read-only here."""
     refused = []
     for folder in (REPOSITORY, REPOSITORY / "sim" / "kernels" / "__pycache__", Path("/var/tmp"), Path("/etc")):  # noqa: S108
         try:

@@ -93,7 +93,7 @@ def results() -> dict[Run, Digests]:
 
 
 @pytest.mark.parametrize("computation", ["evaluation", "gauss_newton", "genetic", "diagnosis"])
-def test_threads_of_blas_change_no_bit(results: dict[Run, Digests], computation: str) -> None:
+def test_the_number_of_blas_threads_changes_no_bit(results: dict[Run, Digests], computation: str) -> None:
     for kernels in {run.kernels for run in RUNS}:
         of_kernels = {run: found.digests for run, found in results.items() if run.kernels == kernels}
         same = {run: digests[computation] for run, digests in of_kernels.items() if computation in digests}
@@ -101,7 +101,7 @@ def test_threads_of_blas_change_no_bit(results: dict[Run, Digests], computation:
         assert len(set(same.values())) <= 1, same
 
 
-def test_the_processes_had_the_threads_they_were_meant_to_have(results: dict[Run, Digests]) -> None:
+def test_the_processes_had_the_requested_threads(results: dict[Run, Digests]) -> None:
     """Also: what the guard found is restored after the last computation."""
     for run, found in results.items():
         wanted = int(run.forced or run.variable or os.cpu_count() or 1)
@@ -113,7 +113,7 @@ def test_the_processes_had_the_threads_they_were_meant_to_have(results: dict[Run
 
 
 @pytest.mark.parametrize("function", GUARDED, ids=lambda function: f"{function.__module__}.{function.__qualname__}")
-def test_what_computes_results_is_guarded(function: Callable[..., object]) -> None:
-    """By the guard's wrapper, which has the function that it calls."""
+def test_functions_that_compute_results_use_the_guard(function: Callable[..., object]) -> None:
+    """They are wrapped by the guard."""
     assert getattr(function, "__wrapped__", None) is not None
     assert function.__code__.co_filename == blas_threads.__file__

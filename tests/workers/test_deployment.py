@@ -1,4 +1,4 @@
-"""What the files of the deployment promise: Ray is out of reach, versions are pinned, nothing local gets in."""
+"""Deployment files: Ray is unreachable from outside, versions are pinned, no local files enter the image."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 from wingfit.workers.node_alive import TIMEOUT_SECONDS
 
 # Head, object manager and node manager (by convention), client, dashboard, its agents, and the range of workers.
@@ -59,14 +59,14 @@ def test_no_ray_node_is_on_the_published_network(compose: dict[str, Any], servic
     assert "volumes" not in services["front"]
 
 
-def test_the_front_passes_on_to_the_port_of_the_api_alone(services: dict[str, dict[str, Any]]) -> None:
+def test_the_front_forwards_to_the_port_of_the_api_only(services: dict[str, dict[str, Any]]) -> None:
     assert services["front"]["command"] == ["python", "-m", "wingfit.service.operations.forward", "api:8321"]
     assert "WINGFIT_PORT=8321" in (REPOSITORY / "Dockerfile").read_text()
     assert services["front"]["depends_on"] == {"api": {"condition": "service_healthy"}}
 
 
 @pytest.mark.parametrize("name", RAY_SERVICES)
-def test_every_member_shows_the_token_and_cannot_change_it(services: dict[str, dict[str, Any]], name: str) -> None:
+def test_every_member_has_the_token_read_only(services: dict[str, dict[str, Any]], name: str) -> None:
     environment = services[name]["environment"]
     assert environment["RAY_AUTH_MODE"] == "token"
     assert environment["RAY_AUTH_TOKEN_PATH"].startswith("/run/ray-token/")
@@ -113,7 +113,7 @@ def number_of_bytes(text: str) -> int:
 
 
 def default(value: object) -> str:
-    """What Compose takes where the variable is not set."""
+    """Compose's default if the variable is not set."""
     return re.sub(r"\$\{\w+:?-(\w+)\}", r"\1", str(value))
 
 
@@ -121,7 +121,7 @@ def default(value: object) -> str:
 def test_every_file_system_is_read_only_but_memory_and_named_volumes(
     compose: dict[str, Any], services: dict[str, dict[str, Any]], name: str
 ) -> None:
-    """That the service runs so is shown by ``test_read_only.py``."""
+    """``test_read_only.py`` runs the service in this way."""
     service = services[name]
     assert service["read_only"] is True
     (mount,) = service["tmpfs"]
@@ -131,7 +131,7 @@ def test_every_file_system_is_read_only_but_memory_and_named_volumes(
     assert writable <= set(compose["volumes"])
 
 
-def test_uploads_wait_on_the_disk_and_rays_sockets_do_not(services: dict[str, dict[str, Any]]) -> None:
+def test_uploads_are_on_disk_and_rays_sockets_in_memory(services: dict[str, dict[str, Any]]) -> None:
     environment = services["api"]["environment"]
     assert (environment["TMPDIR"], environment["RAY_TMPDIR"]) == ("/data", "/tmp")  # noqa: S108
 
@@ -194,7 +194,7 @@ def test_threads_are_limited_by_the_evaluator_alone() -> None:
     assert "OMP_NUM_THREADS" not in (REPOSITORY / "docker-compose.yml").read_text()
 
 
-def test_the_work_is_done_by_the_workers(services: dict[str, dict[str, Any]]) -> None:
+def test_the_workers_do_the_computing(services: dict[str, dict[str, Any]]) -> None:
     assert "--num-cpus=0" in services["api"]["command"]
     assert "--num-cpus=0" in services["ray-head"]["command"]
     assert "--include-dashboard=false" in services["ray-head"]["command"]
@@ -220,7 +220,7 @@ def test_the_base_image_is_named_by_digest() -> None:
 
 
 def make(target: str, folder: Path, answer: str = "") -> subprocess.CompletedProcess[str]:
-    """``make target`` on a copy of the Dockerfile, with a ``docker`` that says ``answer``."""
+    """``make target`` on a copy of the Dockerfile, with a ``docker`` that prints ``answer``."""
     for name in ("Makefile", "Dockerfile"):
         if not (folder / name).exists():
             shutil.copy(REPOSITORY / name, folder)
@@ -272,13 +272,13 @@ def pins() -> dict[str, str]:
     return found
 
 
-def test_the_lock_names_versions_and_no_place_to_get_them_from() -> None:
+def test_the_lock_file_has_versions_but_no_index() -> None:
     text = (REPOSITORY / "requirements.lock").read_text()
     assert pins()
     assert not re.search(r"://|--|\s@\s|index|find-links", text)
 
 
-def test_the_lock_covers_everything_that_the_project_asks_for() -> None:
+def test_the_lock_file_covers_all_requirements() -> None:
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
     wanted = project["dependencies"] + project["optional-dependencies"]["dev"]
     names = {re.split(r"[\[<>=;~! ]", line, maxsplit=1)[0].lower().replace("_", "-") for line in wanted}

@@ -1,4 +1,4 @@
-"""One suite over all evaluators: the same bits, and manners when something goes wrong."""
+"""One suite for all evaluators: equal bits, and correct handling of failures."""
 
 from __future__ import annotations
 
@@ -89,12 +89,12 @@ def test_same_bits_everywhere(any_evaluator: RunningEvaluator, individuals: int)
     assert all(np.isfinite(wanted.fitness[1:]))
 
 
-def test_residuals_only_when_asked(any_evaluator: RunningEvaluator) -> None:
+def test_residuals_only_on_request(any_evaluator: RunningEvaluator) -> None:
     evaluation = any_evaluator.evaluate(pendulum.problem(), pendulum.population(3))
     assert all(part.residuals is None for part in evaluation.per_recording)
 
 
-def test_says_what_it_is(any_evaluator: RunningEvaluator) -> None:
+def test_has_kind_and_workers(any_evaluator: RunningEvaluator) -> None:
     assert any_evaluator.kind in KINDS
     assert any_evaluator.workers == (1 if any_evaluator.kind == "in_process" else 2)
 
@@ -127,14 +127,14 @@ def test_more_problems_than_a_worker_remembers(distributed: RunningEvaluator) ->
         assert_same_bits(distributed.evaluate(problem, values, residuals=True), reference(problem, values))
 
 
-def test_a_models_error_arrives_as_it_was(any_evaluator: RunningEvaluator) -> None:
+def test_an_exception_of_the_model_is_passed_on(any_evaluator: RunningEvaluator) -> None:
     with pytest.raises(ValueError, match=r"^cannot simulate g9\.81"):
         any_evaluator.evaluate(pendulum.problem(pendulum.refuse, (9.81,)), pendulum.population(3))
     problem, values = pendulum.problem(), pendulum.population(3)
     assert_same_bits(any_evaluator.evaluate(problem, values, residuals=True), reference(problem, values))
 
 
-def test_a_model_that_cannot_travel_is_an_error(distributed: RunningEvaluator) -> None:
+def test_a_model_that_cannot_be_pickled_is_an_error(distributed: RunningEvaluator) -> None:
     with pytest.raises(Exception, match="pickle"):
         distributed.evaluate(pendulum.problem(lambda *_: None), pendulum.population(3))
 
@@ -150,9 +150,7 @@ def test_survives_the_death_of_a_worker(distributed: RunningEvaluator, tmp_path:
     assert_same_bits(got, reference(pendulum.problem(), values))
 
 
-def test_a_call_that_is_given_up_drops_what_no_worker_has_begun(
-    any_evaluator: RunningEvaluator, tmp_path: Path
-) -> None:
+def test_an_interrupted_call_drops_units_that_have_not_started(any_evaluator: RunningEvaluator, tmp_path: Path) -> None:
     problem, values = pendulum.problem(pendulum.Count(tmp_path, 0.2)), pendulum.population(400)  # 150 units
 
     def begun() -> int:
@@ -168,7 +166,7 @@ def test_a_call_that_is_given_up_drops_what_no_worker_has_begun(
     assert_same_bits(any_evaluator.evaluate(other, values, residuals=True), reference(other, values))
 
 
-def test_trouble_of_rays_memory_is_no_error_of_the_model(
+def test_an_error_of_rays_memory_is_not_an_error_of_the_model(
     distributed: RunningEvaluator, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     if distributed.kind != "ray":
@@ -181,14 +179,14 @@ def test_trouble_of_rays_memory_is_no_error_of_the_model(
     assert "GetTimeoutError: the problem did not come" in record.getMessage()
 
 
-def test_gives_up_on_what_always_kills_its_worker(distributed: RunningEvaluator) -> None:
+def test_a_unit_that_always_kills_its_worker_is_given_up(distributed: RunningEvaluator) -> None:
     with pytest.raises(WorkerLostError, match="fewer workers than 2"):
         distributed.evaluate(pendulum.problem(pendulum.die_always, (9.81,)), pendulum.population(3))
     problem, values = pendulum.problem(), pendulum.population(3)
     assert_same_bits(distributed.evaluate(problem, values, residuals=True), reference(problem, values))
 
 
-def test_a_death_before_the_work_begins_is_not_the_works_fault(tmp_path: Path) -> None:
+def test_a_death_before_the_start_is_not_blamed_on_the_unit(tmp_path: Path) -> None:
     others = set(_workers())
     evaluator = make_evaluator("processes", 1)
     try:
@@ -216,7 +214,7 @@ def _workers() -> list[int]:
     return []
 
 
-def test_workers_are_polite_and_single_threaded(distributed: RunningEvaluator, tmp_path: Path) -> None:
+def test_workers_have_low_priority_and_one_thread(distributed: RunningEvaluator, tmp_path: Path) -> None:
     distributed.evaluate(pendulum.problem(pendulum.Note(tmp_path, 0.05)), pendulum.population(32))
     notes = [note.read_text().split() for note in tmp_path.iterdir()]
     assert len(notes) == 2
@@ -226,7 +224,7 @@ def test_workers_are_polite_and_single_threaded(distributed: RunningEvaluator, t
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_closing_ends_a_call_under_way(kind: EvaluatorKind, tmp_path: Path) -> None:
+def test_closing_ends_a_call_in_progress(kind: EvaluatorKind, tmp_path: Path) -> None:
     # In a process of its own, since one process can have one connection to Ray.
     code = f"""
 import threading, time
@@ -274,18 +272,18 @@ def environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
 
 
-def test_only_ray_costs_the_import_of_ray() -> None:
+def test_only_the_ray_evaluator_imports_ray() -> None:
     code = "import sys, wingfit.workers.processes as p; p.ProcessPoolEvaluator(1).close(); print('ray' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment(), check=True)
     assert done.stdout.strip() == "False"
 
 
-def test_refuses_settings_that_cannot_be() -> None:
+def test_invalid_settings_are_refused() -> None:
     with pytest.raises(ValueError, match="workers is 0; it must be at least 1"):
         make_evaluator("processes", 0)
     with pytest.raises(ValueError, match="needs the evaluator 'ray'"):
         make_evaluator("processes", address="127.0.0.1:6379")
     with pytest.raises(ValueError, match="'ray://head:10001'; write host:port"):
         make_evaluator("ray", address="ray://head:10001")
-    with pytest.raises(ValueError, match="no evaluator 'dask'; there are in_process, processes, ray"):
+    with pytest.raises(ValueError, match="unknown evaluator 'dask'; give one of in_process, processes, ray"):
         make_evaluator("dask")  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""The life of a job: every transition, what wins over what, and what holds whatever happens."""
+"""The state machine of jobs: every transition, priorities between wishes, and invariants."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_every_transition(standing: str, name: str) -> None:
     assert refusal.value.state == (job.state if job else None)
 
 
-def test_the_third_start_without_progress_is_the_last() -> None:
+def test_a_job_fails_after_the_third_start_without_progress() -> None:
     job, _ = step(None, Submit())
     for _ in range(MOST_STARTS - 1):
         job = step(step(job, Start())[0], Restart())[0]
@@ -135,13 +135,13 @@ def test_the_third_start_without_progress_is_the_last() -> None:
     assert step(step(running, Cancel())[0], Restart())[0].state is State.CANCELLED
 
 
-def test_a_refusal_says_what_could_be_done() -> None:
+def test_a_refusal_names_the_allowed_events() -> None:
     with pytest.raises(
         IllegalTransition,
         match=r"^cannot resume a job in state QUEUED; allowed: start, pause, cancel, restart$",
     ):
         step(Job(), Resume())
-    with pytest.raises(IllegalTransition, match="state RUNNING that is about to cancel; allowed: "):
+    with pytest.raises(IllegalTransition, match="state RUNNING with a pending cancel; allowed: "):
         step(Job(State.RUNNING, Wish.CANCEL), Resume())
     with pytest.raises(IllegalTransition, match="state FAILED; allowed: nothing: the state is final"):
         step(Job(State.FAILED), Cancel())
@@ -154,7 +154,7 @@ def test_progress_is_a_fraction(progress: float) -> None:
 
 
 class Lives(RuleBasedStateMachine):
-    """A server, its runner and its users do whatever they like; instructions are obeyed to the letter."""
+    """A server, its runner and its users act at random; all instructions are carried out."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -276,7 +276,7 @@ def history_of(increments: list[tuple[float, float]]) -> list[tuple[float, float
     return [(t, min(p, 1.0)) for t, p in zip(times, progress, strict=True)]
 
 
-def test_nothing_can_be_said_before_the_first_progress() -> None:
+def test_there_is_no_estimate_before_the_first_progress() -> None:
     assert eta_seconds([]) is None
     assert eta_seconds([(3.0, 0.0), (9.0, 0.0)]) is None
 
@@ -299,7 +299,7 @@ def test_does_not_depend_on_the_unit_of_time(increments: list[tuple[float, float
     eta, scaled = eta_seconds(history), eta_seconds([(t * scale, p) for t, p in history])
     if eta is None and scaled is None:
         return
-    if eta is None or scaled is None:  # one of them is too long to be said
+    if eta is None or scaled is None:  # one of the estimates is too long
         there = scaled / scale if scaled is not None else (eta or 0.0) * scale
         assert there >= 0.999 * ETA_LONGEST
     else:

@@ -1,4 +1,4 @@
-"""The manifests for Kubernetes: what they promise, as far as it can be seen without a cluster."""
+"""The Kubernetes manifests, as far as they can be checked without a cluster."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 from tests.workers.test_deployment import pins
 from wingfit.service.http import request_limits
 from wingfit.service.settings import Settings
@@ -107,7 +107,7 @@ def test_ray_knows_every_option_and_is_the_version_of_the_lock() -> None:
     assert ray_groups()[0]["rayStartParams"]["num-cpus"] == "0"
 
 
-def test_one_pod_has_the_data_also_during_an_update() -> None:
+def test_only_one_pod_has_the_data_even_during_an_update() -> None:
     deployment = the("api.yaml", "Deployment")["spec"]
     assert (deployment["replicas"], deployment["strategy"]) == (1, {"type": "Recreate"})
     claim = the("data.yaml", "PersistentVolumeClaim")
@@ -159,7 +159,7 @@ def test_the_servers_probes_are_answered_by_any_name() -> None:
     assert PODS["api"]["spec"]["terminationGracePeriodSeconds"] >= 60
 
 
-def test_rays_probes_are_ours() -> None:
+def test_ray_pods_have_our_own_probes() -> None:
     """KubeRay adds its own where one is missing, which ask a dashboard agent that the image does not have."""
     head = the("ray-cluster.yaml", "RayCluster")["metadata"]["name"] + "-head-svc:6379"
     for name in ("head", "workers"):
@@ -185,7 +185,7 @@ def test_the_api_joins_with_the_token_that_kuberay_makes() -> None:
     assert not {"WINGFIT_ALLOW_REMOTE", "RAY_AUTH_TOKEN"} & set(environment), "without keys anybody gets in"
 
 
-def test_ray_is_out_of_reach_for_all_but_its_members() -> None:
+def test_only_members_of_the_cluster_can_reach_ray() -> None:
     ray, api = documents("network-policy.yaml")
     members = {"matchLabels": {"wingfit-ray-member": "yes"}}
     assert ray["spec"]["podSelector"] == members

@@ -1,4 +1,4 @@
-"""What docker-compose.yml makes read-only may be: the same mounts, in a mount namespace instead of a container."""
+"""The read-only mounts of docker-compose.yml, in a mount namespace instead of a container."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks.common.ray_nodes import REPOSITORY
+from tests.oracles.processes import REPOSITORY
 
 # The repository is put aside, because it may lie below /tmp, and comes back where it was.
 SCRIPT = """
@@ -40,7 +40,7 @@ def can_mount() -> bool:
 
 
 def image_environment() -> dict[str, str]:
-    """What the image sets, as far as it says where things are written."""
+    """The image's variables for the places of written files."""
     text = (REPOSITORY / "Dockerfile").read_text()
     found = dict(re.findall(r"\b(HOME|TMPDIR|XDG_CACHE_HOME|NUMBA_CACHE_DIR)=(\S+)", text))
     return {name: value for name, value in os.environ.items() if name not in found} | found
@@ -50,7 +50,7 @@ def image_environment() -> dict[str, str]:
 @pytest.mark.skipif(
     not Path(sys.prefix).is_relative_to(REPOSITORY), reason="needs the environment in .venv, by make install"
 )
-def test_a_node_and_the_server_write_nothing_but_tmp_and_bring_their_kernels_along() -> None:
+def test_node_and_server_write_to_tmp_only_and_have_their_kernels() -> None:
     api = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]["api"]
     (mount,) = api["tmpfs"]
     place, _, options = mount.partition(":")

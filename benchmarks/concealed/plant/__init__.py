@@ -1,1 +1,1 @@
-"""Simulations that share no code with the tool, and the cameras and balances that record them."""
+"""Simulated rigs that share no code with the product, and the cameras and balances that record them."""

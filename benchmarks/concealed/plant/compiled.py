@@ -1,4 +1,4 @@
-"""How the plant's loops are compiled: cached on disk under the content of all compiled files."""
+"""Compilation of the plant's loops with numba, cached on disk under a hash of all compiled files."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def _folder() -> Path:
-    """Named after what is compiled: numba itself would not notice a change in a file that is called into."""
+    """Cache folder, named after a hash of the sources.
+
+    Numba does not notice a change in a function called from another file.
+    """
     here = Path(__file__).resolve().parent
-    sources = [text for text in (file.read_bytes() for file in sorted(here.glob("*.py"))) if b"@compiled" in text]
+    sources = [text for text in (file.read_bytes() for file in sorted(here.rglob("*.py"))) if b"@compiled" in text]
     digest = hashlib.sha256(b"".join(sources)).hexdigest()[:16]
     for base in (Path(numba.config.CACHE_DIR or here / "__pycache__"), Path(tempfile.gettempdir())):
         folder = base / f"plant-{digest}"
@@ -25,14 +28,14 @@ def _folder() -> Path:
         except OSError:
             continue
         return folder
-    raise OSError("compiled code cannot be kept: set NUMBA_CACHE_DIR to a folder that can be written")
+    raise OSError("no folder to cache compiled code in is writable; set NUMBA_CACHE_DIR to a writable folder")
 
 
 _CACHE = _folder()
 
 
 def compiled(function: F) -> F:
-    """Compile ``function``; sums may be reordered. OSError where no cache can be written."""
+    """Compile ``function``; sums may be reordered. OSError if no cache folder is writable."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_CACHE)
     try:

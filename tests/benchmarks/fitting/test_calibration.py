@@ -21,6 +21,6 @@ def test_deviation_from_the_truth_compares_normalised_shares() -> None:
     assert [row["error_percent"] for row in rows] == pytest.approx([10.0, 0.0, 0.0])
 
 
-def test_machine_is_named() -> None:
+def test_the_machine_has_a_name() -> None:
     assert cpu()
     assert isinstance(commit(), str)

@@ -30,7 +30,7 @@ def test_a_trace_keeps_the_best_so_far() -> None:
     assert all(p.seconds >= 0 for p in points)
 
 
-def test_random_starts_are_counted_and_their_median_stands_for_them() -> None:
+def test_random_starts_are_counted_and_represented_by_their_median() -> None:
     starts = [[Point(n, n / 10, best)] for n, best in ((300, 1.0), (100, 1.0), (200, 1.0), (50, 3.0))]
     found = _random_row([*starts, []], 1.0)
     assert (found["starts"], found["starts_that_reach_the_floor"]) == (5, 3)

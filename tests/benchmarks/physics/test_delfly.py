@@ -36,7 +36,7 @@ def fitted(evaluator: Evaluator) -> dict[str, Fitted]:
     return {name: fit(model, low, trial, evaluator) for name, model in models.items()}
 
 
-def test_coefficients_come_back_and_the_fling_is_missed(fitted: dict[str, Fitted]) -> None:
+def test_coefficients_are_recovered_and_the_missing_fling_is_located(fitted: dict[str, Fitted]) -> None:
     errors = fitted["proposed"].errors
     assert set(errors) == {"C_l", "C_r", "C_F"}
     assert all(abs(e) < 4 for e in errors.values())
@@ -53,7 +53,7 @@ def test_rows_can_be_printed_and_written(fitted: dict[str, Fitted]) -> None:
     assert "(1.24)" in table(found).splitlines()[1]
 
 
-def test_range_is_the_widest_and_none_when_one_is_missing() -> None:
+def test_range_is_the_union_and_none_if_one_is_missing() -> None:
     assert widest([(0.1, 0.3), (0.05, 0.2)]) == [0.05, 0.3]
     assert widest([(0.1, 0.3), None]) is None
 
@@ -74,7 +74,7 @@ def test_intervals_are_counted(evaluator: Evaluator, monkeypatch: pytest.MonkeyP
         assert set(coverage(model, beats, SMALL, 2, 1, evaluator).values()) == {expected}
 
 
-def test_time_of_an_individual_is_a_time() -> None:
+def test_time_of_an_individual_is_positive() -> None:
     assert 0.001 < milliseconds(BladeElementWing(vehicle()), batch=4, rounds=1) < 50
 
 

@@ -1,4 +1,4 @@
-"""The pages of effects say what the code declares, and name nothing that is not there."""
+"""The pages of effects agree with the code, and their links and sections exist."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_figure_is_a_drawing_with_units_on_its_axes(name: str) -> None:
     assert not any("nan" in curve for curve in curves)
 
 
-def test_a_changed_declaration_is_noticed() -> None:
+def test_a_changed_declaration_is_detected() -> None:
     effect = EFFECTS["camera_shift"]
     text = page_of("camera_shift").read_text(encoding="utf-8")
     changed = replace(effect, size=(replace(effect.size[0], upper=0.25), *effect.size[1:]))
@@ -62,7 +62,7 @@ def test_a_changed_declaration_is_noticed() -> None:
     assert "-0.2 to 0.25 mean chords" in filled(text, blocks_of(changed))
 
 
-def test_page_without_marks_is_refused() -> None:
+def test_page_without_markers_is_refused() -> None:
     with pytest.raises(ValueError, match=r"no place for 'genes'.*end of genes"):
         filled("# Title\n<!-- genes -->\n", {"genes": "table"})
 
@@ -75,7 +75,7 @@ def test_index_names_every_effect_with_its_rigs() -> None:
     assert "| wing |" in rows["camera_shift"]
 
 
-def test_figure_of_a_vehicle_tells_weights_in_millinewtons() -> None:
+def test_figure_of_a_vehicle_is_in_millinewtons() -> None:
     effect, rig = EFFECTS["balance_offset"], rig_of("vehicle", quick=False)
     beat, tests = vehicle_panels(rig, effect)
     assert isinstance(rig.description, Vehicle)
@@ -97,7 +97,7 @@ def test_figure_of_a_wing_shows_the_tip_or_the_marker_concerned() -> None:
     assert len({tip, mid, slipped, neighbour}) == 4
 
 
-def test_axis_of_next_to_nothing_does_not_show_rounding() -> None:
+def test_axis_of_a_negligible_change_does_not_show_rounding() -> None:
     phase = np.linspace(0.0, 1.0, 9)
     nothing, much = (Line("a", phase, size * np.sin(phase)) for size in (1e-12, 2.0))
     assert around_zero([nothing]) == (-LEAST, LEAST)

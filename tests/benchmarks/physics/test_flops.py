@@ -64,7 +64,7 @@ def test_count_grows_with_the_bodies_and_lies_above_the_elimination_alone() -> N
     assert least < four < eleven / (11 / 4)
 
 
-def test_peak_counts_what_its_loop_does() -> None:
+def test_peak_counts_the_operations_of_its_loop() -> None:
     for sums, loop in zip(flops.SUMS, (flops._few, flops._many), strict=True):
         counter, data = Counter(), np.ones((sums + 2, LANES))
         data[sums] = 0.5

@@ -25,7 +25,7 @@ def test_cost_exponent_is_the_slope_at_fixed_chordwise_division() -> None:
     assert cost_exponents(rows) == pytest.approx({"air": 1.1, "vacuum": 0.9})
 
 
-def test_peer_is_put_beside_ours() -> None:
+def test_results_of_a_peer_are_added_to_the_row() -> None:
     case = row(24, "air", 2.0)
     add_peer(case, "exudyn", {"cpu_ms_per_beat": 124.0, "error_mm": 0.07, "note": ""})
     add_peer(case, "scipy", {"cpu_ms_per_beat": None, "note": "not finished within 90 s; allow more time"})
@@ -41,9 +41,7 @@ def test_peer_that_fails_gives_its_reason() -> None:
     assert "abacus" in found["note"]
 
 
-def test_last_line_is_the_object_that_was_promised(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_last_line_is_the_json_object(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(simulator, "QUICK", (4,))
     monkeypatch.setattr(simulator, "ENERGY_BODIES", 4)
     monkeypatch.setattr(simulator, "GENOMES", 18)

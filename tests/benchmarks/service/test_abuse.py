@@ -1,4 +1,4 @@
-"""Hostile requests are many, the same for the same seed, and their answers are judged; so is what a fuzzer reports."""
+"""Hostile requests are numerous and reproducible; answers and fuzzer reports are judged."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.abuse import __main__ as abuse
 from benchmarks.abuse import fuzz, requests, uploads
 from benchmarks.abuse.__main__ import _wrong
 from benchmarks.abuse.cases import Case
-from benchmarks.abuse.filling import Filling
+from benchmarks.abuse.valid_values import ValidValues
 from tests.service import toy
 from tests.service.conftest import Api, serving
 from wingfit.records import load_archive
@@ -25,7 +25,7 @@ Json = dict[str, Any]
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_there_are_many_and_the_same_seed_gives_the_same() -> None:
+def test_there_are_many_requests_and_a_seed_reproduces_them() -> None:
     first, again = (list(uploads.cases(1)) for _ in range(2))
     assert first == again
     assert first != list(uploads.cases(2))
@@ -66,7 +66,7 @@ FAILURE = {"title": "Server error", "count": 3, "operations": ["POST /v1/runs", 
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "failures"),
     [
         ({}, []),
         ({"failures": [FAILURE]}, ["fuzz: Server error, 3 times in POST /v1/runs, GET /v1/runs"]),
@@ -77,12 +77,12 @@ FAILURE = {"title": "Server error", "count": 3, "operations": ["POST /v1/runs", 
         ({"operations": None}, ["fuzz: 0 of all calls of the API"]),
     ],
 )
-def test_a_report_of_the_fuzzer_is_judged(changed: Json, said: list[str]) -> None:
-    assert fuzz.judged(WELL | changed) == said
+def test_a_report_of_the_fuzzer_is_judged(changed: Json, failures: list[str]) -> None:
+    assert fuzz.judged(WELL | changed) == failures
     assert fuzz.counted(WELL | changed) == 1960
 
 
-def test_without_the_fuzzer_the_benchmark_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_fuzzer_is_reported_with_the_command_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fuzz, "program", lambda: None)
     monkeypatch.setattr(sys, "argv", ["abuse", "--json"])
     with pytest.raises(SystemExit, match=r"pip install -e \.\[fuzz\]"):
@@ -96,17 +96,17 @@ def good_of(dataset: str, run: str) -> Json:
     return kinds | more | {"effects": ["added_mass"], "examples": []}
 
 
-def test_what_is_valid_is_filled_alike_for_the_same_request_and_what_others_need_is_not_deleted() -> None:
+def test_values_are_reproducible_and_needed_objects_are_not_deleted() -> None:
     dataset, run = "ds_" + "1" * 16, "run_" + "2" * 16
-    filling = Filling(good_of(dataset, run), [b"zip"], seed=1)
-    asked = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
-    filled = [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
-    assert filled == [filling.body(asked, "tracks", filling.dice("POST", seed)) for seed in range(50)]
+    values = ValidValues(good_of(dataset, run), [b"zip"], seed=1)
+    generated = {"dataset_id": "x", "genome": {}, "population": 900, "preset": "dickinson", "seed": 5}
+    filled = [values.body(generated, "tracks", values.dice("POST", seed)) for seed in range(50)]
+    assert filled == [values.body(generated, "tracks", values.dice("POST", seed)) for seed in range(50)]
     assert 25 < sum(one["dataset_id"] == dataset for one in filled) < 50
     assert all(one["population"] == 8 and one["seed"] == 5 for one in filled)
     assert all("preset" not in one for one in filled if one["dataset_id"] == dataset)
-    assert filling.spared({"run_id": run}) == {"run_id": "run_" + "0" * 16}
-    assert filling.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
+    assert values.spared({"run_id": run}) == {"run_id": "run_" + "0" * 16}
+    assert values.spared({"run_id": "run_" + "9" * 16}) == {"run_id": "run_" + "9" * 16}
 
 
 @pytest.mark.skipif(fuzz.program() is None, reason="schemathesis is not installed")

@@ -1,4 +1,4 @@
-"""The ledger of what was acknowledged sees every kind of loss."""
+"""The ledger of acknowledged requests detects every kind of loss."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from benchmarks.common.files import archive
+from benchmarks.durability.clients import outcome, settle
 from benchmarks.durability.ledger import KnownRun, Ledger
-from benchmarks.durability.visitors import outcome, settle
-from benchmarks.durability.works import WORKS, archive
+from benchmarks.durability.workloads import WORKS
 from wingfit.records import load_archive
 
 Json = dict[str, Any]
@@ -23,14 +24,14 @@ def ledger() -> Ledger:
     return Ledger(runs={"run": KnownRun("genetic 1")})
 
 
-def test_generations_that_stay_are_no_loss(ledger: Ledger) -> None:
+def test_unchanged_generations_are_no_loss(ledger: Ledger) -> None:
     ledger.history("run", [item(1, 0.5), item(2, 0.4)])
     ledger.history("run", [item(1, 0.5, 7.0), item(2, 0.4), item(3, 0.3)])
     assert (ledger.lost, ledger.acknowledged) == ([], 3)
 
 
 @pytest.mark.parametrize("later", [[item(1, 0.5)], [item(1, 0.5), item(2, 0.41)], []])
-def test_one_that_is_gone_or_another_is_a_loss(ledger: Ledger, later: list[Json]) -> None:
+def test_a_missing_or_changed_generation_is_a_loss(ledger: Ledger, later: list[Json]) -> None:
     ledger.history("run", [item(1, 0.5), item(2, 0.4)])
     ledger.history("run", later)
     assert ledger.lost
@@ -44,10 +45,10 @@ def test_one_that_is_gone_or_another_is_a_loss(ledger: Ledger, later: list[Json]
         (("SUCCEEDED",), "CANCELLED", True),
         (("CANCELLED",), "SUCCEEDED", True),  # cancelling was acknowledged
         (("CANCELLED",), "CANCELLED", False),
-        (("SUCCEEDED", "CANCELLED"), "CANCELLED", False),  # asked, and the answer was lost
+        (("SUCCEEDED", "CANCELLED"), "CANCELLED", False),  # requested, but the answer was lost
     ],
 )
-def test_every_end_must_be_one_that_was_asked_for(
+def test_a_run_must_end_in_an_allowed_state(
     ledger: Ledger, endings: tuple[str, ...], state: str, *, lost: bool
 ) -> None:
     ledger.runs["run"].endings = endings
@@ -61,7 +62,7 @@ def test_every_end_must_be_one_that_was_asked_for(
     assert ledger.identical == ledger.results == (state == "SUCCEEDED")
 
 
-def test_another_number_in_a_result_is_seen(ledger: Ledger) -> None:
+def test_a_different_number_in_a_result_is_detected(ledger: Ledger) -> None:
     def fetch(_: str) -> Json:
         return {"items": [item(1, 0.5)]}
 
@@ -71,7 +72,7 @@ def test_another_number_in_a_result_is_seen(ledger: Ledger) -> None:
     assert (ledger.results, ledger.identical, ledger.different) == (1, 0, ["run"])
 
 
-def test_works_are_apart_and_their_datasets_read() -> None:
+def test_workloads_have_different_names_and_valid_datasets() -> None:
     assert len({work.name for work in WORKS}) == len(WORKS)
     for example in {work.example for work in WORKS}:
         assert archive(example) == archive(example)

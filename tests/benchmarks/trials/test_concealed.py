@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
-from benchmarks.concealed.laboratory import Addition, Order, add, make
-from benchmarks.concealed.plant import observe, observe_forces
-from benchmarks.concealed.plant.catalogue import UNKNOWN
+from benchmarks.concealed.plant.measurement import balance, film
+from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
+from benchmarks.concealed.record_trial import Addition, Order, add, make
 from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
 from benchmarks.concealed.strength import rms
@@ -65,7 +65,7 @@ def finding(
     )  # fmt: skip
 
 
-def test_a_finding_that_names_what_is_hidden_gets_full_marks() -> None:
+def test_a_finding_that_names_the_hidden_effect_gets_the_best_score() -> None:
     found = finding("named", ("lumped_mass",), ("lumped_mass",), (gene("lumped_mass.mass", 0.005, 0.002),))
     marks = mark(found, answer(MASS))
     assert (marks.first, marks.exact, marks.wrong, marks.right_side, marks.found) == (True, True, False, True, 1)
@@ -77,20 +77,20 @@ def test_a_finding_that_names_what_is_hidden_gets_full_marks() -> None:
     assert (marks.covered, marks.intervals) == (1, 1)
 
 
-def test_the_place_of_the_effect_that_is_named_goes_before_that_of_the_misfit() -> None:
+def test_the_named_effects_place_has_priority_over_the_misfits() -> None:
     found = finding("named", ("lumped_mass",), ("lumped_mass",), (gene("lumped_mass.station", 0.82, 0.1),))
     assert mark(found, answer(MASS)).span == pytest.approx(0.02)
     assert mark(replace(found, named=("damage",)), answer(MASS)).span == pytest.approx(0.05)
 
 
-def test_another_name_is_wrong_and_so_is_one_more() -> None:
+def test_a_wrong_or_additional_name_is_wrong() -> None:
     other = mark(finding("named", ("damage",), ("damage",)), answer(MASS))
     assert (other.first, other.exact, other.wrong) == (False, False, True)
     more = mark(finding("named", ("lumped_mass", "damage"), ("lumped_mass",)), answer(MASS))
     assert (more.first, more.exact, more.wrong) == (True, False, True)
 
 
-def test_an_open_verdict_names_nothing() -> None:
+def test_an_ambiguous_verdict_names_nothing() -> None:
     marks = mark(finding("ambiguous", ("lumped_mass", "damage"), ("lumped_mass",)), answer(MASS))
     assert (marks.first, marks.exact, marks.wrong, marks.right_side) == (True, False, False, True)
     both_sides = mark(finding("ambiguous", ("lumped_mass", "camera_shift"), ("lumped_mass",)), answer(MASS))
@@ -100,7 +100,7 @@ def test_an_open_verdict_names_nothing() -> None:
 @pytest.mark.parametrize(
     ("verdict", "alarm"), [("adequate", False), ("unnamed", True), ("ambiguous", True), ("named", True)]
 )
-def test_whatever_is_said_to_be_lacking_in_a_null_is_a_false_alarm(verdict: Verdict, alarm: bool) -> None:
+def test_missing_physics_in_a_null_trial_is_a_false_alarm(verdict: Verdict, alarm: bool) -> None:
     marks = mark(finding(verdict, genes=(gene("E_f", 5.1e6, 2e5), gene("L_1", 0.1, 0.01))), answer(group="null"))
     assert marks.alarm is alarm
     assert marks.first is None
@@ -120,19 +120,19 @@ def test_a_fault_taken_for_physics_is_on_the_wrong_side() -> None:
     assert not mark(finding("unnamed"), answer(fault)).right_side
 
 
-def test_of_two_effects_the_credited_ones_count() -> None:
+def test_of_two_effects_the_named_ones_count() -> None:
     pair = answer(MASS, Secret("added_mass", True, "physics", 1.0), group="pairs")
     assert mark(finding("named", ("lumped_mass",), ("lumped_mass", "added_mass")), pair).found == 1
     assert mark(finding("ambiguous", ("damage",), ("lumped_mass", "added_mass")), pair).found == 2
     assert mark(finding("named", ("lumped_mass",)), pair).span is None
 
 
-def test_phases_go_round() -> None:
+def test_phases_are_periodic() -> None:
     assert beats_apart(0.98, 0.02) == pytest.approx(0.04)
     assert beats_apart(0.25, 0.75) == pytest.approx(0.5)
 
 
-def test_an_answer_comes_back_from_its_seal(tmp_path: Path) -> None:
+def test_a_sealed_answer_is_read_back(tmp_path: Path) -> None:
     closed = close({"trial-0001": seal(answer(MASS), tmp_path)}, tmp_path)
     assert open_seal("trial-0001", tmp_path, closed) == answer(MASS)
 
@@ -148,14 +148,14 @@ def test_a_changed_answer_is_refused(tmp_path: Path, spoil: str) -> None:
         open_seal("trial-0001", tmp_path, closed)
 
 
-def test_a_folder_that_was_closed_keeps_its_answers(tmp_path: Path) -> None:
+def test_answers_in_a_closed_folder_cannot_be_replaced(tmp_path: Path) -> None:
     hashes = {"trial-0001": seal(answer(MASS), tmp_path)}
     assert close(hashes, tmp_path) == close(hashes, tmp_path)
     with pytest.raises(BrokenSealError, match="trial-0001"):
         close({"trial-0001": digest("another")}, tmp_path)
 
 
-def test_what_is_there_already_is_not_made_or_diagnosed_again(tmp_path: Path) -> None:
+def test_existing_datasets_and_findings_are_reused(tmp_path: Path) -> None:
     folders, trial = Folders(tmp_path), vehicle_trial("stroke_amplitude")
     folders.findings.mkdir()
     make_all([trial], folders, 1)
@@ -188,7 +188,7 @@ def trial_mark(n: int, group: str, strength: float, **changes: object) -> Mark:
     return replace(plain, trial=f"trial-{n}", **changes)  # type: ignore[arg-type]
 
 
-def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
+def test_trials_are_binned_by_their_measured_strength() -> None:
     marks = (
         trial_mark(0, "null", 0.0, verdict="adequate"),
         trial_mark(1, "null", 0.0, verdict="named", alarm=True, wrong=True, named=("damage",)),
@@ -212,13 +212,13 @@ def test_the_table_counts_trials_for_the_strength_that_they_have() -> None:
     assert figures["rates"]["null: false alarms"][:2] == [1, 2]
     assert len(at(marks, 5)) == 1
     rows = Table((*marks, replace(marks[0], division="4", plant="8x1")), advised, 1, 3.0).rows()
-    assert rows["wing 4 of 4: nulls without alarm"].startswith(" 50.0 %  (1 of 2")
-    assert rows["wing 4 of 8x1: nulls without alarm"].startswith("100.0 %  (1 of 1")
-    assert rows["wing 4 of 4: unlisted unnamed"].startswith(" 50.0 %  (1 of 2")
+    assert rows["wing 4 of 4: nulls without false alarm"].startswith(" 50.0 %  (1 of 2")
+    assert rows["wing 4 of 8x1: nulls without false alarm"].startswith("100.0 %  (1 of 1")
+    assert rows["wing 4 of 4: unlisted, left unnamed"].startswith(" 50.0 %  (1 of 2")
     json.dumps(figures)
 
 
-def test_a_diagnosis_that_fails_gets_the_worst_in_all_that_its_trial_counts_in() -> None:
+def test_a_failed_diagnosis_gets_the_worst_score() -> None:
     table = Table((failed(answer(MASS), "ValueError: no"), failed(answer(group="null"), "")), (), 0, 1.0)
     figures = table.as_json()
     assert table.rates["listed, d = 2: top-1"].percent == 0.0
@@ -232,20 +232,20 @@ def test_a_diagnosis_that_fails_gets_the_worst_in_all_that_its_trial_counts_in()
     json.dumps(figures, allow_nan=False)
 
 
-def test_a_place_that_is_not_told_is_far_off() -> None:
+def test_a_missing_place_has_infinite_distance() -> None:
     silent = replace(finding("unnamed"), where=None)
     marks = mark(silent, answer(MASS))
     assert (marks.span, marks.chord, marks.phase) == (math.inf, math.inf, math.inf)
     assert mark(silent, answer(replace(MASS, phase=None))).phase is None
 
 
-def test_what_a_division_is_said_to_leave_is_no_excuse() -> None:
+def test_the_floor_does_not_include_discretisation_error() -> None:
     found = finding("named", ("lumped_mass",))
     boasting = replace(found, floors=replace(found.floors, division=1e-2))
     assert mark(boasting, answer(MASS)).held_out == mark(found, answer(MASS)).held_out
 
 
-def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
+def test_the_plan_has_the_requested_trials_and_names_reveal_nothing() -> None:
     trials = plan(3)
     by_group: dict[str, list[tuple[str, ...]]] = {}
     for trial in trials:
@@ -260,7 +260,7 @@ def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
     assert sum(trial.build.plant != trial.build.division for trial in trials) >= len(trials) / 3
     assert {trial.build.division for trial in trials} == {"", "4", "11", "24"}
     assert len({trial.name for trial in trials}) == len(trials) == len({trial.seed for trial in trials})
-    physics = {kind for (kind,) in set(unlisted)} - set(observe.FAULTS) - set(observe_forces.FAULTS)
+    physics = {kind for (kind,) in set(unlisted)} - set(film.FAULTS) - set(balance.FAULTS)
     assert len(physics & set(UNKNOWN)) >= 3  # of the wing's plant
     assert len(physics - set(UNKNOWN)) >= 2  # of the vehicle's
     groups = [trial.group for trial in trials[:60]]
@@ -270,7 +270,7 @@ def test_the_plan_holds_what_is_asked_for_and_tells_nothing() -> None:
     assert plan(3, only=["pairs"]) == tuple(trial for trial in trials if trial.group == "pairs")
 
 
-def test_a_sample_touches_every_group_and_both_rigs() -> None:
+def test_the_quick_sample_has_every_group_and_both_rigs() -> None:
     sample = plan(1, quick=True)
     assert len(sample) <= 40
     for group in GROUPS:
@@ -278,7 +278,7 @@ def test_a_sample_touches_every_group_and_both_rigs() -> None:
         assert rigs == {"wing", "vehicle"}, group
 
 
-def test_conditions_keep_to_the_rigs() -> None:
+def test_conditions_suit_the_rig() -> None:
     for trial in plan(1, quick=True):
         rng = np.random.default_rng(trial.seed)
         drawn = conditions(trial, rng)
@@ -297,7 +297,7 @@ def vehicle_trial(*hidden: str, group: str = "listed", target: float = 3.0) -> T
     return Trial("trial-0007", group, VEHICLE, hidden, target, False, 77)  # type: ignore[arg-type]
 
 
-def test_a_trial_is_recorded_alike_twice_and_as_strong_as_asked(tmp_path: Path) -> None:
+def test_recording_a_trial_is_reproducible_and_reaches_the_target_strength(tmp_path: Path) -> None:
     orders = [Order(vehicle_trial("stroke_amplitude"), tmp_path / f"{k}.nc", tmp_path) for k in (1, 2)]
     hashes = [make(order) for order in orders]
     assert hashes[0] == hashes[1]
@@ -309,12 +309,12 @@ def test_a_trial_is_recorded_alike_twice_and_as_strong_as_asked(tmp_path: Path) 
     assert truth.secrets[0].values["stroke_amplitude.part"] == pytest.approx(truth.secrets[0].strength)
     assert len(one.held_out) == 2
     assert len(one.fitted) == 5
-    for told in (one.name, one.description, *(r.name for r in one.recordings)):
-        assert "stroke_amplitude" not in told
+    for text in (one.name, one.description, *(r.name for r in one.recordings)):
+        assert "stroke_amplitude" not in text
     assert all(r.standard_deviation is None for r in one.recordings)
 
 
-def test_what_is_recorded_later_is_of_the_same_rig(tmp_path: Path) -> None:
+def test_a_later_recording_is_of_the_same_rig(tmp_path: Path) -> None:
     trial = vehicle_trial("induced_inflow", group="advice")
     make(Order(trial, tmp_path / "a.nc", tmp_path))
     first = load_dataset(tmp_path / "a.nc")
@@ -329,7 +329,7 @@ def test_what_is_recorded_later_is_of_the_same_rig(tmp_path: Path) -> None:
     assert rms((old.values - new.values).ravel()) < 0.2 * rms(old.values.ravel())  # of the same forces
 
 
-def test_a_wing_hides_nothing_where_nothing_is_hidden(tmp_path: Path) -> None:
+def test_a_null_trial_of_a_wing_has_no_hidden_effect(tmp_path: Path) -> None:
     trial = Trial("trial-0009", "null", EQUAL, (), 0.0, True, 5)
     make(Order(trial, tmp_path / "w.nc", tmp_path))
     truth = read(tmp_path / "trial-0009.json")

@@ -35,14 +35,14 @@ def line(start: Mapping[str, float] | None = None) -> tuple[Refit, np.ndarray]:
     return Refit(Line(), start or {"height": 1.0, "slope": 1.0}, (recording,)), x
 
 
-def test_what_the_genes_can_do_leaves_no_strength() -> None:
+def test_a_change_within_reach_of_the_genes_has_no_strength() -> None:
     refit, x = line()
     change = np.repeat(0.3 + 0.2 * x, 3)
     assert refit.linear(change) == pytest.approx(0.0, abs=1e-6)
     assert refit.full(change)[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_the_rest_is_the_strength_and_a_box_stops_a_refit() -> None:
+def test_strength_is_the_residual_and_a_refit_stops_at_the_bounds() -> None:
     refit, x = line()
     beyond = x**2 - np.mean(x**2) - 0.0 * x
     assert refit.linear(np.repeat(beyond, 3)) == pytest.approx(rms(beyond), rel=1e-6)
@@ -63,7 +63,7 @@ class Fluttering(Line):
         return Observation(seen.channels, reasons)
 
 
-def test_a_refit_goes_round_what_cannot_be_simulated() -> None:
+def test_a_refit_avoids_genomes_that_cannot_be_simulated() -> None:
     refit, x = line()
     change = np.repeat(1.2 + 0.2 * x, 3)
     there = replace(refit, model=Fluttering())
@@ -76,7 +76,7 @@ def test_a_refit_goes_round_what_cannot_be_simulated() -> None:
         nowhere.full(change)
 
 
-def test_a_refit_begins_where_it_is_told_if_that_is_better() -> None:
+def test_a_refit_starts_from_a_given_genome_if_that_is_better() -> None:
     refit, x = line()
     change = np.repeat(2.0 + 0.3 * x, 3)
     _, end = refit.full(change, rounds=3)
@@ -90,7 +90,7 @@ def test_a_refit_begins_where_it_is_told_if_that_is_better() -> None:
 
 
 class Counting(Line):
-    """It notes how many individuals it is asked for."""
+    """Counts the individuals of every request."""
 
     def __init__(self, calls: list[int]) -> None:
         self.calls = calls
@@ -100,7 +100,7 @@ class Counting(Line):
         return super().observe(genomes, recording)
 
 
-def test_missing_samples_count_for_nothing() -> None:
+def test_missing_samples_are_ignored() -> None:
     refit, x = line()
     change = np.repeat(x**2, 3)
     change[::4] = np.nan
@@ -109,7 +109,7 @@ def test_missing_samples_count_for_nothing() -> None:
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
-def test_a_strength_is_found_that_gives_the_target(power: float) -> None:
+def test_the_strength_search_reaches_the_target(power: float) -> None:
     calls = []
 
     def misfit(strength: float) -> float:
@@ -126,7 +126,7 @@ def test_a_strength_stays_within_its_limits() -> None:
     assert strength_for(3.0, lambda s: 0.1 * s, 1.0, (0.1, 2.0)) == pytest.approx((2.0, 0.2))
 
 
-def test_a_search_turns_back_where_the_plant_fails() -> None:
+def test_the_strength_search_retreats_where_the_plant_fails() -> None:
     def misfit(strength: float) -> float:
         if strength > 3.0:
             raise ArithmeticError("no periodic motion")

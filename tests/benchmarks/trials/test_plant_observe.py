@@ -9,12 +9,12 @@ import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.concealed.plant import observe_forces
-from benchmarks.concealed.plant.observe import FAULTS, Filmed, Filming, draw_filming, film, tracked, with_noise
-from benchmarks.concealed.plant.observe_cameras import direction_values, divided, draw_cameras, places
-from benchmarks.concealed.plant.observe_forces import Weighed, Weighing, draw_weighing, silent, weigh
-from benchmarks.concealed.plant.observe_law import Concealed
-from benchmarks.concealed.plant.observe_noise import COLOURS, Noise, bursts, coloured, draw_noise, track_noise
+from benchmarks.concealed.plant.law import Concealed
+from benchmarks.concealed.plant.measurement import balance
+from benchmarks.concealed.plant.measurement.balance import Weighed, Weighing, draw_weighing, silent, weigh
+from benchmarks.concealed.plant.measurement.cameras import direction_values, divided, draw_cameras, places
+from benchmarks.concealed.plant.measurement.film import FAULTS, Filmed, Filming, draw_filming, film, tracked, with_noise
+from benchmarks.concealed.plant.measurement.noise import COLOURS, Noise, bursts, coloured, draw_noise, track_noise
 from wingfit.records import Condition, Dataset, load_dataset, save_dataset
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.virtual_rigs.balance import delfly
@@ -51,7 +51,7 @@ def tracks(hidden: Concealed | None = None) -> Array:
 
 
 @pytest.mark.parametrize("colour", COLOURS)
-def test_noise_has_the_level_that_it_is_given(colour: str) -> None:
+def test_noise_has_the_given_level(colour: str) -> None:
     noise = Noise(colour, 5e-4, 0.6)  # type: ignore[arg-type]
     made = track_noise(noise, 900, 40, rng())
     assert rms(made) == pytest.approx(5e-4, rel=0.05)
@@ -63,7 +63,7 @@ def lagged(values: Array, lag: int) -> float:
     return float(np.mean(values[lag:] * values[:-lag]) / np.mean(values**2))
 
 
-def test_noise_has_the_colour_that_it_is_named_for() -> None:
+def test_noise_has_the_named_colour() -> None:
     shape = (4000, 30)
     first, wavy, pink, heavy = (coloured(c, 0.6, shape, rng()) for c in ("first_order", "wavy", "pink", "heavy"))
     assert [lagged(first, k) for k in (1, 2, 3)] == pytest.approx([0.6, 0.36, 0.216], abs=0.02)
@@ -78,13 +78,13 @@ def test_noise_has_the_colour_that_it_is_named_for() -> None:
     assert np.mean(first**4) / np.mean(first**2) ** 2 == pytest.approx(3.0, abs=0.15)
 
 
-def test_a_shake_is_common_to_all_markers() -> None:
+def test_shake_is_common_to_all_markers() -> None:
     made = track_noise(Noise("shake", 1.0, 0.5, 0.4), 3000, 20, rng())[..., 0]
     alike = np.asarray(np.corrcoef(made.T))[np.triu_indices(20, 1)]
     assert alike.mean() == pytest.approx(0.4, abs=0.06)
 
 
-def test_drawn_noise_is_of_every_colour_and_between_its_bounds() -> None:
+def test_random_noise_has_every_colour_and_stays_within_bounds() -> None:
     drawn = [draw_noise(rng(seed)) for seed in range(60)]
     assert {noise.colour for noise in drawn} == set(COLOURS)
     assert all(2e-4 <= noise.level <= 8e-4 for noise in drawn)
@@ -115,7 +115,7 @@ def test_a_strobe_goes_backwards_through_the_beat_and_a_fast_camera_forwards() -
         assert rms(angle - again - still) < 0.02
 
 
-def test_markers_are_lost_but_never_all_of_reference(tmp_path: Path) -> None:
+def test_some_reference_markers_are_never_lost(tmp_path: Path) -> None:
     shots = []
     for seed in range(6):
         filming = replace(draw_filming(rng(seed)), lost=40)
@@ -128,7 +128,7 @@ def test_markers_are_lost_but_never_all_of_reference(tmp_path: Path) -> None:
     np.testing.assert_allclose(back[0].values, shots[0].recording.values, atol=1e-9)
 
 
-def test_a_gap_is_a_gap_in_all_coordinates() -> None:
+def test_gaps_affect_all_coordinates() -> None:
     shot = filmed(None, replace(NOISY, gap_rate=0.02, gap_frames=4.0))
     gone = np.isnan(shot.recording.positions)
     assert gone.mean() == pytest.approx(0.08, abs=0.03)
@@ -136,7 +136,7 @@ def test_a_gap_is_a_gap_in_all_coordinates() -> None:
     np.testing.assert_array_equal(np.isnan(shot.clean), np.isnan(shot.recording.values))
 
 
-def test_noise_and_chance_do_not_depend_on_what_is_hidden() -> None:
+def test_random_numbers_do_not_depend_on_hidden_faults() -> None:
     plain, shifted = (
         filmed(hidden, NOISY) for hidden in (None, {"camera_shift": {"strength": 0.01, "azimuth": 0.0, "height": 0.0}})
     )
@@ -148,7 +148,7 @@ def test_noise_and_chance_do_not_depend_on_what_is_hidden() -> None:
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_no_fault_is_exactly_none_and_more_is_more(name: str) -> None:
+def test_a_fault_of_zero_strength_changes_nothing_and_a_stronger_one_changes_more(name: str) -> None:
     drawn, filming = FAULTS[name].draw(rng(3)), replace(QUIET, beats=2)
     if name == "marker_swap":
         drawn["strength"] = 1.0
@@ -165,7 +165,7 @@ def test_no_fault_is_exactly_none_and_more_is_more(name: str) -> None:
 
 
 def test_listed_faults_are_in_the_library_and_the_others_are_not() -> None:
-    for laws in (FAULTS, observe_forces.FAULTS):
+    for laws in (FAULTS, balance.FAULTS):
         for law in laws.values():
             assert (law.name in EFFECTS) == law.listed
             for gene in law.values(law.draw(rng())):
@@ -173,14 +173,14 @@ def test_listed_faults_are_in_the_library_and_the_others_are_not() -> None:
                 assert parameter in {p.name for p in EFFECTS[effect].parameters}
 
 
-def test_rays_meet_where_they_came_from() -> None:
+def test_rays_intersect_at_the_marker() -> None:
     cameras = draw_cameras(WING, rng())
     points = REST + 0.1 * rng().standard_normal(REST.shape)
     found = cameras.points((cameras.image(points, 0), cameras.image(points, 1)))
     np.testing.assert_allclose(found, points, atol=1e-12)
 
 
-def test_wrong_cameras_turn_shift_and_stretch_the_frame() -> None:
+def test_wrong_camera_poses_rotate_shift_and_scale_the_frame() -> None:
     angles = {"azimuth": 0.7, "height": 0.3}
     turn = {"strength": 0.01} | angles
     vector = np.array(list(direction_values("camera_rotation", turn).values()))
@@ -194,7 +194,7 @@ def test_wrong_cameras_turn_shift_and_stretch_the_frame() -> None:
     np.testing.assert_allclose(tracks({"scale_error": {"strength": 0.02}}), 1.02 * tracks(), atol=1e-9)
 
 
-def test_images_are_distorted_by_division_and_only_motion_is_seen_out_of_step() -> None:
+def test_distortion_follows_the_division_model_and_a_delay_affects_motion_only() -> None:
     image = 0.2 * rng().standard_normal((50, 2))
     distorted = divided(image, 0.3)
     back = distorted / (1.0 + 0.3 * (distorted**2).sum(axis=1, keepdims=True))
@@ -206,7 +206,7 @@ def test_images_are_distorted_by_division_and_only_motion_is_seen_out_of_step() 
         assert rms(tracks({name: {"strength": 0.003}}) - tracks()) > 1e-4
 
 
-def test_a_shutter_that_rolls_sees_the_tip_late() -> None:
+def test_rolling_shutter_images_the_tip_late() -> None:
     rolled, straight = tracks({"rolling_shutter": {"strength": 0.004}}), tracks()
     rate = 2 * np.pi * 3.0
     wave = np.exp(-1j * rate * filmed().recording.times)[:, None]
@@ -215,7 +215,7 @@ def test_a_shutter_that_rolls_sees_the_tip_late() -> None:
     assert slope == pytest.approx(0.004, rel=0.1)
 
 
-def test_a_marker_slides_on_the_skin_and_two_change_names() -> None:
+def test_a_marker_slips_along_the_skin_and_two_names_are_exchanged() -> None:
     slip = {"strength": 0.006, "span": 0.7, "chord": 0.5, "azimuth": 0.4}
     off = tracks({"marker_slip": slip}) - tracks()
     assert (np.abs(off).max(axis=(0, 2)) > 1e-9).sum() == 1
@@ -233,7 +233,7 @@ def test_a_marker_slides_on_the_skin_and_two_change_names() -> None:
         np.testing.assert_array_equal(swapped[rows, first], tracks()[rows, second])
 
 
-def test_a_tracker_follows_what_accelerates_evenly_and_smooths_the_rest() -> None:
+def test_the_tracker_follows_constant_acceleration_and_smooths_other_motion() -> None:
     lag, t = {"tracker_lag": {"strength": 20.0}}, np.arange(60.0)[:, None, None]
     even = 1.0 + 0.1 * t + 0.02 * t**2 + np.zeros((60, 4, 3))
     hole = bursts((60, 4), 0.05, 4.0, rng())
@@ -247,7 +247,7 @@ def test_a_tracker_follows_what_accelerates_evenly_and_smooths_the_rest() -> Non
     assert rms(tracks(lag) - tracks()) > 1e-3
 
 
-def test_a_pane_displaces_beyond_its_joint_glare_at_one_phase_and_creep_in_time() -> None:
+def test_pane_glare_and_creep_act_where_and_when_they_should() -> None:
     pane = np.abs(tracks({"pane_edge": {"strength": 0.003, "span": 0.6, "azimuth": 0.3}}) - tracks()).max(axis=(0, 2))
     assert pane[places(WING)[:, 0] < 0.45].max() < 0.02 * pane[places(WING)[:, 0] > 0.8].min()
     glare = {"strength": 0.006, "span": 0.7, "chord": 0.5, "phase": 0.25, "azimuth": 0.0}
@@ -279,7 +279,7 @@ def wave(values: Array, weighing: Weighing, k: int) -> npt.NDArray[np.complex128
     return np.asarray(2.0 * (values * np.exp(-2j * np.pi * k * 12.5 * times)[:, None]).mean(axis=0))
 
 
-def test_a_quiet_balance_shows_the_forces() -> None:
+def test_a_balance_without_noise_records_the_forces() -> None:
     shot = weighed()
     t = shot.recording.times * 12.5
     wanted = np.stack([0.15 + 0.2 * np.cos(2 * np.pi * t), 0.05 * np.sin(4 * np.pi * t)], axis=1)
@@ -288,7 +288,7 @@ def test_a_quiet_balance_shows_the_forces() -> None:
     assert shot.recording.forces == ("x", "z")
 
 
-def test_scatter_from_beat_to_beat_and_noise_are_as_large_as_told(tmp_path: Path) -> None:
+def test_variation_between_beats_and_noise_have_the_given_size(tmp_path: Path) -> None:
     weighing = replace(STILL, scatter=0.02, beats=60)
     shot = weighed(None, weighing, np.full((480, 2), 0.2))
     assert np.std(shot.recording.values / 0.2) == pytest.approx(0.02, rel=0.35)
@@ -304,9 +304,9 @@ def test_scatter_from_beat_to_beat_and_noise_are_as_large_as_told(tmp_path: Path
     assert len(load_dataset(tmp_path / "balance").recordings) == 3
 
 
-@pytest.mark.parametrize("name", observe_forces.FAULTS)
-def test_no_fault_of_the_balance_is_exactly_none_and_more_is_more(name: str) -> None:
-    drawn = observe_forces.FAULTS[name].draw(rng(3))
+@pytest.mark.parametrize("name", balance.FAULTS)
+def test_a_balance_fault_of_zero_strength_changes_nothing_and_a_stronger_one_changes_more(name: str) -> None:
+    drawn = balance.FAULTS[name].draw(rng(3))
 
     def hide(part: float) -> Array:
         return weighed({name: drawn | {"strength": part * drawn["strength"]}}).clean
@@ -317,7 +317,7 @@ def test_no_fault_of_the_balance_is_exactly_none_and_more_is_more(name: str) -> 
     assert 1.2 < large / small < 20.0
 
 
-def test_mount_and_amplifier_do_what_their_transfer_functions_say() -> None:
+def test_mount_and_amplifier_have_their_transfer_functions() -> None:
     p = {"strength": 0.3, "frequency": 60.0, "damping": 0.2}
     ratio = 12.5 / 60.0
     felt = (1 + 0.4j * ratio) / (1 - ratio**2 + 0.4j * ratio)
@@ -329,7 +329,7 @@ def test_mount_and_amplifier_do_what_their_transfer_functions_say() -> None:
     assert abs(found - np.exp(2j * np.pi * 12.5 * 1e-3)) < 1e-6
 
 
-def test_tilt_gain_zero_and_drift_change_what_is_shown() -> None:
+def test_tilt_gain_zero_error_and_drift() -> None:
     clean = weighed().clean
     tilted = weighed({"balance_tilt": {"strength": 0.04}}).clean
     np.testing.assert_allclose(tilted, clean @ [[1.0, 0.04], [-0.04, 1.0]], atol=1e-9)
@@ -340,7 +340,7 @@ def test_tilt_gain_zero_and_drift_change_what_is_shown() -> None:
     np.testing.assert_allclose(drift[:, 0], 0.01 * np.log1p(np.arange(len(drift)) / 1250.0 / 0.2), atol=1e-12)
 
 
-def test_dry_friction_holds_back_and_an_amplifier_ends() -> None:
+def test_dry_friction_and_saturation() -> None:
     stuck = weighed({"dry_friction": {"strength": 0.02}}).clean
     assert np.abs(stuck - weighed().clean).max() == pytest.approx(0.02, rel=0.05)
     assert stuck[200:, 0].max() == pytest.approx(0.35 - 0.02, abs=2e-3)

@@ -1,4 +1,4 @@
-"""The plant of the concealed trials: laws by closed forms, the whole wing against the tool's own simulator."""
+"""The plant of the concealed trials: laws against closed forms, the whole wing against the product's simulator."""
 
 import ast
 from dataclasses import replace
@@ -11,15 +11,15 @@ import pytest
 from scipy.signal import resample
 
 import benchmarks.concealed.plant as plant
-from benchmarks.concealed.plant.band import factor, solve
-from benchmarks.concealed.plant.catalogue import KINDS, LISTED, UNKNOWN
-from benchmarks.concealed.plant.geometry import Cut, counts_of
-from benchmarks.concealed.plant.hidden import Effect, Hidden, drawn
-from benchmarks.concealed.plant.joints import joints, shares, torsion_constant
-from benchmarks.concealed.plant.linkage import angles, rocker, series_of
-from benchmarks.concealed.plant.march import A, C
-from benchmarks.concealed.plant.settle import Accuracy
-from benchmarks.concealed.plant.simulate import Beat, simulate
+from benchmarks.concealed.plant.wing.banded import factor, solve
+from benchmarks.concealed.plant.wing.geometry import Cut, counts_of
+from benchmarks.concealed.plant.wing.integrator import A, C
+from benchmarks.concealed.plant.wing.joints import joints, shares, torsion_constant
+from benchmarks.concealed.plant.wing.linkage import angles, rocker, series_of
+from benchmarks.concealed.plant.wing.periodic import Accuracy
+from benchmarks.concealed.plant.wing.simulate import Beat, simulate
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS, LISTED, UNKNOWN
+from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden, drawn
 from wingfit.records import Condition, FourBarDrive
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
@@ -55,7 +55,7 @@ def rms(difference: Array) -> float:
 
 
 def test_the_plant_shares_no_code_with_the_tool() -> None:
-    for file in Path(plant.__file__).parent.glob("*.py"):
+    for file in Path(plant.__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -92,11 +92,11 @@ def test_bodies_and_joints_are_those_of_the_simulator(division: str) -> None:
     assert (cut.under(places[:, 0], places[:, 1]) == structure.wiring.carrier).all()
 
 
-def test_divisions_are_read_or_refused() -> None:
+def test_divisions_are_parsed_or_refused() -> None:
     assert counts_of("11") == (3, 3, 3, 2)
     assert counts_of("2x3") == (3, 3)
     for text in ("", "1x1", "4x0", "one", "3,-1"):
-        with pytest.raises(ValueError, match="not understood"):
+        with pytest.raises(ValueError, match="is invalid"):
             counts_of(text)
 
 
@@ -157,12 +157,14 @@ def test_steps_are_fine_enough_and_the_motion_is_periodic() -> None:
     # what the simulator's sums over cells leave is most in thin air at 4 Hz: 0.05 mm, without them 0.008 mm
     [("4", THIN, 7e-5), ("4", STREAM, 2e-5), ("11", THICK, 4e-5), ("11", STREAM, 3e-5), ("24", THIN, 3e-5)],
 )
-def test_without_anything_hidden_it_moves_as_the_simulator(division: str, condition: Condition, allowed: float) -> None:
+def test_without_hidden_effects_the_motion_equals_the_simulators(
+    division: str, condition: Condition, allowed: float
+) -> None:
     values = genome(1)
     model = FlexibleWing(WING, division, numerics=Numerics(accuracy=1e-5))
-    told = model.beat([values[gene.name] for gene in model.genes], blank_recording(WING, condition))
+    simulated = model.beat([values[gene.name] for gene in model.genes], blank_recording(WING, condition))
     found = simulate(WING, division, values, condition).tracks
-    difference = found - resample(told.tracks, len(found), axis=0)
+    difference = found - resample(simulated.tracks, len(found), axis=0)
     assert np.linalg.norm(difference, axis=2).max() < allowed
     assert rms(difference) < 2e-5
 
@@ -170,7 +172,7 @@ def test_without_anything_hidden_it_moves_as_the_simulator(division: str, condit
 # --- hidden effects as a whole --------------------------------------------------------------------------------------
 
 
-def test_the_catalogue_says_rightly_what_the_library_has() -> None:
+def test_listed_effects_are_in_the_library_and_the_others_are_not() -> None:
     assert len(LISTED) >= 12
     assert len(UNKNOWN) >= 5
     assert set(LISTED) <= set(EFFECTS)
@@ -180,7 +182,7 @@ def test_the_catalogue_says_rightly_what_the_library_has() -> None:
 
 
 @pytest.mark.parametrize("name", list(KINDS))
-def test_every_effect_is_nothing_at_nothing_and_grows(name: str) -> None:
+def test_every_effect_vanishes_at_zero_strength_and_grows(name: str) -> None:
     condition, typical = STREAM if name in IN_STREAM else THIN, KINDS[name].typical
     nominal = beat(condition).tracks
     assert np.array_equal(beat(condition, name).tracks, nominal)
@@ -197,7 +199,7 @@ def test_every_effect_is_nothing_at_nothing_and_grows(name: str) -> None:
         ("added_mass", 0.05), ("backlash", 0.05), ("stroke_amplitude", 0.3), ("drive_harmonics", 0.3),
     ],
 )  # fmt: skip
-def test_genes_that_are_told_are_those_of_the_library(name: str, left: float) -> None:
+def test_true_gene_values_mean_the_same_in_the_library(name: str, left: float) -> None:
     """The library's effect with these values moves the wing as the plant's does, but for the difference in form."""
     condition = STREAM if name in IN_STREAM else THIN
     found = beat(condition, name, KINDS[name].typical)
@@ -208,9 +210,9 @@ def test_genes_that_are_told_are_those_of_the_library(name: str, left: float) ->
     with_it = model.beat([genes.get(gene.name, gene.nominal) for gene in model.genes], blank).tracks
     without = base.beat([gene.nominal for gene in base.genes], blank).tracks
     n = len(found.tracks)
-    told = resample(with_it, n, axis=0) - resample(without, n, axis=0)
+    expected = resample(with_it, n, axis=0) - resample(without, n, axis=0)
     change = found.tracks - beat(condition).tracks
-    assert rms(change - told) < left * rms(change)
+    assert rms(change - expected) < left * rms(change)
 
 
 def test_two_effects_at_once_and_their_answers() -> None:
@@ -224,7 +226,7 @@ def test_two_effects_at_once_and_their_answers() -> None:
     ]  # fmt: skip
 
 
-def test_a_stop_is_told_where_the_wing_is_highest() -> None:
+def test_a_stop_acts_where_the_wing_is_highest() -> None:
     found = beat(STREAM, "stop", KINDS["stop"].typical)
     (truth,) = found.truths
     assert truth.turn is not None
@@ -243,7 +245,7 @@ def test_the_beat_begins_where_reference_markers_rise_through_the_hinge() -> Non
     assert height[(k + 20) % 4096] > 1e-3
 
 
-def test_draws_stay_in_their_ranges_and_what_is_unknown_is_refused() -> None:
+def test_draws_stay_in_their_ranges_and_unknown_effects_are_refused() -> None:
     rng = np.random.default_rng(5)
     for name, kind in KINDS.items():
         effect = drawn(name, kind.typical, rng)

@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.concealed.plant.attached import point_loads
-from benchmarks.concealed.plant.build import Draft, rig_of
-from benchmarks.concealed.plant.catalogue import KINDS
-from benchmarks.concealed.plant.hidden import Hidden
-from benchmarks.concealed.plant.linkage import angles
-from benchmarks.concealed.plant.rig import AIR_LAWS, CARRIED, LAG, LAG_RATE, STALL, VORTEX, Motion, Rig
-from benchmarks.concealed.plant.springs import dead_zone, joint_loads, remembered_loads
-from benchmarks.concealed.plant.stream import air_loads
+from benchmarks.concealed.plant.wing.air_loads import air_loads
+from benchmarks.concealed.plant.wing.build import Draft, rig_of
+from benchmarks.concealed.plant.wing.joint_loads import dead_zone, joint_loads, remembered_loads
+from benchmarks.concealed.plant.wing.linkage import angles
+from benchmarks.concealed.plant.wing.point_loads import point_loads
+from benchmarks.concealed.plant.wing.rig import AIR_LAWS, CARRIED, LAG, LAG_RATE, STALL, VORTEX, Motion, Rig
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
+from benchmarks.concealed.plant.wing_effects.hidden import Hidden
 from wingfit.records import Condition
 from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.flexible_wing import FlexibleWing
@@ -87,7 +87,7 @@ def test_springs_are_the_gradient_of_their_energy() -> None:
 
 
 @pytest.mark.parametrize("name", ["", "cubic_stiffness", "backlash", "viscoelastic", "hysteresis", "rod_slip"])
-def test_joints_balance_and_dampers_lose(name: str) -> None:
+def test_joint_forces_balance_and_dampers_dissipate(name: str) -> None:
     one = rig(Hidden.one(name, KINDS[name].typical) if name else None)
     motion = disturbed(one, 2)
     rng = np.random.default_rng(3)
@@ -132,7 +132,7 @@ def test_hardening_adds_its_strength_at_a_radian_over_the_span() -> None:
     assert hard < soft < 0
 
 
-def test_play_holds_nothing_within_and_all_beyond() -> None:
+def test_play_has_no_moment_inside_and_the_full_stiffness_outside() -> None:
     assert dead_zone(0.0, 0.01) == pytest.approx(0.0, abs=1e-12)
     assert dead_zone(0.004, 0.01) < 1e-5
     assert dead_zone(0.03, 0.01) == pytest.approx(0.02, rel=1e-6)
@@ -145,7 +145,7 @@ def test_play_holds_nothing_within_and_all_beyond() -> None:
 
 
 @pytest.mark.parametrize("name", ["viscoelastic", "hysteresis", "rod_slip"])
-def test_memories_end_where_they_must(name: str) -> None:
+def test_internal_states_reach_their_limits(name: str) -> None:
     """At a steady rate of turning: a Maxwell branch at r T, a slider at its yield; after a step of 1 ms at once."""
     one = rig(Hidden.one(name, KINDS[name].typical))
     motion = still(one)
@@ -207,7 +207,7 @@ def test_the_vortex_has_the_measured_coefficients() -> None:
     assert load[:, 0].sum() == pytest.approx(q * (drag - lift) * math.sqrt(0.5), rel=1e-6)
 
 
-def test_lift_of_a_step_comes_by_wagners_function() -> None:
+def test_lift_after_a_step_follows_wagners_function() -> None:
     """Half of it at once, the rest as half chords are travelled."""
     one = rig(wind=np.array([6.0, 0.0, 0.6]), air_laws=laws({LAG: 1.0, LAG_RATE: 1.0}), remembers=1)
     one = one._replace(coefficients=np.array([4.0, 0.0, 0.0, 0.0]))
@@ -220,7 +220,7 @@ def test_lift_of_a_step_comes_by_wagners_function() -> None:
     assert load[0, 2] == pytest.approx(wagner * full[0, 2], rel=0.01)
 
 
-def test_stall_takes_lift_late_and_by_kirchhoff() -> None:
+def test_stall_reduces_lift_with_a_lag_and_by_kirchhoffs_law() -> None:
     alpha = 0.6
     wind = 6.0 * np.array([math.cos(alpha), 0.0, math.sin(alpha)])
     hidden = Hidden.one("dynamic_stall", 1.0, angle=0.35, delay=1.0)
@@ -235,7 +235,7 @@ def test_stall_takes_lift_late_and_by_kirchhoff() -> None:
     assert late[0, 2] == pytest.approx(full[0, 2] * ((1 + math.sqrt(part)) / 2) ** 2, rel=1e-6)
 
 
-def test_carried_air_resists_acceleration_across_only() -> None:
+def test_added_mass_resists_normal_acceleration_only() -> None:
     one = rig(air_laws=laws({CARRIED: 1.0}), coefficients=np.zeros(4), wind=np.zeros(3))
     motion, load = still(one), np.zeros((6, 6))
     motion.dv[:] = [3.0, 2.0, 10.0]
@@ -255,7 +255,7 @@ def at_point(kind: str, strength: float, velocity: Array, lift: float, **at: flo
     return load[one.point_body[0]], one
 
 
-def test_things_at_a_point() -> None:
+def test_point_loads() -> None:
     slack, _ = at_point("band", 10.0, np.zeros(3), -0.01)
     tight, one = at_point("band", 10.0, np.zeros(3), 0.03)
     assert abs(slack[2]) < 1e-3
@@ -270,7 +270,7 @@ def test_things_at_a_point() -> None:
     assert braked[:3] == pytest.approx([0.0, -0.2 * 25 * 3, 0.2 * 25 * 4])
 
 
-def test_an_appendage_sags_by_its_weight_and_rings_at_its_frequency() -> None:
+def test_an_appendage_sags_by_its_weight_and_oscillates_at_its_frequency() -> None:
     one = rig(Hidden.one("appendage", 0.01, hertz=8.0))
     motion, load, z = still(one), np.zeros((6, 6)), np.array([0.01, 0.0])
     track = []

@@ -13,7 +13,7 @@ from benchmarks.proof import delfly, robird
 from benchmarks.proof.__main__ import main
 from benchmarks.proof.delfly import FLING, Lift
 from benchmarks.proof.robird import HIDDEN, Campaign, Stall
-from benchmarks.proof.told import Claim, Story, beside_truth, families, leader, opened, over_floor, saved
+from benchmarks.proof.story import Claim, Story, beside_truth, families, leader, opened, over_floor, saved
 from tests.report.findings import force_finding, wing_finding
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.result import Result
@@ -45,7 +45,7 @@ def weighed() -> Dataset:
 
 
 class Browser(webbrowser.GenericBrowser):
-    """One that remembers what it was asked to open."""
+    """A browser that records the opened addresses."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -60,7 +60,7 @@ def held(story: Story) -> list[bool]:
     return [claim.holds for claim in story.claims]
 
 
-def test_the_robirds_dataset_is_described_without_what_is_hidden(filmed: Campaign) -> None:
+def test_the_robirds_description_does_not_contain_hidden_effects(filmed: Campaign) -> None:
     dataset = filmed.dataset
     assert dataset.wing == robird_wing()
     assert len(dataset.recordings) == len({r.name for r in dataset.recordings}) == 7
@@ -69,21 +69,21 @@ def test_the_robirds_dataset_is_described_without_what_is_hidden(filmed: Campaig
     assert len(dataset.held_out) == 2
 
 
-def test_the_true_genes_are_those_of_what_is_hidden(filmed: Campaign) -> None:
+def test_true_genes_belong_to_the_hidden_effects(filmed: Campaign) -> None:
     truth, hinge = filmed.truth, HIDDEN["hinge_offset"]
     assert {name.partition(".")[0] for name in truth} == set(HIDDEN)
     assert np.hypot(truth["hinge_offset.y"], truth["hinge_offset.z"]) == pytest.approx(hinge["strength"])
     assert truth["drive_harmonics.cos2"] ** 2 + truth["drive_harmonics.sin2"] ** 2 > 0.02**2
 
 
-def test_what_is_hidden_moves_the_markers_by_centimetres(filmed: Campaign) -> None:
+def test_hidden_effects_move_the_markers_by_centimetres(filmed: Campaign) -> None:
     bare = robird.campaign(4, hidden={}).dataset
     for one, other in zip(filmed.dataset.recordings, bare.recordings, strict=True):
         apart = (one.values - other.values).reshape(len(one.times), -1, 3)
         assert np.nanmean(np.linalg.norm(apart, axis=2)) > robird.CENTIMETRES
 
 
-def test_the_truth_leaves_less_than_the_description_and_no_less_than_noise(filmed: Campaign) -> None:
+def test_the_true_model_fits_better_than_the_description_but_not_below_the_noise(filmed: Campaign) -> None:
     quiet = robird.campaign(4, hidden={})
     noise, described = quiet.left_by_truth(), replace(filmed, truth={}).left_by_truth()
     assert 0.9 * noise < filmed.left_by_truth() < 0.2 * described
@@ -101,43 +101,43 @@ def test_the_thesis_search_reports_where_it_ended(filmed: Campaign, evaluator: E
     assert cut.generations < found.generations
 
 
-def test_what_a_search_gained_lately_is_that_of_its_last_stage() -> None:
+def test_the_recent_gain_of_a_search_is_that_of_its_last_stage() -> None:
     assert robird.gained(["a", "a", "b", "b"], [0.04, 0.03, 0.02, 0.015]) == pytest.approx(0.25)
     assert robird.gained(["a"] * 12, [0.05, 0.04, *[0.03] * 10]) == pytest.approx(0.25)
     assert robird.gained(["a"], [0.02]) == 0.0
 
 
-def test_the_robirds_claims_fail_where_the_tool_is_wrong(filmed: Campaign) -> None:
+def test_the_robird_claims_fail_if_the_diagnosis_is_wrong(filmed: Campaign) -> None:
     made = replace(filmed, truth={"hinge_offset.y": 0.0120, "hinge_offset.z": -0.005})
     search = Stall(Result((), (), 0.03, 0.02, 0.031, 0.021, 3e-4), 0.01, 30, 1500, 60.0, stalled=True)
     found, proof = wing_finding(), Proof(Interval(4.4, 4.1, 4.7), Interval(1.04, 1.0, 1.1), 1e-3, True, "")
     found = replace(found, proof=proof)
-    story = robird.told(made, search, found, PAGE)
+    story = robird.story_of(made, search, found, PAGE)
     assert held(story) == [True] * 5
     assert [row["covered"] for row in story.figures["genes"]] == [True, False]
     assert story.figures["stall_mm"] == pytest.approx(20.0)
     wrong = replace(found, named=("camera_rotation",), verdict="measurement fault")
-    assert held(robird.told(made, search, wrong, PAGE)) == [True, False, False, True, True]
-    assert held(robird.told(made, search, replace(found, named=()), PAGE)) == [True, False, False, True, True]
+    assert held(robird.story_of(made, search, wrong, PAGE)) == [True, False, False, True, True]
+    assert held(robird.story_of(made, search, replace(found, named=()), PAGE)) == [True, False, False, True, True]
     worse = replace(found, proof=replace(proof, after=Interval(1.2, 1.1, 1.3)))
-    assert held(robird.told(made, search, worse, PAGE))[3:] == [False, True]
+    assert held(robird.story_of(made, search, worse, PAGE))[3:] == [False, True]
     far = replace(found, proof=replace(proof, floor=1.3 * made.left_by_truth()))
-    assert held(robird.told(made, search, far, PAGE))[3:] == [True, False]
-    assert held(robird.told(made, search, replace(found, proof=None), PAGE))[3:] == [False, False]
+    assert held(robird.story_of(made, search, far, PAGE))[3:] == [True, False]
+    assert held(robird.story_of(made, search, replace(found, proof=None), PAGE))[3:] == [False, False]
     moving = replace(search, stalled=False, gain=0.1)
-    assert held(robird.told(made, moving, found, PAGE))[0] is False
+    assert held(robird.story_of(made, moving, found, PAGE))[0] is False
     near = replace(search, result=replace(search.result, after=0.004))
-    assert held(robird.told(made, near, found, PAGE))[0] is False
+    assert held(robird.story_of(made, near, found, PAGE))[0] is False
 
 
-def test_what_is_not_named_has_no_value_beside_the_truth() -> None:
+def test_an_effect_that_is_not_named_has_no_estimate() -> None:
     genes = {"a.b": GeneValue("a.b", "1", "", Interval(0.5, 0.4, None), 0.0)}
     named, absent = beside_truth(genes, {"a.b": 0.45, "c.d": 1.0})
     assert (named["found"], named["covered"]) == (0.5, None)
     assert (absent["found"], absent["covered"]) == (None, None)
 
 
-def test_the_named_explanation_is_told_even_where_another_is_first() -> None:
+def test_the_named_hypothesis_has_priority_over_the_most_probable() -> None:
     found = wing_finding()
     turned = replace(found, hypotheses=found.hypotheses[::-1])
     assert leader(turned).effects == found.named
@@ -145,16 +145,14 @@ def test_the_named_explanation_is_told_even_where_another_is_first() -> None:
     assert over_floor(found)["heldout_over_floor"] == pytest.approx(1.04)
 
 
-def test_the_delflys_tests_keep_their_conditions_and_the_noise_of_their_seed(weighed: Dataset) -> None:
+def test_the_delfly_tests_have_their_conditions_and_reproducible_noise(weighed: Dataset) -> None:
     again = delfly.campaign(4, FEW, held_out=("test-5",))
     assert [r.condition for r in weighed.recordings] == [trial.condition for trial in FEW]
     for one, other in zip(weighed.recordings, again.recordings, strict=True):
         np.testing.assert_array_equal(one.values, other.values)
 
 
-def test_the_baseline_lacks_something_while_the_wings_peel_and_nothing_without_that(
-    weighed: Dataset, evaluator: Evaluator
-) -> None:
+def test_the_nominal_model_misfits_only_while_the_wings_peel(weighed: Dataset, evaluator: Evaluator) -> None:
     places = delfly.located(weighed, evaluator, FEW)
     assert list(places) == ["test-2"]
     assert places["test-2"] is not None
@@ -163,7 +161,7 @@ def test_the_baseline_lacks_something_while_the_wings_peel_and_nothing_without_t
     assert delfly.located(nothing_lacks, evaluator, FEW) == {"test-2": None}
 
 
-def test_lift_agrees_better_with_the_fling_put_in(weighed: Dataset, evaluator: Evaluator) -> None:
+def test_lift_agrees_better_with_the_fling(weighed: Dataset, evaluator: Evaluator) -> None:
     value = {"C_l": 1.3, "C_r": 1.42, "clap_and_peel.coefficient": 1.6, "clap_and_peel.clearance": 0.0}
     genes = tuple(GeneValue(name, "1", "", Interval(one, None, None)) for name, one in value.items())
     lift = delfly.lifts(weighed, replace(force_finding(), genes=genes), evaluator)
@@ -172,30 +170,30 @@ def test_lift_agrees_better_with_the_fling_put_in(weighed: Dataset, evaluator: E
         assert one.before < delfly.AS_IN_TABLE_7 < one.after
 
 
-def test_the_delflys_claims_fail_where_the_tool_is_wrong() -> None:
+def test_the_delfly_claims_fail_if_the_diagnosis_is_wrong() -> None:
     lift = (
         Lift("test-2", held_out=False, before=0.90, after=0.99),
         Lift("test-5", held_out=True, before=0.9, after=0.98),
     )
     found = force_finding()
-    story = delfly.told(found, PLACES, lift, PAGE)
+    story = delfly.story_of(found, PLACES, lift, PAGE)
     assert held(story) == [True] * 6
     assert story.figures["misfit_tstar_range"] == (0.06, 0.32)
     assert story.figures["lift_correlation_after"] == pytest.approx(0.985)
     assert found.where is not None
     late = replace(found, where=replace(found.where, phase=Interval(0.3, 0.1, 0.45)))
-    assert held(delfly.told(late, PLACES, lift, PAGE))[0] is False
+    assert held(delfly.story_of(late, PLACES, lift, PAGE))[0] is False
     spread = replace(found, where=replace(found.where, phase=None))
-    assert held(delfly.told(spread, PLACES, lift, PAGE))[0] is False
-    assert held(delfly.told(found, PLACES | {"test-5": None}, lift, PAGE))[1] is False
-    assert held(delfly.told(replace(found, named=("wake_capture",)), PLACES, lift, PAGE))[2:4] == [False, False]
+    assert held(delfly.story_of(spread, PLACES, lift, PAGE))[0] is False
+    assert held(delfly.story_of(found, PLACES | {"test-5": None}, lift, PAGE))[1] is False
+    assert held(delfly.story_of(replace(found, named=("wake_capture",)), PLACES, lift, PAGE))[2:4] == [False, False]
     more = replace(found, named=(FLING, "wake_capture"))
-    assert held(delfly.told(more, PLACES, lift, PAGE))[2:4] == [True, False]
+    assert held(delfly.story_of(more, PLACES, lift, PAGE))[2:4] == [True, False]
     low = (replace(lift[0], after=0.91), replace(lift[1], after=0.89))
-    assert held(delfly.told(found, PLACES, low, PAGE))[4:] == [False, False]
+    assert held(delfly.story_of(found, PLACES, low, PAGE))[4:] == [False, False]
 
 
-def test_a_page_is_opened_only_where_it_can_be_seen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_page_is_opened_in_graphical_browsers_only(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for name, expected in (("firefox", True), ("lynx", False)):
         browser = Browser(name)
         monkeypatch.setattr(webbrowser, "get", lambda one=browser: one)
@@ -222,7 +220,7 @@ def test_the_command_ends_with_figures_and_fails_with_a_claim(
     assert "delfly" not in last
 
 
-def test_a_dataset_takes_the_place_of_an_earlier_one_and_of_nothing_else(weighed: Dataset, tmp_path: Path) -> None:
+def test_a_dataset_replaces_an_earlier_dataset_only(weighed: Dataset, tmp_path: Path) -> None:
     (tmp_path / "delfly").mkdir()
     kept = tmp_path / "delfly" / "notes.txt"
     kept.write_text("mine")

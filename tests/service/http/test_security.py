@@ -14,7 +14,7 @@ from typing import Any
 import httpx
 import pytest
 
-from benchmarks.abuse import uploads
+from tests.oracles.datasets import example_files, zipped, zipped_with
 from tests.service import toy
 from tests.service.conftest import Api, serving
 from wingfit.diagnosis import DiagnosisSpec
@@ -150,9 +150,9 @@ def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
         trap.settimeout(0.5)
         url = f"http://127.0.0.1:{trap.getsockname()[1]}/x"
         with serving(create_app(Settings(data=tmp_path), make_evaluator=toy.NoEvaluator)) as client:
-            archive = uploads._files() | {"recordings/link.url": url.encode()}
+            archive = example_files() | {"recordings/link.url": url.encode()}
             archive["dataset.yaml"] = archive["dataset.yaml"].replace(b"name: robird-11", f"name: {url}".encode())
-            sent = {"file": (url, uploads._zipped(archive))}
+            sent = {"file": (url, zipped(archive))}
             client.post("/v1/datasets", files=sent, headers={"Referer": url, "X-Forwarded-Host": url})
             for path in ("runs", "diagnoses", "simulations", "loads"):
                 body = {"dataset_id": url, "recording": url, "name": url, "run_id": url}
@@ -166,7 +166,7 @@ def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
 def test_an_upload_writes_no_file_of_a_name_of_its_own(tmp_path: Path) -> None:
     with serving(create_app(Settings(data=tmp_path / "data"), make_evaluator=toy.NoEvaluator)) as client:
         for filename in ("../../evil.zip", "/etc/evil.zip", "evil.zip", "..\\evil.zip"):
-            data = uploads._with(uploads._files(), "evil/evil.csv")
+            data = zipped_with(example_files(), "evil/evil.csv")
             answer = client.post("/v1/datasets", files={"file": (filename, data)})
             assert answer.status_code == 201, answer.text
             told = client.get(f"/v1/datasets/{answer.json()['id']}/archive").headers["Content-Disposition"]

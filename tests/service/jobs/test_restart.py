@@ -186,7 +186,7 @@ def test_a_run_that_takes_the_server_down_is_given_up_and_its_neighbour_is_not(t
             assert again.api.diagnosed(neighbour)["state"] == "SUCCEEDED"
             break
     assert deaths == 3
-    assert "the server ended 3 times in a row while this was computed" in run["error"]
+    assert "the server ended 3 times in a row while this was running" in run["error"]
     assert "(after step 2)" in run["error"]
     assert run["generations"] == 2
 

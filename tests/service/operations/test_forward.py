@@ -12,7 +12,7 @@ from contextlib import closing, contextmanager, suppress
 
 import pytest
 
-from benchmarks.common.ray_nodes import REPOSITORY, free_port
+from tests.oracles.processes import REPOSITORY, free_port
 
 SECONDS = 20.0
 

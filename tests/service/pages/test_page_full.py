@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from benchmarks.load.filling import Filled, fill
+from tests.oracles.datasets import Filled, fill
 from tests.service.pages.browsing import DRAWN, Seen
 from tests.service.processes import ServerProcess
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import plank
 from wingfit.records import Condition, Wing
 from wingfit.sim.effects.ports.wing import WingScene

@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import ORDER, driven, march, order, plank, vacuum_here, with_connectors
 from tests.sim.wing.test_rigid import SMALL, TwoBodies
 from wingfit.sim.effects.ports.wing import WingScene

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import ORDER, driven, march, order, plank, vacuum_here, with_connectors
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS

@@ -13,18 +13,22 @@ import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.peers import compare, scipy_engine
-from benchmarks.peers.equations import (
+from tests.oracles.engines import (
     SIZE,
+    PeerWing,
     air_loads,
     at_rest,
+    compare,
+    exudyn_engine,
     marker_tracks,
+    peer_wing,
     put_rods,
     right_hand_side,
+    rod_motion,
+    scipy_engine,
     sparsity,
     spring_loads,
 )
-from benchmarks.peers.wing import PeerWing, peer_wing, rod_motion
 from wingfit.records import Condition
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import new_work
@@ -207,22 +211,20 @@ def test_no_dependence_is_missing_from_the_sparsity() -> None:
 def test_exudyn_under_the_same_spring_law_agrees(medium: compare.Medium) -> None:
     """4 bodies at 480 steps a beat: of second order, 0.02 mm of its own error is left."""
     pytest.importorskip("exudyn", reason=EXUDYN)
-    from benchmarks.peers.exudyn_engine import SAMPLES, Settings, simulate
-
     condition = compare.CONDITIONS[medium]
-    run = simulate(peer("4", condition), Settings(480, "energy"))
-    ours = second_beat("4", condition)[:: FINE // SAMPLES]
+    run = exudyn_engine.simulate(peer("4", condition), exudyn_engine.Settings(480, "energy"))
+    ours = second_beat("4", condition)[:: FINE // exudyn_engine.SAMPLES]
     np.testing.assert_allclose(
-        run.times[SAMPLES : 2 * SAMPLES] * condition.flap_frequency - 1, np.arange(60) / 60, atol=1e-9
+        run.times[exudyn_engine.SAMPLES : 2 * exudyn_engine.SAMPLES] * condition.flap_frequency - 1,
+        np.arange(60) / 60,
+        atol=1e-9,
     )
-    assert farthest(run.tracks[SAMPLES : 2 * SAMPLES], ours) < 0.1
+    assert farthest(run.tracks[exudyn_engine.SAMPLES : 2 * exudyn_engine.SAMPLES], ours) < 0.1
 
 
 def test_exudyns_user_law_is_that_of_the_independent_equations() -> None:
     """One spring at a time, undamped: force on the first body, and moment on the second about its frame's origin."""
     pytest.importorskip("exudyn", reason=EXUDYN)
-    from benchmarks.peers.exudyn_engine import energy_wrench
-
     wing, none = peer("11", compare.CONDITIONS["vacuum"]), np.zeros(6)
     R, p, _, _ = frames(wing, shaken(wing, 9), 0.21)
     still = np.zeros_like(p)
@@ -234,7 +236,7 @@ def test_exudyns_user_law_is_that_of_the_independent_equations() -> None:
         arm = R[j] @ wing.b[c]
         d = R[i].T @ (p[j] + arm - p[i]) - wing.a[c]
         angles = Rotation.from_matrix(R[i].T @ R[j]).as_euler("XYZ")
-        found = energy_wrench(wing.stiffness[c], none, d, angles, np.zeros(3), np.zeros(3))
+        found = exudyn_engine.energy_wrench(wing.stiffness[c], none, d, angles, np.zeros(3), np.zeros(3))
         expected = np.concatenate([load[i, :3] @ R[i], -(load[j, 3:] - np.cross(arm, load[j, :3])) @ R[i]])
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
@@ -242,8 +244,6 @@ def test_exudyns_user_law_is_that_of_the_independent_equations() -> None:
 def test_air_on_exudyns_angles_does_the_work_of_the_air_on_the_bodies() -> None:
     """Virtual work: the generalised force on an angle is the moment along the rotation that the angle makes."""
     pytest.importorskip("exudyn", reason=EXUDYN)
-    from benchmarks.peers.exudyn_engine import air_on_angles
-
     wing, rng, h = peer("11", compare.CONDITIONS["air"]), np.random.default_rng(4), 1e-6
     n = len(wing.mass)
     q, q_t = 0.3 * rng.normal(size=(n, 6)), rng.normal(size=(n, 6)) * [1, 1, 1, 10, 10, 10]
@@ -253,7 +253,7 @@ def test_air_on_exudyns_angles_does_the_work_of_the_air_on_the_bodies() -> None:
     load = np.zeros((n, 6))
     air_loads(wing, R.as_matrix(), q_t[:, :3].copy(), np.einsum("nk,nki->ni", q_t[:, 3:], axes), load)
     expected = np.concatenate([load[:, :3], np.einsum("nki,ni->nk", axes, load[:, 3:])], axis=1)
-    found = air_on_angles(wing, q.ravel(), q_t.ravel()).reshape(n, 6)
+    found = exudyn_engine.air_on_angles(wing, q.ravel(), q_t.ravel()).reshape(n, 6)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max(axis=0).min())
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.sim.vehicle.printed import forces
+from tests.oracles.armanini_2016 import forces
 from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, genome, plate, recording
 from wingfit.records import FourierFlap, FourierPitch
 from wingfit.sim.atmosphere import density

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.sim.vehicle.printed import split_cycle
+from tests.oracles.armanini_2016 import split_cycle
 from tests.sim.vehicle.vehicles import DELFLY, PASSIVE
 from wingfit.records import FourierFlap, FourierPitch, SplitCycleFlap, WingMotion
 from wingfit.sim.vehicle.motion import angles, motion_genes, split_cycle_series

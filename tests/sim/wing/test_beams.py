@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.linalg import expm
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, iv, jv
 
-from benchmarks.beams import (
+from tests.oracles.beams import (
+    CANTILEVER_ROOTS,
     CASES,
     ELASTIC,
     STOCKY,
@@ -19,33 +19,27 @@ from benchmarks.beams import (
     UNIFORM_ROD,
     UNIFORM_SHEET,
     WINGS,
+    Beam,
+    Family,
+    cut_beam,
+    elastica,
+    euler_bernoulli,
     frequency_errors,
     frequency_markdown,
     observed_order,
+    spring_chain,
+    timoshenko,
     torsion_carried,
+    torsion_constant,
+    torsional,
+    transfer_matrix,
     twist_rate,
     wing_tracks,
 )
-from benchmarks.physics.beam_theory import (
-    CANTILEVER_ROOTS,
-    Beam,
-    Family,
-    elastica,
-    euler_bernoulli,
-    timoshenko,
-    torsion_constant,
-    torsional,
-)
-from benchmarks.physics.spring_chain import cut_beam, spring_chain
 
 Array = npt.NDArray[np.float64]
 
 BENDING: tuple[Family, ...] = ("flapwise", "in-plane")
-
-
-def transfer(rate: Array, length: float) -> Array:
-    """Of the state of a uniform beam from root to tip; ``rate`` [4, 4] is its derivative along the span."""
-    return np.asarray(expm(rate * length))
 
 
 def changes_sign(determinant: list[float]) -> bool:
@@ -89,7 +83,7 @@ def test_ritz_finds_the_roots_of_timoshenkos_frequency_equation(family: Family) 
             rate[1, 2] = 1 / (beam.young * inertia)
             rate[2, 1], rate[2, 3] = -beam.density * inertia * omega**2, -1.0
             rate[3, 0] = -beam.density * A * omega**2
-            sides.append(float(np.linalg.det(transfer(rate, beam.length)[2:, 2:])))
+            sides.append(float(np.linalg.det(transfer_matrix(rate, beam.length)[2:, 2:])))
         assert changes_sign(sides)
     assert timoshenko(beam, family)[2] < 0.95 * euler_bernoulli(beam, family)[2], "a beam where shear matters"
 
@@ -109,7 +103,7 @@ def test_ritz_gives_both_torsions_of_the_uniform_beam() -> None:
         for omega in 2 * np.pi * frequency * np.array([1 - 1e-6, 1 + 1e-6]):
             rate = np.diag([1.0, 1.0, 1.0], 1)
             rate[3] = [inertia * omega**2 / warping, 0.0, rigidity / warping, 0.0]
-            tip = transfer(rate, L)
+            tip = transfer_matrix(rate, L)
             free = np.array([tip[2], warping * tip[3] - rigidity * tip[1]])[:, 2:]
             sides.append(float(np.linalg.det(free)))
         assert changes_sign(sides)

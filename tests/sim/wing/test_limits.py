@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 from scipy.interpolate import CubicSpline
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import CHORD, DENSITY, LENGTH, ORDER, THICKNESS, driven, march, plank, vacuum_here
 from wingfit.records import Condition, FourBarDrive, Genome
 from wingfit.sim.kernels.arrays import Setting

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.oracles.newton_euler import newton_euler, rate_of
 from wingfit.records import Condition, FourierDrive
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
@@ -84,13 +85,6 @@ def affected() -> Found:
     return model, *of_genome(model, genome, TUNNEL)
 
 
-def rate_of(series: Array, step: float) -> Array:
-    """Rate of a periodic series at its samples, by the central difference of sixth order."""
-    weights = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
-    total = sum(w * (np.roll(series, -k, axis=0) - np.roll(series, k, axis=0)) for k, w in weights)
-    return np.asarray(total / step)
-
-
 def recorded_alike(outputs: Outputs, beat: Beat, *, moving_air: bool = False) -> None:
     """Motors, air, energies and powers, from connectors and strips one at a time, equal the record of the whole.
 
@@ -135,34 +129,6 @@ def test_motors_follow_the_drive(which: str, request: pytest.FixtureRequest) -> 
     np.testing.assert_allclose(front.angle, told, atol=1e-9)
     late = [float(np.argmax(m.angle)) / len(outputs.phase) for m in (front, rear)]
     assert (late[1] - late[0]) % 1.0 == pytest.approx(TUNNEL.phase_lag / (2 * np.pi), abs=1 / len(outputs.phase))
-
-
-def newton_euler(model: FlexibleWing, outputs: Outputs, motion: State, condition: Condition) -> tuple[Array, Array]:
-    """[n, N, 6] sum of the wrenches on every body in its frame, and what its motion needs (finite differences)."""
-    w, n = model.structure.wiring, len(model.structure.bodies)
-    R = motion.R.reshape(len(motion.R), -1, 3, 3)
-    applied = outputs.air_wrench.copy()
-    down = np.array([0.0, 0.0, -condition.gravity])
-    applied[:, :, 3:] += w.mass[:, None] * np.einsum("tnji,j->tni", R[:, :n], down)
-    for c, load in enumerate(outputs.connectors):
-        i, j = w.first[c], w.second[c]
-        moment, force = load.wrench[:, :3], load.wrench[:, 3:]
-        held = motion.p[:, j] + np.einsum("tij,j->ti", R[:, j], w.b[c])
-        world_force, world_moment = (np.einsum("tij,tj->ti", R[:, i], x) for x in (force, moment))
-        for body, sign in ((i, -1.0), (j, 1.0)):
-            if body < n:
-                about = world_moment + np.cross(held - motion.p[:, body], world_force)
-                both = np.stack([about, world_force], axis=1)
-                applied[:, body] += sign * np.einsum("tji,tkj->tki", R[:, body], both).reshape(-1, 6)
-    step = 1 / (condition.flap_frequency * len(motion.V))
-    V = motion.V[:, :n]
-    inertia = w.inertia.reshape(n, 3, 3)
-    spin = np.einsum("nij,tnj->tni", inertia, V[:, :, :3])
-    momentum = np.concatenate([spin, w.mass[:, None] * V[:, :, 3:]], axis=2)
-    turning = np.concatenate(
-        [np.cross(V[:, :, :3], spin), w.mass[:, None] * np.cross(V[:, :, :3], V[:, :, 3:])], axis=2
-    )
-    return applied, rate_of(momentum, step) + turning
 
 
 @pytest.mark.parametrize("which", ["found", "affected"])

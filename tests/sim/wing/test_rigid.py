@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.integrate import cumulative_simpson
 from scipy.linalg import eig, eigh
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.free_body import FreeBody
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import (
     ORDER,
     STIFF_ORDER,
@@ -37,34 +37,6 @@ G = 9.81
 PRINCIPAL = np.array([1e-5, 2e-5, 3e-5])
 AXES = Rotation.from_rotvec([0.4, -0.7, 0.3]).as_matrix()  # principal axes in the body frame, as columns
 SPIN = np.array([10.0, 0.0, 7.0])  # about the principal axes; close to where the middle axis tips over
-
-
-class FreeBody:
-    """Torque-free asymmetric body (Landau and Lifshitz, Mechanics, section 37), rates about its principal axes."""
-
-    def __init__(self, inertia: Array, spin: Array) -> None:
-        i1, i2, i3 = inertia
-        self.inertia, self.energy2 = inertia, float(inertia @ spin**2)
-        self.momentum = float(np.linalg.norm(inertia * spin))
-        e, m2 = self.energy2, self.momentum**2
-        assert m2 > e * i2, "the closed form below is for motion around the third axis"
-        self.sizes = np.sqrt(
-            [(e * i3 - m2) / (i1 * (i3 - i1)), (e * i3 - m2) / (i2 * (i3 - i2)), (m2 - e * i1) / (i3 * (i3 - i1))]
-        )
-        self.pace = np.sqrt((i3 - i2) * (m2 - e * i1) / (i1 * i2 * i3))
-        self.m = (i2 - i1) * (e * i3 - m2) / ((i3 - i2) * (m2 - e * i1))
-        self.period = 4 * ellipk(self.m) / self.pace
-
-    def rates(self, t: Array) -> Array:
-        """omega [T, 3] at times ``t``, omega_2 = 0 at 0 (Eqs. 37.8-37.12)."""
-        sn, cn, dn, _ = ellipj(self.pace * t, self.m)
-        return np.stack([cn, sn, dn], axis=1) * self.sizes
-
-    def precession(self, t: Array) -> Array:
-        """Angle of the third axis about the angular momentum since t[0] (Eq. 37.17), ``t`` finely spaced."""
-        across = self.inertia[:2] * self.rates(t)[:, :2] ** 2
-        rate = self.momentum * across.sum(axis=1) / (across @ self.inertia[:2])
-        return np.asarray(cumulative_simpson(rate, x=t, initial=0.0))
 
 
 def free_flight(step: float, steps: int, gravity: float = 0.0) -> tuple[Array, Array, Array, Structure]:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.physics.plates import cut, displacement, loaded, plate, stiffness_matrix, straight_rod
+from tests.oracles.plates import cut, displacement, loaded, plate, stiffness_matrix, straight_rod
 from tests.sim.wing.test_structure import FRONT_D, GENOME, REAR_D, SPAN, THICKNESS, foam_rows, numbered, rod_rows
 from wingfit.records import Rod, Wing
 from wingfit.sim.virtual_rigs.campaign import robird_wing

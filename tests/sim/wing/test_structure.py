@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.physics.plates import cut, displacement, loaded, plate, stiffness_matrix, straight_rod, with_materials
+from tests.oracles.plates import cut, displacement, loaded, plate, stiffness_matrix, straight_rod, with_materials
 from wingfit.records import Marker, Wing
 from wingfit.sim.virtual_rigs.campaign import robird_wing
 from wingfit.sim.wing.division import Division

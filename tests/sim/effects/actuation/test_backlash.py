@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of, told
 from tests.sim.effects.driving import robird
 from tests.sim.kernels.marching import CHORD, DENSITY, LENGTH, THICKNESS, march, plank, vacuum_here

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.kernels.marching import CHORD, LENGTH, THICKNESS, march, plank, with_connectors
 from wingfit.records import Condition, Materials, Wing
 from wingfit.sim.atmosphere import density

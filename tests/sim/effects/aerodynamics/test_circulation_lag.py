@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.special import hankel2
 
+from tests.oracles.unsteady_airfoil import theodorsen
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import CHORD
 from wingfit.sim.effects.library.aerodynamics.circulation_lag import wagner
@@ -16,11 +16,6 @@ Array = npt.NDArray[np.float64]
 
 SPEED = 6.0
 PLAIN = {"L_a": 5.0, "L_b": 0.0}
-
-
-def theodorsen(k: Array) -> npt.NDArray[np.complex128]:
-    """C(k) = H1 / (H1 + i H0) with Hankel functions of the second kind (Theodorsen 1935, Eq. XIII)."""
-    return np.asarray(hankel2(1, k) / (hankel2(1, k) + 1j * hankel2(0, k)))
 
 
 def test_after_a_step_circulation_grows_as_wagner_says() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.physics.plates import loaded
+from tests.oracles.plates import loaded
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.effects.rigs import bare, force_recording
 from tests.sim.kernels.marching import CHORD, LENGTH, plank

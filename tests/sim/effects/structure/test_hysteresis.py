@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from tests.sim.effects.bench import Array, Bench, beat_of, ledger
+from tests.oracles.bouc_wen import hysteretic_angle
+from tests.sim.effects.bench import Bench, beat_of, ledger
 from wingfit.sim.effects.ports.joints import Joints
 
 K, YIELD = 0.3, 0.1
@@ -17,27 +15,13 @@ def largest(bench: Bench) -> float:
     return YIELD * float(Joints.of(bench.scene.structure).part[bench.at])
 
 
-def textbook(phi: Array, beta: float, gamma: float, n: float) -> Array:
-    """z along a path of angles, integrated by another method: dz/dphi = 1 - |z|^n (gamma + beta sgn(dphi z))."""
-    z, found = 0.0, [0.0]
-    for start, end in pairwise(phi):
-        side = np.sign(end - start)
-
-        def rate(_: float, y: Array, side: float = side) -> Array:
-            return side * (1 - np.abs(y) ** n * (gamma + beta * side * np.sign(y)))
-
-        z = float(solve_ivp(rate, (0, abs(end - start)), [z], rtol=1e-9, atol=1e-12).y[0, -1])
-        found.append(z)
-    return np.array(found)
-
-
 @pytest.mark.parametrize(("gamma", "n"), [(0.5, 1.0), (-0.5, 1.0), (0.0, 2.5)])
 def test_loop_is_that_of_an_independent_integration(gamma: float, n: float) -> None:
     bench = Bench.of("hysteresis", k=K, yield_angle=YIELD, gamma=gamma, n=n)
     top = largest(bench)
     phi = 2 * top * np.sin(np.linspace(0, 4 * np.pi, 801))
     moment, _, lost, _ = bench.swing(0, phi, 1e-3)
-    z = textbook(phi, (1 - gamma) / top**n, gamma / top**n, n)
+    z = hysteretic_angle(phi, (1 - gamma) / top**n, gamma / top**n, n)
     spring = K * bench.stiffness[0]
     np.testing.assert_allclose(moment, -spring * z, atol=2e-4 * spring * top)
     area = float(np.trapezoid(spring * z[400:], phi[400:]))

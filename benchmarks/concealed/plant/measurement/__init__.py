@@ -1,0 +1,1 @@
+"""Cameras and balances: from a motion to a recording, with noise, gaps and faults."""

@@ -1,0 +1,259 @@
+"""From the forces of a vehicle to a recording by a balance.
+
+Variation between beats, mount, amplifier, noise, faults.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, cont2discrete, lfilter, sosfiltfilt
+
+from benchmarks.concealed.plant.law import Concealed, Law, Parameters, check_known, strength
+from benchmarks.concealed.plant.measurement.noise import COLOURS, Colour, coloured
+from wingfit.records import Condition, Recording, Vehicle
+from wingfit.records.dataset import STANDARD_GRAVITY
+
+Array = npt.NDArray[np.float64]
+
+_FINER = 4  # oversampling before the final decimation
+_LEAD = 6  # beats before and after the recording, for the filters' transients
+_STAGES = 4  # low-pass stages of a delaying amplifier
+_UNEQUAL = 0.9  # gain error of z relative to that of x
+_DECIMALS = 5
+_CUT = 0.4  # cut-off of the filter before the decimation, relative to the sampling rate
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """Settings of the balance. They describe noise: none of it repeats with the beat.
+
+    Attributes:
+        colour, memory: of the sensor's noise; memory is its lag-1 autocorrelation.
+        sensor: its standard deviation, N.
+        rattle: standard deviation of vibrations of the mount at its natural frequency, N.
+        mount: that frequency along x and z, Hz.
+        wander: standard deviation of a slow drift, N.
+        scatter: relative variation of the force between beats.
+        jitter: variation of the start of a beat, beats.
+        rate: samples per second.
+        beats: number of beats in a recording.
+    """
+
+    colour: Colour
+    memory: float
+    sensor: float
+    rattle: float
+    mount: tuple[float, float]
+    wander: float
+    scatter: float
+    jitter: float
+    rate: float = 1250.0
+    beats: int = 28
+
+
+class Weighed(NamedTuple):
+    """A recording, the same without noise [T, C], and the RMS of the noise (N, all frequencies)."""
+
+    recording: Recording
+    clean: Array
+    noise: float
+
+
+def draw_weighing(rng: np.random.Generator) -> Weighing:
+    """A random balance similar to that of Armanini et al. (2016), section 3.2."""
+    colours = [c for c in COLOURS if c != "shake"]
+    low = [0.0, 8e-4, 4e-3, 105.0, 85.0, 2e-4, 0.008, 2e-4]
+    high = [0.7, 2.5e-3, 1e-2, 150.0, 120.0, 6e-4, 0.025, 6e-4]
+    memory, sensor, rattle, x, z, wander, scatter, jitter = (float(v) for v in rng.uniform(low, high))
+    colour = colours[int(rng.integers(len(colours)))]
+    return Weighing(colour, memory, sensor, rattle, (x, z), wander, scatter, jitter)
+
+
+def silent(weighing: Weighing) -> Weighing:
+    """The same balance without noise."""
+    return replace(weighing, sensor=0.0, rattle=0.0, wander=0.0, scatter=0.0, jitter=0.0)
+
+
+def weigh(
+    forces: Array,
+    vehicle: Vehicle,
+    condition: Condition,
+    weighing: Weighing,
+    rng: np.random.Generator,
+    hidden: Concealed | None = None,
+    *,
+    name: str = "balance",
+) -> Weighed:
+    """Record the periodic ``forces`` [n, 2] along body x and z (N, from t* = 0) of a vehicle on a balance.
+
+    ``hidden``: parameters of the faults, by name as in :data:`FAULTS`. The draws of ``rng`` do not depend on them.
+    """
+    hidden = hidden or {}
+    check_known(hidden, FAULTS)
+    noisy = _measured(forces, vehicle, condition, weighing, hidden, rng)
+    clean = _measured(forces, vehicle, condition, silent(weighing), hidden, np.random.default_rng(0))
+    times = np.round(np.arange(len(noisy)) / weighing.rate, 9)
+    values = np.round(noisy, _DECIMALS)
+    recording = Recording(name, "wind_tunnel", condition, times, (), values, forces=("x", "z"), mass=vehicle.mass)
+    return Weighed(recording, clean, float(np.sqrt(np.mean((noisy - clean) ** 2))))
+
+
+def _measured(
+    forces: Array, vehicle: Vehicle, air: Condition, weighing: Weighing, hidden: Concealed, rng: np.random.Generator
+) -> Array:
+    """[T, 2] in N at the recording's rate."""
+    fine, frequency = weighing.rate * _FINER, air.flap_frequency
+    kept = math.ceil(weighing.beats * weighing.rate / frequency)
+    lead = round(_LEAD * weighing.rate / frequency) * _FINER
+    t = (np.arange(kept * _FINER + 2 * lead) - lead) / fine
+    at = _clock(t, hidden) * frequency
+    size, start = (_by_beat(at, memory, rng) for memory in (0.3, 0.0))
+    force = CubicSpline(np.arange(len(forces) + 1) / len(forces), np.concatenate([forces, forces[:1]]), 0, "periodic")
+    felt = force((at + weighing.jitter * start) % 1.0) * (1.0 + weighing.scatter * size)[:, None]
+    felt = _through(felt, fine, hidden)
+    felt = felt + _noise(weighing, len(t), fine, rng)
+    felt = sosfiltfilt(butter(8, 2.0 * _CUT / _FINER, output="sos"), felt, axis=0)
+    seen = felt[lead : lead + kept * _FINER : _FINER]
+    seen = seen + weighing.sensor * coloured(weighing.colour, weighing.memory, seen.shape, rng)
+    return _shown(seen, np.arange(kept) / weighing.rate, vehicle, hidden)
+
+
+def _clock(t: Array, hidden: Concealed) -> Array:
+    """True sampling times."""
+    return np.asarray(t * (1.0 + strength(hidden, "strobe_rate")) + strength(hidden, "clock_offset"))
+
+
+def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
+    """Unit noise with one value in the middle of each beat and a smooth curve between; ``at`` [T] in beats."""
+    first = math.floor(at[0]) - 3
+    count = math.ceil(at[-1]) - first + 4
+    values = coloured("first_order", memory, (count,), rng)
+    return np.asarray(CubicSpline(first + 0.5 + np.arange(count), values)(at))
+
+
+def _noise(weighing: Weighing, count: int, fine: float, rng: np.random.Generator) -> Array:
+    """Vibration of the mount, and a slow drift."""
+    out = np.empty((count, 2))
+    for k, natural in enumerate(weighing.mount):
+        b, a = _mount(natural, 0.02, fine)
+        shaken = lfilter(b, a, rng.standard_normal(count))
+        slow = np.cumsum(rng.standard_normal(count))
+        slow -= np.linspace(slow[0], slow[-1], count)  # a Brownian bridge: it ends where it began
+        out[:, k] = weighing.rattle * shaken / shaken.std() + weighing.wander * (slow - slow.mean()) / slow.std()
+    return out
+
+
+def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
+    """Filter from the force on a mass to the force that its spring and damper transmit.
+
+    x'' + 2 zeta w x' + w^2 x = F, and w^2 x + 2 zeta w x' is measured (Den Hartog 1956, transmissibility). The force is
+    held between samples.
+    """
+    w = 2.0 * math.pi * natural
+    numerator, denominator = [2.0 * damping * w, w * w], [1.0, 2.0 * damping * w, w * w]
+    b, a, _ = cont2discrete((numerator, denominator), 1.0 / rate, method="zoh")
+    return np.asarray(b).ravel(), np.asarray(a).ravel()
+
+
+def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
+    """Axes, mount and amplifier, in the time domain."""
+    if strength(hidden, "balance_tilt"):
+        a = strength(hidden, "balance_tilt")
+        forces = forces @ np.array([[1.0, a], [-a, 1.0]])  # cross-talk that the calibration matrix omits
+    if strength(hidden, "balance_resonance"):
+        p = hidden["balance_resonance"]
+        b, a_ = _mount(p["frequency"], p["damping"], rate)
+        swung = lfilter(b, a_, forces - forces[0], axis=0) + forces[0]
+        forces = forces + p["strength"] * (swung - forces)
+    if strength(hidden, "filter_delay"):
+        held = strength(hidden, "filter_delay") * rate / _STAGES
+        slow = held / (1.0 + held)  # an implicit step of 1 / (1 + tau s / 4), with exact delay
+        for _ in range(_STAGES):  # four equal stages in series
+            forces = lfilter([1.0 - slow], [1.0, -slow], forces - forces[0], axis=0) + forces[0]
+    if strength(hidden, "dry_friction"):
+        forces = _stuck(forces, hidden["dry_friction"])
+    return forces
+
+
+def _stuck(forces: Array, p: Parameters) -> Array:
+    """A pivot with stiction: the output follows the force at a distance (the play operator, Krejci 1996)."""
+    reach, out = p["strength"], np.empty_like(forces)
+    shown = forces[0]
+    for t, force in enumerate(forces):
+        shown = np.minimum(np.maximum(shown, force - reach), force + reach)
+        out[t] = shown
+    return out
+
+
+def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Array:
+    """Gain, saturation, zero error and drift of the output."""
+    gain = 1.0 + strength(hidden, "scale_error") * np.array([1.0, _UNEQUAL])
+    forces = forces * gain
+    if strength(hidden, "clipping"):
+        part = strength(hidden, "clipping") * np.abs(forces) / (vehicle.mass * STANDARD_GRAVITY)
+        forces = forces / (1.0 + part**4) ** 0.25
+    if strength(hidden, "balance_offset"):
+        forces = forces + hidden["balance_offset"]["strength"] * _way(hidden["balance_offset"])
+    if strength(hidden, "balance_drift"):
+        p = hidden["balance_drift"]
+        forces = forces + p["strength"] * np.log1p(t / p["time"])[:, None] * _way(p)
+    return np.asarray(forces)
+
+
+def _way(p: Parameters) -> Array:
+    return np.array([math.cos(p["azimuth"]), math.sin(p["azimuth"])])
+
+
+_WAY = {"azimuth": (0.0, 2.0 * math.pi)}
+_listed = partial(Law, side="measurement")
+_unlisted = partial(Law, side="measurement", listed=False)
+FAULTS = {
+    law.name: law
+    for law in (
+        _listed(
+            "balance_tilt",
+            typical=0.04,
+            source="cross-talk of a linear calibration (AIAA R-091A 2020)",
+            both_signs=True,
+            values=lambda p: {"balance_tilt.angle": p["strength"]},
+        ),
+        _listed(
+            "balance_resonance",
+            typical=0.2,
+            source="transmissibility of spring and damper, in time (Den Hartog 1956)",
+            shape={"frequency": (45.0, 90.0), "damping": (0.02, 0.06)},
+        ),
+        _listed("filter_delay", typical=1.5e-3, source="four equal stages (Tietze, Schenk and Gamm 2008)"),
+        _listed("balance_offset", typical=5e-3, source="zero error, N (AIAA R-091A 2020)", shape=_WAY),
+        _listed(
+            "balance_drift",
+            typical=4e-3,
+            source="creep of strain gauges, logarithmic in time (Doebelin 2004)",
+            shape={"time": (0.1, 0.5)} | _WAY,
+        ),
+        _listed("scale_error", typical=0.05, source="gains of both axes, unequal (AIAA R-091A 2020)", both_signs=True),
+        _listed(
+            "clock_offset",
+            typical=8e-4,
+            source="latency of a trigger",
+            both_signs=True,
+            values=lambda p: {"clock_offset.delay": p["strength"]},
+        ),
+        _listed(
+            "strobe_rate",
+            typical=4e-4,
+            source="clock error",
+            both_signs=True,
+            values=lambda p: {"strobe_rate.part": p["strength"]},
+        ),
+        _unlisted("dry_friction", typical=0.02, source="play operator (Krejci 1996)"),
+        _unlisted("clipping", typical=0.5, source="saturation of an amplifier, rounded"),
+    )
+}

@@ -1,0 +1,309 @@
+"""A flapping vehicle by blade elements after Armanini et al. (2016), written independently of the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.plant.law import Concealed, check_known, strength
+from benchmarks.concealed.plant.vehicle.laws import (
+    AFTERWARDS,
+    CIRCULATION,
+    GUSTS,
+    LAWS,
+    Flow,
+    blocked,
+    disc_inflow,
+    fling,
+    levered,
+    tip,
+)
+from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
+from wingfit.records.vehicle import Flap
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+PROPOSED = ("inertial", "translation", "rotation", "clap_and_peel", "added_mass", "effective_chord", "viscous")
+BERMAN_WANG = ("inertial", "translation", "rotation", "added_mass", "viscous")
+GAS = 287.05  # J/(kg K), of dry air
+_FINE = 4096  # samples of the flap law for its Fourier series
+_HARMONICS = 100
+_NODES = 10  # Gauss points between two stations
+_ROUNDS, _COARSE, _SETTLED = 40, 120, 1e-5  # of the inflow: iterations, instants, m/s
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Flap angle and pitch at the pitch station [3, n] with two derivatives, at n equal steps of a beat from t* = 0."""
+
+    flap: Array
+    pitch: Array
+
+
+def simulate(
+    vehicle: Vehicle,
+    coefficients: Mapping[str, float],
+    condition: Condition,
+    hidden: Concealed | None = None,
+    *,
+    terms: tuple[str, ...] = PROPOSED,
+    instants: int = 480,
+) -> Array:
+    """Forces [instants, 2] of all wings along body x and z (N) over one beat from t* = 0.
+
+    Args:
+        vehicle: that flaps.
+        coefficients: C_l, C_r, C_F, C_D0 and C_Dpi2; those of disabled terms are not needed.
+        condition: frequency, air, airspeed and body pitch.
+        hidden: parameters of the hidden effects, by name as in :data:`.laws.LAWS`.
+        terms: of the nominal model.
+        instants: number of instants in the beat.
+    """
+    hidden = hidden or {}
+    check_known(hidden, LAWS)
+    if vehicle.velocities != "mirrored":
+        raise ValueError(f"vehicle {vehicle.name!r} has printed velocities; this plant supports mirrored ones only")
+    air = blocked(condition, strength(hidden, "airspeed_error"))
+    inflow = None
+    if strength(hidden, "induced_inflow"):
+        inflow = _inflow(vehicle, coefficients, air, hidden, terms, instants)
+    return _forces(vehicle, coefficients, air, hidden, terms, instants, inflow)[0]
+
+
+def density(air: Condition) -> float:
+    """Density of dry air, kg/m^3."""
+    return air.pressure / (GAS * air.temperature)
+
+
+def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
+    """Flap angle and pitch with two time derivatives (rad, s)."""
+    flap = levered(_flap_samples(vehicle.motion.flap), strength(hidden, "stroke_amplitude"))
+    rates = [_derived(flap, frequency, order) for order in range(4)]
+    law = vehicle.motion.pitch
+    if isinstance(law, FourierPitch):
+        samples = _series(law.mean, law.cosine, law.sine)
+        pitch = [_derived(samples, frequency, order) for order in range(3)]
+    else:
+        angle = np.pi / 2 + law.constant + law.flap * rates[0]
+        pitch_samples = angle + law.flap_rate * rates[1] + law.flap_rate_squared * rates[1] ** 2
+        pitch = [_derived(pitch_samples, frequency, order) for order in range(3)]
+    keep = _FINE / instants * np.arange(instants)
+    grid = np.arange(_FINE + 1)
+    both = [np.stack([np.interp(keep, grid, np.append(a, a[0])) for a in these]) for these in (rates[:3], pitch)]
+    return Motion(*both)
+
+
+def _flap_samples(law: Flap) -> Array:
+    """Flap angle at _FINE equal steps of a beat: Eqs. 20-21 as printed, then smoothed by their Gaussian."""
+    if isinstance(law, FourierFlap):
+        return _series(law.mean, law.cosine, law.sine)
+    spectrum = np.fft.rfft(_split_cycle(law))
+    k = np.arange(len(spectrum))
+    spectrum *= np.exp(-0.5 * (2 * np.pi * k * law.smoothing) ** 2) * (k <= _HARMONICS)
+    return np.fft.irfft(spectrum, _FINE)
+
+
+def _split_cycle(law: SplitCycleFlap) -> Array:
+    t, omega = np.arange(_FINE) / _FINE, 2 * np.pi
+    sigma = law.split * omega / (omega - 2 * law.split)
+    late = -2 * np.pi * law.split / (omega - 2 * law.split)
+    opening = (omega - law.split) * t
+    return law.bias - law.amplitude * np.cos(np.where(opening <= np.pi, opening, (omega + sigma) * t + late))
+
+
+def _series(mean: float, cosine: tuple[float, ...], sine: tuple[float, ...]) -> Array:
+    psi = 2 * np.pi * np.arange(_FINE) / _FINE
+    out = np.full(_FINE, mean)
+    for k, c in enumerate(cosine, 1):
+        out += c * np.cos(k * psi)
+    for k, s in enumerate(sine, 1):
+        out += s * np.sin(k * psi)
+    return out
+
+
+def _derived(samples: Array, frequency: float, order: int) -> Array:
+    """Time derivative of periodic ``samples``, without frequencies far above all harmonics of the motion."""
+    spectrum = np.fft.rfft(samples)
+    k = np.arange(len(spectrum))
+    spectrum *= (2j * np.pi * k * frequency) ** order * (k <= 2 * _HARMONICS)
+    return np.fft.irfft(spectrum, len(samples))
+
+
+def _elements(vehicle: Vehicle) -> tuple[Array, Array, Array]:
+    """Radii r (m), chords (m) and weights (m) of the elements."""
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    places, widths = [], []
+    for inner, outer in zip(vehicle.stations[:-1], vehicle.stations[1:], strict=True):
+        half = 0.5 * (outer.r - inner.r)
+        places.append(inner.r + half * (nodes + 1.0))
+        widths.append(half * weights)
+    r = np.concatenate(places)
+    chord = np.interp(r, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations])
+    return r, chord, np.concatenate(widths)
+
+
+def _forces(
+    vehicle: Vehicle,
+    coefficients: Mapping[str, float],
+    air: Condition,
+    hidden: Concealed,
+    terms: tuple[str, ...],
+    instants: int,
+    inflow: Array | None,
+) -> tuple[Array, Array]:
+    """Forces [n, 2] of all wings, and the part along body x [n] due to circulation and drag, N."""
+    motion = motion_of(vehicle, air.flap_frequency, instants, hidden)
+    r, chord, width = _elements(vehicle)
+    total, carried = np.zeros((instants, 2)), np.zeros(instants)
+    alike = 1.0 if vehicle.layout == "single" else 2.0
+    for sign in (1.0, -1.0) if vehicle.layout == "x4" else (1.0,):
+        flow = _flow(vehicle, air, motion, r, chord, sign)
+        lifted, inert = _element_forces(flow, vehicle, coefficients, hidden, terms, inflow)
+        carried += alike * lifted.real @ width
+        stroke = lifted + inert
+        total[:, 0] += alike * stroke.real @ width
+        total[:, 1] += alike * sign * flow.level * (stroke.imag @ width)
+    for name, law in AFTERWARDS.items():
+        if strength(hidden, name):
+            total = total + law(total, vehicle, air, hidden[name])
+    return total, carried
+
+
+def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Array, sign: float) -> Flow:
+    """Motion of the elements of one side; ``sign`` is -1 for the upper wings, mirrored at the body's plane."""
+    share = r / (vehicle.motion.pitch_station * vehicle.span)
+    root, frequency = vehicle.motion.root_pitch, air.flap_frequency
+    zeta, rate, acceleration = motion.flap
+    apart = vehicle.dihedral - sign * zeta
+    down = sign * air.airspeed * np.sin(air.angle_of_attack)
+    swing = rate[:, None] * r + (down * np.cos(apart))[:, None]
+    gain = acceleration[:, None] * r + (down * np.sin(apart) * sign * rate)[:, None]
+    t = np.arange(len(zeta)) / len(zeta)
+    window, peeled = _peel(motion.pitch[1], t, vehicle)
+    return Flow(
+        t=t,
+        r=r,
+        chord=chord,
+        frequency=frequency,
+        rho=density(air),
+        span=vehicle.span,
+        zeta=zeta,
+        rate=rate,
+        acceleration=acceleration,
+        level=np.cos(apart),
+        theta=root + (motion.pitch[0] - root)[:, None] * share,
+        turn=motion.pitch[1][:, None] * share,
+        turn_rate=motion.pitch[2][:, None] * share,
+        own=air.airspeed * np.cos(air.angle_of_attack) + 1j * swing,
+        own_rate=1j * gain,
+        peel=window,
+        peeled=peeled,
+    )
+
+
+def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
+    """Fraction of each instant in which the wings peel (Eq. 7), and of the chord that has separated, [n] each."""
+    if not vehicle.claps:
+        return np.zeros(len(t)), np.ones(len(t))
+    started = np.logical_or.accumulate(turn < 0)
+    over = np.logical_or.accumulate(started & (turn >= 0))
+    window = (started & ~over).astype(float)
+    if not window.any() or t[int(window.argmax())] >= vehicle.motion.peel_end:
+        window[:] = 0.0
+    window[0] *= 0.5  # the beat starts in the middle of this instant
+    peeled = np.minimum(t / vehicle.motion.peel_end, 1.0)
+    peeled[0] = np.sqrt(0.5)
+    return window, peeled
+
+
+def _element_forces(
+    flow: Flow,
+    vehicle: Vehicle,
+    coefficients: Mapping[str, float],
+    hidden: Concealed,
+    terms: tuple[str, ...],
+    inflow: Array | None,
+) -> tuple[Complex, Complex]:
+    """Forces per metre on the elements [n, E], along body x + i along the normal of the wing's plane.
+
+    The first part is due to circulation and drag, the second due to inertia.
+    """
+    rho, chord = flow.rho, flow.chord
+    air = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
+    stream = flow.turned(air)
+    for name, gust in GUSTS.items():
+        if strength(hidden, name):
+            air = air + gust(flow, hidden[name])
+    flow = replace(flow, met=flow.turned(air))
+    force = 1j * rho * _circulation(flow, vehicle, coefficients, hidden, terms) * flow.met
+    if "viscous" in terms:
+        drag = coefficients["C_D0"] * flow.met.real**2 + coefficients["C_Dpi2"] * flow.met.imag**2
+        force -= 0.5 * rho * chord * drag / flow.speed * flow.met
+    return flow.turned(force), flow.turned(_inertia(flow, stream, vehicle, terms))
+
+
+def _circulation(
+    flow: Flow, vehicle: Vehicle, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]
+) -> Array:
+    """Circulation of the elements [n, E] (Eqs. 2-4, 7), with the hidden effects, m^2/s.
+
+    Lag and stall act on the circulation of a single wing, not on that of two wings that separate.
+    """
+    half = 0.5 * flow.chord**2 * flow.turn
+    rotation = coefficients["C_r"] * (0.75 - vehicle.pitch_axis) * half if "rotation" in terms else 0.0 * half
+    gamma = rotation.copy()
+    if "translation" in terms:
+        gamma -= coefficients["C_l"] * flow.chord * flow.met.real * flow.met.imag / flow.speed
+    for name, law in CIRCULATION.items():
+        if strength(hidden, name):
+            gamma = law(flow, gamma, rotation, hidden[name])
+    if "clap_and_peel" in terms:
+        gamma -= (coefficients["C_F"] * half + rotation) * flow.peel[:, None]
+    if strength(hidden, "clap_and_peel"):
+        gamma += fling(flow, hidden["clap_and_peel"])
+    return gamma * tip(flow, hidden["tip_loss"]["strength"]) if strength(hidden, "tip_loss") else gamma
+
+
+def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ...]) -> Complex:
+    """Inertial terms and added mass per metre in axes of the chord (Eqs. 9-14).
+
+    The wing's own mass moves with the wing, the air's relative to the ``stream`` [n, E], whose rate of change is
+    neglected.
+    """
+    rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
+    peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
+    r, chords = [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
+    mass = vehicle.wing_mass * chord / np.trapezoid(chords, r)
+    along, across = np.pi / 4 * rho * vehicle.thickness**2, np.pi / 4 * rho * (chord * peeled) ** 2
+    force = np.zeros(own.shape, complex)
+    if "inertial" in terms:
+        force += flow.turn * (mass * (own.imag - 1j * own.real) + across * stream.imag - 1j * along * stream.real)
+    if "added_mass" in terms:
+        rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 0.5j * chord * flow.turn_rate
+        force -= along * rate.real + 1j * across * rate.imag
+    return force
+
+
+def _inflow(
+    vehicle: Vehicle,
+    coefficients: Mapping[str, float],
+    air: Condition,
+    hidden: Concealed,
+    terms: tuple[str, ...],
+    instants: int,
+) -> Array:
+    """Inflow [n] (m/s) along body x at the tips, through the disc that the wings sweep, by iteration."""
+    p = hidden["induced_inflow"]
+    swept = min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2
+    v = np.zeros(_COARSE)
+    for _ in range(_ROUNDS):
+        thrust = _forces(vehicle, coefficients, air, hidden, terms, _COARSE, v)[1]
+        change = 0.5 * (disc_inflow(thrust, swept, air, density(air), p) - v)
+        v = v + change
+        if np.abs(change).max() < _SETTLED:
+            return np.fft.irfft(np.fft.rfft(v) * (instants / _COARSE), instants)
+    raise ValueError(f"the inflow at {air.airspeed:g} m/s does not converge; choose a strength below {p['strength']:g}")

@@ -1,0 +1,1 @@
+"""The flexible wing: cut into rigid bodies, joined, integrated to a periodic motion."""

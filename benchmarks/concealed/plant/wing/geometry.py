@@ -1,0 +1,162 @@
+"""A wing divided into rigid bodies: masses, inertias, areas, and the body of each marker.
+
+From ``records.Wing`` alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.records import Wing
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+_NAMED = {"4": [1] * 4, "11": [3, 3, 3, 2], "24": [4] * 6}
+_SAMPLES = 3000  # points along a rod, whose mass is added to the bodies at these points
+_GAUSS = 4  # Gauss points per stretch; exact because planform and thickness are linear in it
+
+
+def counts_of(division: str) -> tuple[int, ...]:
+    """Number of bodies along the chord of every strip, from the root; ValueError for an invalid division.
+
+    A preset ("4", "11", "24"), "STRIPSxBODIES" such as "8x4", or a list such as "3,3,3,2".
+    """
+    try:
+        if division in _NAMED:
+            return tuple(_NAMED[division])
+        if "x" in division:
+            strips, along = map(int, division.split("x"))
+            counts = [along] * strips
+        else:
+            counts = [int(part) for part in division.split(",")]
+    except ValueError:
+        counts = []
+    if len(counts) < 2 or min(counts) < 1:
+        raise ValueError(f"division {division!r} is invalid; write 4, 11, 24, 8x4 or 3,3,3,2")
+    return tuple(counts)
+
+
+@dataclass(frozen=True)
+class Lump:
+    """A point mass (kg) at (x, y, z) in the wing frame, m."""
+
+    mass: float
+    place: tuple[float, float, float]
+
+
+class Cut:
+    """A wing divided into bodies, with additional point masses ``lumps``.
+
+    Body n belongs to strip ``strip[n]`` and covers the fractions ``s0[n]`` to ``s1[n]`` of the chord. The strips'
+    borders are ``edges`` [S + 1], m.
+    """
+
+    def __init__(self, wing: Wing, division: str, lumps: Sequence[Lump] = ()) -> None:
+        self.wing, self.counts, self.lumps = wing, counts_of(division), tuple(lumps)
+        table = np.array([(s.y, s.leading_edge, s.chord, s.thickness) for s in wing.stations])
+        self._y, self._sections = table[:, 0], table[:, 1:]
+        self.edges = np.linspace(self._y[0], self._y[-1], len(self.counts) + 1)
+        self.strip = np.repeat(np.arange(len(self.counts)), self.counts)
+        self.start = np.concatenate([[0], np.cumsum(self.counts)]).astype(np.int64)
+        self.s0 = np.concatenate([np.arange(n) / n for n in self.counts])
+        self.s1 = np.concatenate([(np.arange(n) + 1) / n for n in self.counts])
+
+    def section(self, y: float) -> tuple[float, float, float]:
+        """Leading edge, chord and thickness at span position y, m."""
+        edge, chord, thickness = (float(np.interp(y, self._y, column)) for column in self._sections.T)
+        return edge, chord, thickness
+
+    def x_at(self, part: float, y: float) -> float:
+        """x (m) at a fraction of the chord."""
+        edge, chord, _ = self.section(y)
+        return edge + part * chord
+
+    def place(self, span: float, chord: float) -> tuple[float, float]:
+        """(x, y) in m at fractions of span and chord."""
+        y = float(self.edges[0] + span * (self.edges[-1] - self.edges[0]))
+        return self.x_at(chord, y), y
+
+    def under(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
+        """Bodies at the points (x, y); a point on a border belongs to the outer or rear body."""
+        xs, ys = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
+        strip = np.clip(np.searchsorted(self.edges, ys, side="right") - 1, 0, len(self.counts) - 1)
+        edge, chord = np.interp(ys, self._y, self._sections[:, 0]), np.interp(ys, self._y, self._sections[:, 1])
+        count = np.array(self.counts)[strip]
+        along = np.clip(((xs - edge) / chord * count).astype(np.int64), 0, count - 1)
+        return np.asarray(self.start[strip] + along, np.int64)
+
+    def _stretches(self, strip: int) -> tuple[Array, Array]:
+        """Gauss points and weights (m) over the width of a strip, one stretch between stations after the other."""
+        inner, outer = self.edges[strip], self.edges[strip + 1]
+        cuts = np.unique(np.concatenate([[inner, outer], self._y[(self._y > inner) & (self._y < outer)]]))
+        nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
+        half = 0.5 * np.diff(cuts)[:, None]
+        return (half * nodes + 0.5 * (cuts[1:] + cuts[:-1])[:, None]).ravel(), (half * weights).ravel()
+
+    @cached_property
+    def area(self) -> Array:
+        """[N] planform area, m^2."""
+        return np.array([self._plan(n)[0].sum() for n in range(len(self.strip))])
+
+    @cached_property
+    def centroid(self) -> Array:
+        """[N, 2] centroid of the planform, wing frame, m."""
+        return np.array([w @ np.stack([x, y], axis=1) / w.sum() for w, x, y, _ in map(self._plan, range(len(self.s0)))])
+
+    def _plan(self, n: int) -> tuple[Array, Array, Array, Array]:
+        """Area weights, x, y and thickness at the Gauss points of a body."""
+        y, weight = self._stretches(int(self.strip[n]))
+        edge, chord, thickness = (np.interp(y, self._y, column) for column in self._sections.T)
+        nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
+        part = self.s0[n] + 0.5 * (nodes + 1) * (self.s1[n] - self.s0[n])
+        along = 0.5 * weights * (self.s1[n] - self.s0[n])
+        shape = (len(y), _GAUSS)
+        return (
+            ((weight * chord)[:, None] * along).ravel(),
+            (edge[:, None] + part * chord[:, None]).ravel(),
+            np.broadcast_to(y[:, None], shape).ravel(),
+            np.broadcast_to(thickness[:, None], shape).ravel(),
+        )
+
+    @cached_property
+    def _points(self) -> tuple[Index, Array, Array]:
+        """Point masses (rods with their straw, markers, lumps): body [P], mass [P], place [P, 3]."""
+        masses, places = [], []
+        t = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+        for rod in self.wing.rods:
+            ends = np.array([[rod.x_root, rod.y_root, 0.0], [rod.x_tip, rod.y_tip, 0.0]])
+            per_metre = rod.density * math.pi / 4 * rod.diameter**2 + rod.glue_linear_density
+            masses.append(np.full(_SAMPLES, per_metre * float(np.linalg.norm(ends[1] - ends[0])) / _SAMPLES))
+            places.append(ends[0] + t[:, None] * (ends[1] - ends[0]))
+        lumps = [Lump(m.mass, m.position) for m in self.wing.markers] + list(self.lumps)
+        masses.append(np.array([lump.mass for lump in lumps]))
+        places.append(np.reshape([lump.place for lump in lumps], (-1, 3)))
+        where = np.concatenate(places)
+        return self.under(where[:, 0], where[:, 1]), np.concatenate(masses), where
+
+    @cached_property
+    def bodies(self) -> tuple[Array, Array, Array]:
+        """Mass [N] kg, centre of mass [N, 3] m, inertia about it [N, 3, 3] kg m^2, in the wing frame."""
+        found = [self._body(n) for n in range(len(self.strip))]
+        return np.array([f[0] for f in found]), np.array([f[1] for f in found]), np.array([f[2] for f in found])
+
+    def _body(self, n: int) -> tuple[float, Array, Array]:
+        materials = self.wing.materials
+        area, x, y, h = self._plan(n)
+        foam, skin = materials.foam_density * h * area, materials.skin_areal_density * area
+        carrier, masses, places = self._points
+        mine = carrier == n
+        m = np.concatenate([foam + skin, masses[mine]])
+        r = np.concatenate([np.stack([x, y, np.zeros_like(x)], axis=1), places[mine]])
+        centre = m @ r / m.sum()
+        r = r - centre
+        through = float((foam * h**2 / 12 + skin * h**2 / 4).sum())  # foam fills the thickness, skin lies on both faces
+        inertia = np.einsum("p,pk,pk->", m, r, r) * np.eye(3) - np.einsum("p,pi,pj->ij", m, r, r)
+        return float(m.sum()), centre, inertia + np.diag([through, through, 0.0])

@@ -1,0 +1,62 @@
+"""Loads at one point of the wing: a band, a stop, a brake, an appendage. The library has none of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.plant.compiled import compiled
+from benchmarks.concealed.plant.wing.rig import BAND, BRAKE, STOP, Motion, Rig
+from benchmarks.concealed.plant.wing.vectors import V3, ZERO, act, axis, cross, dot, plus, row, turned
+
+Array = npt.NDArray[np.float64]
+
+_SLACK = 5e-4  # m: range over which a band becomes tight
+
+
+@compiled
+def _held(q: Array, place: V3, velocity: V3) -> V3:
+    """Force on the wing at ``place``, for a row ``q`` of Rig.points without an internal state."""
+    if q[0] == BAND:  # from a fixed point, elastic beyond its length: x, y, z, N/m, m
+        away = plus((q[4], q[5], q[6]), -1.0, place)
+        length = math.sqrt(dot(away, away))
+        beyond = length - q[8]
+        return plus(ZERO, 0.5 * q[7] * (beyond + math.sqrt(beyond * beyond + _SLACK * _SLACK)) / length, away)
+    if q[0] == STOP:  # Hunt and Crossley (1975) against a plane at a height, from below (1) or above (-1)
+        depth = q[5] * (place[2] - q[4])
+        if depth <= 0.0:
+            return ZERO
+        push = q[6] * depth * math.sqrt(depth) * max(1.0 + q[7] * q[5] * velocity[2], 0.0)
+        return 0.0, 0.0, -q[5] * push
+    if q[0] == BRAKE:  # against the velocity, by its third power: N s^3/m^3
+        return plus(ZERO, -q[4] * dot(velocity, velocity), velocity)
+    return ZERO
+
+
+@compiled
+def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, load: Array) -> None:
+    """Add the loads of all points.
+
+    An appendage of mass q4 (kg) moves along the body's normal n on a spring of angular frequency q5 (rad/s) with
+    damping ratio q6. Its states are the spring's displacement s and its velocity u along n: s' = u - n.v,
+    u' = -(w^2 s + 2 d w s') + (omega x n).v - g n_z; they are solved in closed form, as in ``remembered_loads``.
+    """
+    for k in range(len(rig.points)):
+        q, n = rig.points[k], rig.point_body[k]
+        arm = turned(m.R, n, (q[1], q[2], q[3]))
+        place = plus(row(m.p, n), 1.0, arm)
+        velocity = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))
+        force = _held(q, place, velocity)
+        if q[0] > BRAKE + 0.5:
+            normal, i = axis(m.R, n, 2), first + 2 * k
+            square, loss, base = q[5] * q[5], 2.0 * q[6] * q[5], dot(normal, velocity)
+            pull = dot(cross(row(m.w, n), normal), velocity) - rig.gravity * normal[2]
+            # u = old_u - hg (square s + loss (u - base)) + hg pull, s = old_s + hg (u - base)
+            u = old[i + 1] - hg * square * (old[i] - hg * base) + hg * (loss * base + pull)
+            u /= 1.0 + hg * loss + hg * hg * square
+            z[i + 1] = u
+            z[i] = old[i] + hg * (u - base)
+            force = plus(ZERO, q[4] * (square * z[i] + loss * (u - base)), normal)
+        act(load, n, force, cross(arm, force))

@@ -1,0 +1,1 @@
+"""What can be hidden in the wing, its drive and the air."""

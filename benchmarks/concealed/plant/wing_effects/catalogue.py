@@ -1,0 +1,13 @@
+"""All effects that the plant can hide in a wing, in the order in which they are applied."""
+
+from __future__ import annotations
+
+from benchmarks.concealed.plant.wing_effects.air import LISTED_AIR
+from benchmarks.concealed.plant.wing_effects.drive import LISTED_DRIVE
+from benchmarks.concealed.plant.wing_effects.kind import Kind
+from benchmarks.concealed.plant.wing_effects.structure import LISTED_STRUCTURE
+from benchmarks.concealed.plant.wing_effects.unlisted import UNLISTED
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in (*LISTED_STRUCTURE, *LISTED_DRIVE, *LISTED_AIR, *UNLISTED)}
+LISTED = tuple(kind.name for kind in KINDS.values() if kind.listed)
+UNKNOWN = tuple(kind.name for kind in KINDS.values() if not kind.listed)

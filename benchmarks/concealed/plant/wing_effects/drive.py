@@ -1,0 +1,146 @@
+"""Errors of the drive that the library has too, in another form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.linkage import series_of
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
+from wingfit.records import FourBarDrive, Wing
+
+Complex = npt.NDArray[np.complex128]
+
+
+def _linkage(wing: Wing) -> FourBarDrive:
+    if not isinstance(wing.drive, FourBarDrive):
+        raise ValueError(f"wing {wing.name!r} is driven by a series; this effect needs the links of a four-bar")
+    return wing.drive
+
+
+def _further(wing: Wing, strength: float) -> Complex:
+    """Change of the series for a crank longer by a fraction, with the same mean."""
+    link = _linkage(wing)
+    change = series_of(replace(link, crank=link.crank * (1 + strength))) - series_of(link)
+    change[0] = 0.0
+    return change
+
+
+def _otherwise(wing: Wing, strength: float) -> Complex:
+    """Change of the series for a frame longer by a fraction, with the same mean and first harmonic."""
+    link = _linkage(wing)
+    nominal, changed = series_of(link), series_of(replace(link, ground=link.ground * (1 + strength)))
+    shift, size = np.angle(nominal[1] / changed[1]), abs(nominal[1] / changed[1])
+    change = size * changed * np.exp(1j * shift * np.arange(len(changed))) - nominal
+    change[:2] = 0.0
+    return np.asarray(change)
+
+
+def _add(draft: Draft, change: Complex) -> None:
+    """Add to both rods; the change of the rear rod lags like the rod itself."""
+    late = np.exp(-1j * draft.condition.phase_lag * np.arange(len(change)))
+    draft.rods += np.stack([change, change * late], axis=1)
+
+
+def _stroke(draft: Draft, strength: float, _: Values) -> None:
+    _add(draft, _further(draft.wing, strength))
+
+
+def _stroke_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
+    first = series_of(wing.drive)[1]
+    return {"stroke_amplitude.part": float(abs(first + _further(wing, strength)[1]) / abs(first) - 1)}
+
+
+def _shape(draft: Draft, strength: float, _: Values) -> None:
+    _add(draft, _otherwise(draft.wing, strength))
+
+
+def _shape_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
+    change = _otherwise(wing, strength) / abs(series_of(wing.drive)[1])
+    found = {f"drive_harmonics.cos{k}": float(change[k].real) for k in (2, 3, 4)}
+    return found | {f"drive_harmonics.sin{k}": -float(change[k].imag) for k in (2, 3, 4)}
+
+
+def _late(draft: Draft, strength: float, _: Values) -> None:
+    draft.rods[:, 1] *= np.exp(-1j * strength * np.arange(len(draft.rods)))
+
+
+def _late_genes(_: Wing, strength: float, __: Values) -> dict[str, float]:
+    return {"phase_lag_error.angle": strength}
+
+
+def _tilted(draft: Draft, strength: float, at: Values) -> None:
+    """The rear bearing, a root chord behind the front one, is displaced by ``strength``.
+
+    The direction is from y to z.
+    """
+    chord = draft.cut.section(float(draft.cut.edges[0]))[1]
+    axle = np.array([chord, strength * math.cos(at["direction"]), strength * math.sin(at["direction"])])
+    draft.axle = axle / np.linalg.norm(axle)
+
+
+def _tilt_genes(wing: Wing, strength: float, at: Values) -> dict[str, float]:
+    slope = strength / wing.stations[0].chord
+    return {
+        "hinge_tilt.y": -math.atan(slope) * math.sin(at["direction"]),
+        "hinge_tilt.z": math.atan(slope) * math.cos(at["direction"]),
+    }
+
+
+def _moved(draft: Draft, strength: float, at: Values) -> None:
+    draft.hinge = draft.hinge + strength * np.array([0.0, math.cos(at["direction"]), math.sin(at["direction"])])
+
+
+def _moved_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
+    return {
+        "hinge_offset.y": strength * math.cos(at["direction"]),
+        "hinge_offset.z": strength * math.sin(at["direction"]),
+    }
+
+
+def _loose(draft: Draft, strength: float, _: Values) -> None:
+    for c, joint in enumerate(draft.joints):
+        if joint.first < 0:
+            draft.play[c] = 0.5 * strength
+
+
+def _loose_genes(_: Wing, strength: float, __: Values) -> dict[str, float]:
+    return {"backlash.b": strength}
+
+
+_ROUND = {"direction": (0.6, -math.pi, math.pi)}
+
+LISTED_DRIVE = (
+    Kind(
+        "stroke_amplitude", "actuation", True, "1", 0.05, 0.3,
+        "a crank longer by a fraction: Freudenstein's equation (1955); the library multiplies the series", _stroke,
+        genes=_stroke_genes,
+    ),
+    Kind(
+        "drive_harmonics", "actuation", True, "1", 0.04, 0.13,
+        "a linkage with a longer frame but the same stroke: all harmonics change; the library has two", _shape,
+        genes=_shape_genes,
+    ),
+    Kind(
+        "phase_lag_error", "actuation", True, "rad", 0.03, 0.2,
+        "the rear rod lags more than described (van der Grinten, section III-F)", _late, genes=_late_genes,
+    ),
+    Kind(
+        "hinge_tilt", "actuation", True, "m", 0.01, 0.05,
+        "axis through two bearings, of which the rear one is displaced", _tilted, shape=_ROUND, genes=_tilt_genes,
+    ),
+    Kind(
+        "hinge_offset", "actuation", True, "m", 0.006, 0.04,
+        "axis displaced by a distance in a direction (van der Grinten's likeliest cause)", _moved, shape=_ROUND,
+        genes=_moved_genes,
+    ),
+    Kind(
+        "backlash", "actuation", True, "rad", 0.03, 0.12,
+        "dead zone with logarithmic edges about the chord (Dubowsky and Freudenstein 1971; soft stops); the "
+        "library has a pin in series with the spring", _loose, genes=_loose_genes,
+    ),
+)  # fmt: skip

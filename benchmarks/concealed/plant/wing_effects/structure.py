@@ -1,0 +1,125 @@
+"""Effects of structure and inertia that the library has too, in another form."""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing.geometry import Cut, Lump
+from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, SLIDER
+from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
+from wingfit.records import Wing
+
+_SPECTRUM = (
+    (0.5, 1.0),
+    (0.5, 6.0),
+)  # fractions of the stiffness that relaxes, and relaxation times relative to the first
+_YIELDS = (0.4, 1.0, 2.5)  # of Dahl's elements, relative to the middle one
+_STEEPEST = 12.0  # largest argument of sinh at one radian over the span
+
+
+def _lump(draft: Draft, strength: float, at: Values) -> None:
+    """A point mass, added before the wing is divided, so that masses, centres and inertias include it."""
+    x, y = Cut(draft.wing, draft.division).place(at["span"], at["chord"])
+    draft.lumps.append(Lump(strength, (x, y, 0.0)))
+
+
+def _lump_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
+    return {
+        "lumped_mass.mass": strength,
+        "lumped_mass.station": at["span"],
+        "lumped_mass.chord": at["chord"],
+    }
+
+
+def _damage(draft: Draft, strength: float, at: Values) -> None:
+    """The stiffness is reduced by the fraction ``strength``, evenly, over a stretch with sharp ends."""
+    root = float(draft.cut.edges[0])
+    lower, upper = (root + draft.span * (at["span"] + side * 0.5 * at["width"]) for side in (-1, 1))
+    for c, joint in enumerate(draft.joints):
+        common = max(min(upper, joint.to_y) - max(lower, joint.from_y), 0.0) / (joint.to_y - joint.from_y)
+        if joint.along_span:
+            draft.factor[c] *= 1 / (1 - common + common / (1 - strength))
+        else:
+            draft.factor[c] *= 1 - strength * common
+
+
+def _damage_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
+    return {"damage.station": at["span"]}
+
+
+def _hardening(draft: Draft, strength: float, _: Values) -> None:
+    """Moment k phi sinh(x) / x, x = h times curvature.
+
+    ``h`` is such that the factor is 1 + strength at a radian over the span.
+    """
+    steep = float(brentq(lambda h: math.sinh(h) / h - 1 - strength, 1e-6, _STEEPEST))
+    for c, joint in enumerate(draft.joints):
+        if joint.first >= 0:
+            draft.hardening[c] = steep
+
+
+def _relaxing(draft: Draft, strength: float, at: Values) -> None:
+    """Two Maxwell branches parallel to each spring of bending and torsion."""
+    for c, joint in enumerate(draft.joints):
+        for k in (0, 1):
+            if joint.first >= 0 or k == 1:
+                for part, times in _SPECTRUM:
+                    stiff = strength * part * float(joint.stiffness[k])
+                    draft.memory.append((c, k, float(MAXWELL), stiff, times * at["time"]))
+
+
+def _yielding(draft: Draft, strength: float, at: Values) -> None:
+    """Three Dahl elements in parallel that yield one after the other, as the sliders of Iwan (1966)."""
+    for c, joint in enumerate(draft.joints):
+        for k in (0, 1):
+            if joint.first >= 0 or k == 1:
+                for part in _YIELDS:
+                    stiff = strength * float(joint.stiffness[k]) / len(_YIELDS)
+                    draft.memory.append((c, k, float(DAHL), stiff, part * at["angle"] / draft.curvature(joint)))
+
+
+def _slipping(draft: Draft, strength: float, at: Values) -> None:
+    """A spring with a dry slider parallel to each joint with rods; it carries at most ``strength``."""
+    for c, joint in enumerate(draft.joints):
+        if joint.first >= 0 and joint.of_rods > 0:
+            limit = strength / draft.curvature(joint)
+            draft.memory.append((c, 0, float(SLIDER), at["stick"] * joint.of_rods, limit))
+
+
+_PLACE = {"span": (0.75, 0.3, 0.95), "chord": (0.7, 0.1, 0.9)}
+
+LISTED_STRUCTURE = (
+    Kind(
+        "lumped_mass", "inertia", True, "kg", 0.003, 0.012,
+        "a point in the mass integrals of the wing itself; Steiner's theorem for the whole body", _lump,
+        shape=_PLACE, genes=_lump_genes, before=True,
+    ),
+    Kind(
+        "damage", "structure", True, "1", 0.6, 0.9,
+        "a beam with a notch of even depth: Cawley and Adams (1979); sharp ends; the library has a bell shape", _damage,
+        shape={"span": (0.5, 0.2, 0.8), "width": (0.15, 0.1, 0.25)}, genes=_damage_genes,
+    ),
+    Kind(
+        "cubic_stiffness", "structure", True, "1", 1.5, 200.0,
+        "hardening as a hyperbolic sine (like Ogden's and Fung's exponential laws); the library is cubic",
+        _hardening,
+    ),
+    Kind(
+        "viscoelastic", "structure", True, "1", 0.2, 4.0,
+        "Prony series of two Maxwell branches (Ferry 1980, ch. 1); the library has one", _relaxing,
+        shape={"time": (0.03, 0.015, 0.06)},
+    ),
+    Kind(
+        "hysteresis", "structure", True, "1", 0.25, 4.0,
+        "three elements of Dahl (1968) in parallel as in Iwan's model (1966); the library has Bouc and Wen",
+        _yielding, shape={"angle": (0.1, 0.05, 0.2)},
+    ),
+    Kind(
+        "rod_slip", "structure", True, "rad", 0.04, 1.0,
+        "Prandtl's slider (1928) with a spring, sharp; the library has Dahl's friction with play", _slipping,
+        shape={"stick": (0.4, 0.3, 0.6)},
+    ),
+)  # fmt: skip

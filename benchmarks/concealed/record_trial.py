@@ -1,0 +1,279 @@
+"""Record the trials: simulate and record each plant, save the dataset for the diagnosis, and seal the answer.
+
+Parameters of the rig, conditions, recording quality and the shape of the hidden effect are drawn at random. The
+strength of the effect is searched, so that the scorer's refit of the nominal model leaves the misfit aimed at. The same
+trial always gives the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from benchmarks.concealed.answer import Answer, Secret
+from benchmarks.concealed.bench import Bench, Made, bench_of
+from benchmarks.concealed.plant.law import Concealed
+from benchmarks.concealed.seal import read, seal
+from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
+from benchmarks.concealed.trials import Trial, conditions, name_of
+from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset
+
+Array = npt.NDArray[np.float64]
+
+ATTEMPTS = 4  # draws of a trial, if the plant cannot be simulated with the first ones
+ROUNDS = 8  # limit of a refit's iterations; genes that can imitate a mass almost completely converge slowly
+CORRECTIONS = 1  # full refits to correct a strength; the remaining error is corrected by lowering the noise
+LITTLE = 0.85  # fraction of the target d below which the noise is lowered, as far as real equipment allows
+
+
+@dataclass(frozen=True)
+class Order:
+    """A trial to be recorded, the path of its dataset, and the folder for its sealed answer."""
+
+    trial: Trial
+    dataset: Path
+    sealed: Path
+
+
+@dataclass(frozen=True)
+class Addition:
+    """One more recording of a trial's rig under ``condition``.
+
+    The path of its dataset, and that of the extended dataset.
+    """
+
+    trial: Trial
+    condition: Condition
+    dataset: Path
+    longer: Path
+    sealed: Path
+
+
+@dataclass(frozen=True, eq=False)
+class Specimen:
+    """A rig on its bench with everything that determines its recordings.
+
+    ``level`` multiplies the noise that was drawn. An ``ideal`` specimen is recorded without noise and without gaps.
+    """
+
+    bench: Bench[Any, Any]
+    seed: int
+    attempt: int
+    genome: Mapping[str, float]
+    hidden: Concealed
+    level: float = 1.0
+    ideal: bool = False
+
+    @cached_property
+    def quality(self) -> Any:
+        """Settings of cameras or balance."""
+        drawn = self.bench.quality(np.random.default_rng([self.seed, self.attempt, 2]))
+        return self.bench.ideal(drawn) if self.ideal else self.bench.quieter(drawn, self.level)
+
+    @property
+    def least_level(self) -> float:
+        """Smallest possible ``level``."""
+        return self.bench.least(replace(self, level=1.0, ideal=False).quality)
+
+    def made(self, number: int, condition: Condition) -> Made:
+        """Recording ``number``, under ``condition``."""
+        rng = np.random.default_rng([self.seed, self.attempt, 3, number])
+        found = self.bench.recording(condition, self.genome, self.hidden, self.quality, rng)
+        return found._replace(recording=replace(found.recording, name=name_of(condition)))
+
+    def fitted(self, conditions: Sequence[Condition]) -> tuple[Recording, ...]:
+        """Recordings under ``conditions``, filtered as for a fit."""
+        made = (self.made(number, condition).recording for number, condition in enumerate(conditions))
+        return tuple(self.bench.fitted(one) for one in made)
+
+    def secret(self, name: str, condition: Condition) -> Secret:
+        """The hidden effect ``name`` as it goes into the answer.
+
+        Its phase is read from the beat under ``condition``.
+        """
+        law, parameters = self.bench.laws[name], self.hidden[name]
+        beat = self.bench.beat(condition, self.genome, self.hidden)
+        return Secret(
+            law.name,
+            law.listed,
+            law.side,
+            parameters["strength"],
+            dict(parameters),
+            parameters.get("span"),
+            parameters.get("chord"),
+            self.bench.phase(beat, name, parameters),
+            dict(law.values(parameters)),
+        )
+
+    def noise(self, conditions: Sequence[Condition]) -> float:
+        """RMS noise of the recordings under ``conditions``, m or N."""
+        return rms(np.array([self.made(number, condition).noise for number, condition in enumerate(conditions)]))
+
+
+def make(order: Order) -> str:
+    """Record a trial, save its dataset and seal its answer; returns the SHA-256 of the answer.
+
+    RuntimeError if the plant cannot be simulated in any of ATTEMPTS draws.
+    """
+    reasons = []
+    for attempt in range(ATTEMPTS):
+        try:
+            dataset, answer = _made(order.trial, attempt)
+        except (RuntimeError, ArithmeticError, ValueError) as error:
+            reasons.append(f"{type(error).__name__}: {error}")
+            continue
+        save_dataset(dataset, order.dataset)
+        return seal(answer, order.sealed)
+    raise RuntimeError(f"{order.trial} cannot be recorded: {'; '.join(reasons)}")
+
+
+def add(order: Addition) -> None:
+    """Record one more condition of a trial's rig, and save the dataset extended by it."""
+    dataset, answer = load_dataset(order.dataset), read(order.sealed / f"{order.trial.name}.json")
+    hidden = {secret.name: dict(secret.parameters) for secret in answer.secrets}
+    bench = bench_of(order.trial.build)
+    specimen = Specimen(bench, answer.seed, answer.attempt, answer.genome, hidden, answer.level)
+    more = specimen.made(len(dataset.recordings), order.condition).recording
+    taken = {one.name for one in dataset.recordings}
+    name = more.name if more.name not in taken else f"{more.name}-again"
+    save_dataset(replace(dataset, recordings=(*dataset.recordings, replace(more, name=name))), order.longer)
+
+
+def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
+    rng = np.random.default_rng([trial.seed, attempt, 1])
+    bench = bench_of(trial.build)
+    planned = conditions(trial, rng)
+    fitted = [condition for condition, held_out in planned if not held_out]
+    bare = Specimen(bench, trial.seed, attempt, bench.genome(rng), {})
+    drawn = {name: bench.laws[name].draw(rng) for name in trial.hidden}
+    strength = Strength.of(bare, fitted)
+    specimen = strength.set(bare, drawn, trial.target)
+    every = [specimen.made(number, condition) for number, (condition, _) in enumerate(planned)]
+    held_out = tuple(one.recording.name for one, (_, held) in zip(every, planned, strict=True) if held)
+    noise = {
+        held: rms(np.array([one.noise for one, (_, other) in zip(every, planned, strict=True) if other is held]))
+        for held in (False, True)
+    }
+    answer = Answer(
+        trial=trial.name,
+        group=trial.group,
+        rig=trial.build.rig,
+        division=trial.build.division,
+        plant=trial.build.plant,
+        secrets=tuple(specimen.secret(name, fitted[0]) for name in specimen.hidden),
+        genome=specimen.genome,
+        target=trial.target,
+        strength=strength.final(specimen) / noise[False],
+        strength_of_division=strength.division() / noise[False],
+        noise=noise[False],
+        noise_held_out=noise[True],
+        conditions={one.recording.name: one.recording.condition for one in every},
+        seed=trial.seed,
+        attempt=attempt,
+        level=specimen.level,
+    )
+    return Dataset(trial.name, bench.rig, tuple(one.recording for one in every), held_out), answer
+
+
+@dataclass(frozen=True, eq=False)
+class Strength:
+    """Residuals of the refitted nominal model when something is hidden in a bare specimen, under the fitted conditions.
+
+    The change due to a hidden effect is simulated with the discretisation of the model, which is cheaper and gives the
+    same change. A strength is searched first with the model linearised at the true genome, then by full refits.
+    ``ends`` caches RMS residual and genes at the end of each full refit; later refits can start from them.
+    """
+
+    bare: Specimen
+    conditions: tuple[Condition, ...]
+    refit: Refit
+    coarse: Specimen
+    plain: Array
+    changes: dict[Hashable, Array] = field(default_factory=dict, repr=False)
+    ends: dict[Hashable, tuple[float, Array]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
+        """Set up for ``bare``, with the nominal model at its own true genome."""
+        ideal = replace(bare, ideal=True)
+        coarse = replace(ideal, bench=bare.bench.coarse())
+        recordings = ideal.fitted(fitted)
+        plain = stacked(recordings) if coarse.bench is ideal.bench else stacked(coarse.fitted(fitted))
+        refit = Refit(bare.bench.model_beside(bare.genome), bare.genome, recordings)
+        return cls(ideal, tuple(fitted), refit, coarse, plain)
+
+    def change(self, hidden: Concealed) -> Array:
+        """[D] change of all recordings due to ``hidden``, cached."""
+        key = _key(hidden)
+        if key not in self.changes:
+            self.changes[key] = stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
+        return self.changes[key]
+
+    def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
+        """The specimen with each effect of ``drawn`` at strength d = ``target``.
+
+        Its noise is lowered if that is not reached.
+        """
+        hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
+        for name, parameters in drawn.items():
+            hidden[name], found = self._sized(name, parameters, target, noise)
+            if found < LITTLE * target:
+                level = min(level, max(found / target, bare.least_level))
+        return replace(bare, hidden=hidden, level=level)
+
+    def _sized(
+        self, name: str, parameters: Mapping[str, float], target: float, noise: float
+    ) -> tuple[dict[str, float], float]:
+        """Parameters with the strength whose refit leaves ``target`` times the noise, and the ratio that is reached."""
+
+        def sized(size: float) -> dict[str, float]:
+            return {**parameters, "strength": size * parameters["strength"]}
+
+        def linear(size: float) -> float:
+            return self.refit.linear(self.change({name: sized(size)})) / noise
+
+        def full(size: float) -> float:
+            truth, hidden = self.refit.unit, {name: sized(size)}
+            near = [truth + part * (end - truth) for old, end in ends.items() for part in (1, size / old)]
+            left = self._refit(hidden, [np.clip(one, 0.0, 1.0) for one in near])
+            ends[size] = self.ends[_key(hidden)][1]
+            return left / noise
+
+        ends: dict[float, Array] = {}
+        limits = self.bare.bench.limits(name)
+        start, _ = strength_for(target, linear, 1.0, limits)
+        size, found = strength_for(target, full, start, limits, CORRECTIONS)
+        return sized(size), found
+
+    def final(self, specimen: Specimen) -> float:
+        """RMS residual of a full refit with everything hidden in ``specimen``, m or N.
+
+        For a single effect it is cached.
+        """
+        hidden = specimen.hidden
+        key = _key(hidden)
+        if hidden and key not in self.ends:
+            self._refit(hidden, [end for _, end in self.ends.values()])
+        return self.ends[key][0] if hidden else 0.0
+
+    def _refit(self, hidden: Concealed, near: Sequence[Array]) -> float:
+        self.ends[_key(hidden)] = self.refit.full(self.change(hidden), rounds=ROUNDS, near=near)
+        return self.ends[_key(hidden)][0]
+
+    def division(self) -> float:
+        """RMS residual of the linearised refit with nothing hidden, m or N: the effect of discretisation and solver.
+
+        With equal discretisation only the solvers differ; that difference is small and is not refitted.
+        """
+        change = stacked(self.refit.recordings) - self.refit.nominal
+        return rms(change) if self.coarse.bench is self.bare.bench else self.refit.linear(change)
+
+
+def _key(hidden: Concealed) -> Hashable:
+    return tuple((name, *sorted(values.items())) for name, values in hidden.items())

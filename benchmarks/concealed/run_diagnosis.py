@@ -1,0 +1,53 @@
+"""The diagnosis as a user runs it: a dataset on disk goes in, a finding comes out. No answer is known here."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis import DiagnosisSpec, diagnose
+from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.policy import POLICY, Policy
+from wingfit.records import load_dataset
+from wingfit.workers import make_evaluator
+
+
+@dataclass(frozen=True)
+class Task:
+    """A request: a dataset, the division of a wing's model, and the terms that a vehicle's model leaves out."""
+
+    trial: str
+    dataset: Path
+    division: str
+    without: tuple[str, ...]
+    policy: Policy = POLICY
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a task; ``reason`` says why there is no finding, and is "" if there is one."""
+
+    trial: str
+    finding: Finding | None
+    reason: str
+    seconds: float
+
+
+def run(task: Task) -> Outcome:
+    """Diagnose in this process. An exception of the diagnosis becomes the ``reason``."""
+    start, finding, reason = time.perf_counter(), None, ""
+    calibration = CalibrationSpec(without=task.without)
+    if task.division:
+        calibration = replace(calibration, division=task.division)
+    evaluator = make_evaluator("in_process")
+    try:
+        for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration), evaluator):
+            finding = progress.finding
+        reason = "" if finding else "it ended without a finding"
+    except Exception as error:  # a crash counts as a failed trial; the other trials continue
+        finding, reason = None, f"{type(error).__name__}: {error}"
+    finally:
+        evaluator.close()
+    return Outcome(task.trial, finding, reason, time.perf_counter() - start)

@@ -1,0 +1,39 @@
+"""Workloads: small calibrations of both kinds and a diagnosis. Undisturbed, each always has the same result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Work:
+    """A run to submit on the dataset ``example``."""
+
+    name: str
+    example: str
+    body: Json = field(hash=False)
+
+
+def _search(name: str, seed: int, **more: Any) -> Work:
+    wing = {"division": "4", "population": 8, "max_generations": 10, "stall": 10, "seed": seed}
+    return Work(f"{name} {seed}", "robird", wing | {"recordings": ["vac-0010mbar-lag0-2.0hz"], "mode": "joint"} | more)
+
+
+WORKS = (
+    *(_search("genetic", seed) for seed in (1, 2, 3)),
+    _search("CMA-ES", 4, method="cma_es"),
+    Work("forces, Gauss-Newton", "delfly", {"axes": ["x", "z"]}),
+    Work(
+        "forces, CMA-ES, then Gauss-Newton",
+        "delfly",
+        {"method": "cma_es", "finish": True, "population": 12, "max_generations": 12, "stall": 12, "seed": 5},
+    ),
+)
+
+
+DIAGNOSIS: Json = {"axes": ["x", "z"], "seed": 1}
+"""Of balance recordings. It starts again after every kill of the server, and ends in the quiet phase."""
+DIAGNOSED = "delfly"

@@ -1,0 +1,262 @@
+"""Convergence of one nominal wing.
+
+Its converged periodic motion, the steps a beat needs, the beats until it is periodic.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from wingfit.records import Condition
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.arrays import State, Trace, new_work
+from wingfit.sim.kernels.integrate import advance
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.solver.periodic import Secants
+from wingfit.sim.solver.scene import at_rest, drive_table, new_trace, setting
+from wingfit.sim.solver.simulate import Beat, periodic_beats
+from wingfit.sim.virtual_rigs.campaign import robird_wing
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.genes import lanes
+from wingfit.sim.wing.structure import Structure
+
+Array = npt.NDArray[np.float64]
+
+CONVERGED = 1024  # steps of the reference, which is compared with half as many
+SETTLED = 1e-7  # m from the periodic motion: negligible compared with 0.1 mm
+MOST_BEATS = 400
+_AGREEMENT = 0.02  # largest change from half as many steps to the reference, relative to the tolerance
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The Robird's wing with nominal genes, a division and a condition; all lanes are equal.
+
+    ``damping`` multiplies the nominal damping genes.
+    """
+
+    division: str
+    condition: Condition
+    damping: float = 1.0
+
+    @cached_property
+    def model(self) -> FlexibleWing:
+        """With default settings."""
+        return FlexibleWing(robird_wing(), self.division)
+
+    @property
+    def structure(self) -> Structure:
+        """Bodies and connectors."""
+        return self.model.structure
+
+    @cached_property
+    def genome(self) -> Array:
+        """The genome, [1, G]."""
+        factors = {"D_E": self.damping, "D_G": self.damping}
+        return np.array([[gene.nominal * factors.get(gene.name, 1.0) for gene in self.model.genes]])
+
+    @cached_property
+    def scene(self) -> WingScene:
+        """A full group of lanes."""
+        return WingScene.of(self.structure, self.condition, lanes(self.structure, self.model.genes, self.genome))
+
+    def drive(self, numerics: Numerics, steps: int, beat: int) -> Array:
+        """Drive of a beat, see :func:`wingfit.sim.solver.scene.drive_table`."""
+        return drive_table(self.scene.rods, self.condition.flap_frequency, numerics, steps, beat)
+
+
+@dataclass(frozen=True)
+class Passed:
+    """One integrated beat: trace of the first lane, start state, and distance (m) from periodic."""
+
+    trace: Trace
+    start: State
+    distance: float
+
+
+def beats(subject: Subject, steps: int, *, window: int, start: State | None = None) -> Iterator[Passed]:
+    """Beats of ``steps`` steps from rest or from ``start``, without end; ArithmeticError if a lane diverges.
+
+    As :func:`wingfit.sim.solver.settle.settle`, but every beat is yielded. ``window`` as in Numerics.
+    """
+    structure, numerics = subject.structure, Numerics(steps=steps, window=window)
+    group, here = subject.scene.frozen(), subject.scene.setting(steps)
+    work = new_work(structure.wiring, here, group)
+    state, trace, alive = at_rest(structure), new_trace(structure, steps), np.ones(LANES, bool)
+    if start is not None:
+        _put(state, start)
+    secants: Secants | None = None
+    beat = 0 if start is None else numerics.ramp_beats
+    while True:
+        before = _first_lane(state)
+        table = subject.drive(numerics, steps, min(beat, numerics.ramp_beats))
+        advance(structure.wiring, here, group, table, work, state, trace, alive)
+        if not alive.all():
+            raise ArithmeticError(f"{subject.division} bodies diverge with {steps} steps a beat")
+        distance = np.inf
+        if beat >= numerics.ramp_beats:
+            secants = secants or Secants(before, subject.scene.angular_rate, window, group.laws.size)
+            following, distance = secants.add(before, _first_lane(state))
+            _put(state, following)
+        yield Passed(Trace(*(array[..., 0].copy() for array in trace)), before, distance)
+        beat += 1
+
+
+def _first_lane(state: State) -> State:
+    return State(*(array[..., 0].copy() for array in state))
+
+
+def _put(into: State, state: State) -> None:
+    for array, value in zip(into, state, strict=True):
+        array[:] = value[..., None]
+
+
+def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed:
+    """The periodic beat with ``steps``, to within SETTLED."""
+    window = Numerics().window
+    for passed in islice(beats(subject, steps, window=window, start=start), MOST_BEATS):
+        if passed.distance <= SETTLED:
+            return passed
+    raise ArithmeticError(f"{subject.division} bodies are not periodic to {SETTLED:g} m after {MOST_BEATS} beats")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The converged periodic motion.
+
+    ``tracks`` [CONVERGED, M, 3], ``change`` (m) compared with half as many steps, and a ``start`` state.
+    """
+
+    tracks: Array
+    change: float
+    start: State
+
+
+def reference(subject: Subject, tolerance: float) -> Reference:
+    """The converged motion; ArithmeticError if half as many steps differ too much compared with ``tolerance`` (m)."""
+    half = periodic(subject, CONVERGED // 2)
+    whole = periodic(subject, CONVERGED, half.start)
+    change = largest_distance(half.trace.tracks, whole.trace.tracks)
+    if not change <= _AGREEMENT * tolerance:
+        raise ArithmeticError(
+            f"{CONVERGED} and {CONVERGED // 2} steps differ by {change * 1e3:.3g} mm, more than "
+            f"{_AGREEMENT * tolerance * 1e3:.3g} mm; raise CONVERGED"
+        )
+    return Reference(whole.trace.tracks, change, whole.start)
+
+
+def largest_distance(tracks: Array, converged: Array) -> float:
+    """Largest distance (m) of a marker of ``tracks`` [n, M, 3] from the periodic ``converged`` [m, M, 3]."""
+    return float(np.sqrt(((tracks - at_steps(converged, len(tracks))) ** 2).sum(axis=-1)).max())
+
+
+def at_steps(tracks: Array, count: int) -> Array:
+    """Periodic tracks [m, M, 3] at ``count`` equal steps, by their full Fourier series."""
+    if len(tracks) % count == 0:
+        return tracks[:: len(tracks) // count]
+    series = np.fft.rfft(tracks, axis=0) / len(tracks)
+    series[1 : (len(tracks) + 1) // 2] *= 2
+    turn = np.exp(2j * np.pi * np.outer(np.arange(count) / count, np.arange(len(series))))
+    return np.asarray(np.tensordot(turn, series, axes=1).real)
+
+
+def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least: int = 16) -> tuple[int, float]:
+    """Smallest even number of steps a beat that keeps markers within ``tolerance`` (m), and the error (m) with them.
+
+    The next larger number must suffice too, so that a zero crossing of the error does not count.
+    """
+    found: tuple[int, float] | None = None
+    for steps in range(least, CONVERGED // 2, 2):
+        error = _error(subject, converged, steps)
+        if error > tolerance:
+            found = None
+        elif found is not None:
+            return found
+        else:
+            found = steps, error
+    raise ArithmeticError(f"{subject.division} bodies: {CONVERGED // 2} steps are not enough for {tolerance:g} m")
+
+
+def _error(subject: Subject, converged: Reference, steps: int) -> float:
+    """Largest error (m) of the periodic tracks with ``steps``; infinite if there are none."""
+    try:
+        return largest_distance(periodic(subject, steps, converged.start).trace.tracks, converged.tracks)
+    except ArithmeticError:
+        return np.inf
+
+
+def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: float) -> int | None:
+    """Number of beats from rest, with the ramp, until all tracks stay within ``tolerance`` (m) of the periodic ones.
+
+    Compared with the periodic tracks of as many steps; None if it takes more than MOST_BEATS.
+    """
+    final = periodic(subject, steps).trace.tracks
+    errors = []
+    for passed in islice(beats(subject, steps, window=window), MOST_BEATS):
+        errors.append(largest_distance(passed.trace.tracks, final))
+        if passed.distance <= SETTLED and errors[-1] <= tolerance:
+            return 1 + int(np.max(1 + np.flatnonzero(np.array(errors) > tolerance), initial=0))
+    return None
+
+
+def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6) -> float:
+    """Processor time of one beat per individual of a full group, without compilation: median of repeats."""
+    structure, numerics = subject.structure, Numerics(steps=steps)
+    group, here = subject.scene.frozen(), subject.scene.setting(steps)
+    work = new_work(structure.wiring, here, group)
+    table = subject.drive(numerics, steps, numerics.ramp_beats)
+    state, trace, alive = at_rest(structure), new_trace(structure, steps), np.ones(LANES, bool)
+    _put(state, start)
+    times: list[float] = []
+    while len(times) < 6 or sum(times) < seconds:
+        began = time.thread_time()
+        advance(structure.wiring, here, group, table, work, state, trace, alive)
+        times.append(time.thread_time() - began)
+    if not alive.all():
+        raise ArithmeticError(f"{subject.division} bodies diverge with {steps} steps a beat")
+    return 1e3 * statistics.median(times[1:]) / LANES
+
+
+@dataclass(frozen=True)
+class ByDefault:
+    """A simulation with default settings: ``ms`` for one individual of a full group until the periodic beat."""
+
+    beat: Beat
+    ms: float
+
+
+def by_default(subject: Subject) -> ByDefault:
+    """A full group through :func:`wingfit.sim.solver.simulate.periodic_beats`, and the first of its beats."""
+    genomes = np.repeat(subject.genome, LANES, axis=0)
+    arguments = (subject.model.subject((), subject.condition), genomes, subject.model.numerics)
+    times, found = [], periodic_beats(*arguments)
+    for _ in range(3):
+        began = time.thread_time()
+        found = periodic_beats(*arguments)
+        times.append(time.thread_time() - began)
+    if found[0].reason is not None:
+        raise ArithmeticError(f"{subject.division} bodies, nominal genes: {found[0].reason}")
+    return ByDefault(found[0], 1e3 * min(times) / LANES)
+
+
+def energy_error(subject: Subject, steps: int, count: int = 20) -> float:
+    """Energy error over ``count`` beats from rest, relative to the largest work through a port.
+
+    Change of stored energy (kinetic, elastic, gravitational) minus the work of dampers, two motors and air.
+    """
+    passed = [one.trace for one in islice(beats(subject, steps, window=0), count)]
+    stored = np.concatenate([trace.energy for trace in passed]).sum(axis=1)
+    power = np.concatenate([trace.power for trace in passed])
+    times = np.arange(len(power)) * setting(subject.condition, steps).step
+    work = CubicSpline(times, power).antiderivative()(times)
+    return float(np.abs(stored - stored[0] - work.sum(axis=1)).max() / np.abs(work).max())

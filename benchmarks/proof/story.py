@@ -1,0 +1,122 @@
+"""Common parts of both case studies: dataset on disk, diagnosis as a user runs it, report, and claims."""
+
+from __future__ import annotations
+
+import shutil
+import webbrowser
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from wingfit.cli.base.output import progress
+from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis
+from wingfit.records import Dataset, save_dataset
+from wingfit.report import html
+from wingfit.service.diagnoses.local import diagnose
+
+Numbers = Mapping[str, Any]
+
+IN_A_TERMINAL = ("www-browser", "links", "elinks", "lynx", "w3m")
+"""Browsers that run in the terminal and draw no figures."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One statement of a study, and whether it holds."""
+
+    words: str
+    holds: bool
+
+
+@dataclass(frozen=True)
+class Story:
+    """A finished study: ``figures`` for JSON, ``lines`` of text, and the report."""
+
+    figures: Numbers
+    lines: tuple[str, ...]
+    claims: tuple[Claim, ...]
+    report: Path
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {**self.figures, "claims": [asdict(claim) for claim in self.claims], "report": str(self.report)}
+
+
+def saved(dataset: Dataset, folder: Path) -> Path:
+    """Write ``dataset`` into ``folder``, replacing the dataset of an earlier run."""
+    path = folder / dataset.name
+    if (path / "dataset.yaml").is_file():
+        shutil.rmtree(path)
+    save_dataset(dataset, path)
+    return path
+
+
+def diagnosed(path: Path, options: Mapping[str, Any], workers: int) -> tuple[Finding, Path]:
+    """Diagnose the dataset at ``path`` as ``wingfit diagnose --local`` does, and write the report beside it.
+
+    The diagnosis receives only the files and ``options`` (those of that command).
+    """
+    with progress(f"{path.name}: diagnosing") as tell:
+        finding = diagnose(path, dict(options), workers, tell)
+    page = path.with_name(f"{path.name}.html")
+    page.write_text(html(finding), encoding="utf-8")
+    return finding, page
+
+
+def leader(finding: Finding) -> Hypothesis:
+    """The hypothesis that the verdict names, else the most probable one."""
+    named = set(finding.named)
+    return next((one for one in finding.hypotheses if set(one.effects) == named), finding.hypotheses[0])
+
+
+def nominal_misfit(finding: Finding) -> float:
+    """RMS residual of the refitted nominal model, m or N."""
+    return next(one.misfit for one in finding.hypotheses if not one.effects)
+
+
+def families(finding: Finding) -> tuple[str, ...]:
+    """Family of each named effect."""
+    known = {one.effects[0]: one.family for one in finding.hypotheses if len(one.effects) == 1}
+    return tuple(known.get(name, "") for name in finding.named)
+
+
+def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Each true value with its estimate and 90 % interval; None if the effect was not named."""
+    rows = []
+    for name, true in truth.items():
+        found = genes[name].value if name in genes else None
+        ends = (None, None) if found is None else (found.low, found.high)
+        rows.append(
+            {
+                "gene": name,
+                "true": true,
+                "found": None if found is None else found.value,
+                "low": ends[0],
+                "high": ends[1],
+                "covered": None if None in ends else bool(ends[0] <= true <= ends[1]),  # type: ignore[operator]
+            }
+        )
+    return rows
+
+
+def over_floor(finding: Finding) -> dict[str, float | None]:
+    """Held-out misfit / floor, before and after the diagnosis."""
+    proof = finding.proof
+    return {
+        "heldout_before_over_floor": None if proof is None else proof.before.value,
+        "heldout_over_floor": None if proof is None else proof.after.value,
+        "heldout_over_floor_low": None if proof is None else proof.after.low,
+        "heldout_over_floor_high": None if proof is None else proof.after.high,
+    }
+
+
+def opened(page: Path) -> bool:
+    """Open a page in a graphical browser; False if there is none."""
+    try:
+        browser = webbrowser.get()
+    except webbrowser.Error:
+        return False
+    if isinstance(browser, webbrowser.GenericBrowser) and browser.name in IN_A_TERMINAL:
+        return False
+    return browser.open(page.resolve().as_uri())
