@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
-Port = Literal["inertia", "connector", "drive", "air", "observation"]
+Port = Literal["inertia", "connector", "point", "drive", "air", "observation"]
 Power = Literal["conservative", "dissipative", "any"]
 Measure = Literal["span", "chord", "mass"]
 RigKind = Literal["wing", "vehicle"]

@@ -16,6 +16,7 @@ _PLACES: tuple[str, ...] = (
     "structure.rod_slip",
     "structure.hysteresis",
     "structure.viscoelastic",
+    "structure.tether",
     # inertia
     "inertia.lumped_mass",
     "inertia.mass_offset",

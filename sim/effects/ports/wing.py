@@ -44,6 +44,9 @@ class WingScene:
     _air: dict[tuple[int, int], Array] = field(default_factory=dict)
     _strip: list[list[int]] = field(default_factory=list)
     _connector: list[list[int]] = field(default_factory=list)
+    _point: list[list[int]] = field(default_factory=list)
+    _bodies: list[int] = field(default_factory=list)
+    _arms: list[Array] = field(default_factory=list)
     _parameters: list[Array] = field(default_factory=list)
     _axes: list[int] = field(default_factory=list)
     _sizes: list[Array] = field(default_factory=list)
@@ -126,6 +129,24 @@ class WingScene:
         self._connector[-1][5] = len(self._axes)
         self._axes += axes or []
 
+    def add_point_law(self, law: Law, station: Array, fraction: Array, parameters: list[Array]) -> None:
+        """Let a law apply a wrench at a place of the wing, which :meth:`body_at` reads; ``parameters`` [W] each.
+
+        Of a body that has the place in some individuals only, all parameters are zero in the others.
+        """
+        found, arms = self.body_at(station, fraction)
+        bodies = np.unique(found)
+        here = found == bodies[:, None]
+        self._add(self._point, len(bodies), law, [np.where(here, values, 0.0) for values in parameters], [])
+        self._point[-1][2:] = [len(bodies), self._point[-1][3], len(self._bodies)]
+        self._bodies += bodies.tolist()
+        self._arms += [np.where(lanes, arms.T, 0.0) for lanes in here]
+
+    def at_rest(self, station: Array, fraction: Array) -> Array:
+        """Where places of the wing lie in the world at rest, [3, W] m."""
+        found, arms = self.body_at(station, fraction)
+        return np.asarray((arms + np.array([self.structure.bodies[n].centre for n in found])).T)
+
     def _add(self, laws: list[list[int]], places: int, law: Law, parameters: list[Array], states: list[float]) -> None:
         at, first = sum(map(len, self._parameters)), sum(map(len, self._sizes))
         laws.append([address(law), len(parameters), len(states), at, first, 0])
@@ -149,7 +170,10 @@ class WingScene:
         laws = Laws(
             strip=np.array(self._strip, np.int64).reshape(-1, 6),
             connector=np.array(self._connector, np.int64).reshape(-1, 6),
+            point=np.array(self._point, np.int64).reshape(-1, 5),
             axes=np.array(self._axes, np.int64),
+            bodies=np.array(self._bodies, np.int64),
+            arms=aligned(np.array(self._arms).reshape(-1, 3, LANES)),
             parameters=aligned(np.concatenate([*self._parameters, np.zeros((0, LANES))])),
             size=np.concatenate([*self._sizes, self._motor_sizes]),
             motor=aligned(self.motor),

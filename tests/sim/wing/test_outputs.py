@@ -141,7 +141,7 @@ def newton_euler(model: FlexibleWing, outputs: Outputs, motion: State, condition
     """[n, N, 6] sum of the wrenches on every body in its frame, and what its motion needs (finite differences)."""
     w, n = model.structure.wiring, len(model.structure.bodies)
     R = motion.R.reshape(len(motion.R), -1, 3, 3)
-    applied = outputs.air_wrench.copy()
+    applied = outputs.air_wrench + outputs.held
     down = np.array([0.0, 0.0, -condition.gravity])
     applied[:, :, 3:] += w.mass[:, None] * np.einsum("tnji,j->tni", R[:, :n], down)
     for c, load in enumerate(outputs.connectors):
@@ -238,7 +238,7 @@ def test_every_section_carries_weight_air_and_inertia_of_all_that_is_outboard(fo
     R = motion.R.reshape(len(motion.R), -1, 3, 3)[:, :n]
     _, needed = newton_euler(model, outputs, motion, TUNNEL)
     weight = np.array([[0.0], [0.0], [-TUNNEL.gravity]]) * w.mass
-    from_outside = outputs.air_wrench.copy()
+    from_outside = outputs.air_wrench + outputs.held
     from_outside[:, :, 3:] += np.einsum("tnji,jn->tni", R, weight)
     through = needed - from_outside
     moment, force = (np.einsum("tnij,tnj->tni", R, through[:, :, part]) for part in (slice(0, 3), slice(3, 6)))
