@@ -39,6 +39,7 @@ class EffectOut(BaseModel):
     port: Port
     power: Power
     memory: str | None
+    law: str
     source: str
     signature: str
     confused_with: list[str]

@@ -88,10 +88,11 @@ class Laws(NamedTuple):
     """Compiled laws of the effects chosen.
 
     ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, where in
-    ``parameters`` [., W] and in the states [Z, W] they start, where in ``axes`` its states' axes start. ``axes``: of
-    each state per connector, 0..5 as in stiffness. ``size`` [Z]: a state times this is comparable with metres.
-    ``point`` [L, 5]: address of the law, number of parameters and of points, where in ``parameters`` and among the
-    points they start; ``bodies`` [P] of the points, and where they lie on these, ``arms`` [P, 3, W].
+    ``parameters`` [., W] and in the states [Z, W] they start; of a strip whether it is called BEFORE the flow is known,
+    of a connector where in ``axes`` its states' axes start. ``axes``: of each state per connector, 0..5 as in
+    stiffness. ``size`` [Z]: a state times this is comparable with metres. ``point`` [L, 5]: address of the law, number
+    of parameters and of points, where in ``parameters`` and among the points they start; ``bodies`` [P] of the points,
+    and where they lie on these, ``arms`` [P, 3, W].
     ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
     """
 

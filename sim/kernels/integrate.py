@@ -159,7 +159,8 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     laws = lanes.laws
     work.induced[:] = 0.0
     for k in range(len(laws.strip)):
-        call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, BEFORE)
+        if laws.strip[k, 5]:
+            call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, BEFORE)
     strip_flow(
         wiring.strip_start, wiring.weight, wiring.centroid, setting.wind, lanes.coefficients,
         work.induced, work.R, work.p, work.V, work.flow, work.loads,

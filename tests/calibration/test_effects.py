@@ -41,10 +41,11 @@ def bump(monkeypatch: pytest.MonkeyPatch) -> Effect:
     found = Effect(
         name="bump",
         title="A bump",
-        family="aerodynamics",
+        family="measurement",
         port="observation",
         size=(Parameter("size", "1", -1.0, 1.0, 0.3, "height"),),
         shape=(Parameter("place", "1", 0.0, 1.0, 0.5, "where", place=True),),
+        law="y = size",
         source="none",
         signature="a bump",
         confused_with=(),

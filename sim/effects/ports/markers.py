@@ -6,12 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import Wing
-from wingfit.sim.effects.contract import Array, Parameter, Values
+from wingfit.sim.effects.contract import Array, Values, place
 
-PLACE = (
-    Parameter("station", "1", 0.0, 1.0, 0.7, "span station of the place, in parts of the span", place=True),
-    Parameter("chord", "1", 0.0, 1.0, 0.5, "place along the chord, in parts of it from the leading edge", place=True),
-)
+PLACE = place(0.7, 0.5)
 _NEAR = 0.05  # of the span: neighbours so far away count for exp(-1/2)
 
 

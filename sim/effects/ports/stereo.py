@@ -17,9 +17,9 @@ Array = npt.NDArray[np.float64]
 
 PLACES = (
     Parameter("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),
-    Parameter("y", "m", 0.0, 1.0, 0.5, "y of that point", "span"),
+    Parameter("y", "m", 0.0, 1.0, 0.5, "y of the point that both cameras aim at", "span"),
     Parameter("distance", "m", 2.0, 10.0, 2.5, "height of the cameras above z = 0", "span"),
-    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras, in parts of their height"),
+    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras over their height"),
 )
 """Shape parameters of an effect that needs the cameras: a metre or two away, seen under some 20 degrees."""
 

@@ -106,8 +106,10 @@ class WingScene:
         """
         self._air[first, second] = self._air.get((first, second), 0.0) + block
 
-    def add_strip_law(self, law: Law, parameters: list[Array], states: list[float] | None = None) -> None:
-        """Let a law of the air act on every strip.
+    def add_strip_law(
+        self, law: Law, parameters: list[Array], states: list[float] | None = None, *, before: bool = False
+    ) -> None:
+        """Let a law of the air act on every strip, ``before`` the flow of the strips is known as well as after it.
 
         ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: one number for each of its states, by
         which a state is multiplied to be comparable with metres of motion (for the way to the periodic motion), in air
@@ -116,6 +118,7 @@ class WingScene:
         felt = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_FELT)
         sizes = [size * min(felt, 1.0) for size in states or []]
         self._add(self._strip, len(self.structure.wiring.geometry), law, parameters, sizes)
+        self._strip[-1][5] = int(before)
 
     def add_connector_law(
         self, law: Law, parameters: list[Array], axes: list[int] | None = None, states: list[float] | None = None

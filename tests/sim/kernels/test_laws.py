@@ -67,12 +67,11 @@ def _blowing(frame: Any, moment: int) -> None:
             store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + given)
 
 
-def _still(frame: Any, moment: int) -> None:
+def _still(frame: Any, moment: int) -> None:  # noqa: ARG001
     """No state; shows that the law after it finds its own."""
     port = strip_port(frame)
     for s in range(port.places):
-        if moment == AFTER:
-            store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + 100.0 * load(port.parameters, 1, s))
+        store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + 100.0 * load(port.parameters, 1, s))
 
 
 def test_a_law_sees_its_own_parameters_and_states() -> None:
@@ -89,7 +88,7 @@ def test_a_law_sees_its_own_parameters_and_states() -> None:
         for law in connectors:
             parameters, axes = ([first], [0, 4]) if law is _one else ([a, b], [2])
             scene.add_connector_law(law, parameters, axes=axes, states=[1.0] * len(axes))
-        scene.add_strip_law(_blowing, [given], states=[1.0])
+        scene.add_strip_law(_blowing, [given], states=[1.0], before=True)
         group, here = scene.frozen(), scene.setting(100)
         work, rest = new_work(w, here, group), at_rest(structure)
         work.R[:], work.p[:], work.V[:] = rest.R, rest.p, rest.V

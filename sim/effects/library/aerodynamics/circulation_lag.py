@@ -1,4 +1,4 @@
-"""Circulation follows the wing late, while the vortices that it sheds are near (Wagner)."""
+"""Circulation lags behind the wing's motion while the shed vortices are near (Wagner)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
 from wingfit.sim.kernels.lanes.vector import load, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 
 Array = npt.NDArray[np.float64]
 
@@ -44,10 +44,8 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     scene.after("circulation", lambda: _lag(scene, values))
 
 
-def _law(frame: Any, moment: int) -> None:
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
     """The same on strips: of twice Gamma over the chord, which is speed times lift coefficient."""
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         share = load(port.parameters, 0, s)
@@ -75,12 +73,15 @@ EFFECT = Effect(
     title="Lagged circulation (Wagner, Theodorsen)",
     family="aerodynamics",
     port="air",
-    size=(Parameter("share", "1", 0.0, 1.5, 1.0, "part of Wagner's deficit; 1 is a thin wing in plane flow"),),
-    shape=(Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states in parts of that in plane flow", scale="log"),),
-    memory="two late circulations at each station or strip",
+    size=(Parameter("share", "1", 0.0, 1.5, 1.0, "fraction of Wagner's deficit; 1 is a thin wing in plane flow"),),
+    shape=(
+        Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states as a fraction of that in plane flow", scale="log"),
+    ),
+    memory="two lagging circulations at each station or strip",
+    law="x_i' = rate b_i (2 V / c) (Gamma_0 - x_i),     i = 1, 2\nGamma = Gamma_0 - share sum_i a_i (Gamma_0 - x_i)",
     source="Wagner (1925) in the approximation of R. T. Jones (1940, NACA Report 681), which for a steady swing is "
     "Theodorsen's function (1935, NACA Report 496); states: Leishman (2006, ch. 8)",
-    signature="lift that comes late and swings less, by the same half chords at any frequency",
+    signature="lift is late and varies less, by the same number of half chords travelled at any flap frequency",
     confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),
     wing=_wing,
     vehicle=_vehicle,

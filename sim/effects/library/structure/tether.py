@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Effect, Parameter, Values, place
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
 from wingfit.sim.kernels.laws import point_port
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
     """Force -k (x - x_0) - c v on the point, in the world; parameters are k, c and the three coordinates of x_0."""
     port = point_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
@@ -31,8 +31,8 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    place = values["station"], values["chord"]
-    scene.add_point_law(_law, *place, [values["k"], values["c"], *scene.at_rest(*place)])
+    at = values["station"], values["chord"]
+    scene.add_point_law(_law, *at, [values["k"], values["c"], *scene.at_rest(*at)])
 
 
 EFFECT = Effect(
@@ -42,17 +42,15 @@ EFFECT = Effect(
     port="point",
     size=(
         Parameter("k", "N/m", 0.0, 20.0, 1.0, "stiffness of the spring between the wing and the ground"),
-        Parameter("c", "N s/m", 0.0, 0.5, 0.01, "damping constant of the damper beside that spring"),
+        Parameter("c", "N s/m", 0.0, 0.5, 0.01, "damping constant beside that spring"),
     ),
-    shape=(
-        Parameter("station", "1", 0.0, 1.0, 0.9, "where it is, part of the span from root to tip", place=True),
-        Parameter("chord", "1", 0.0, 1.0, 0.5, "where it is, part of the chord from the leading edge", place=True),
-    ),
+    shape=place(0.9, 0.5),
     power="dissipative",
-    source="Rayleigh, The Theory of Sound (1877), ch. IV: potential energy k x^2 / 2 and dissipation function "
-    "c v^2 / 2; Blevins, Formulas for Natural Frequency and Mode Shape (1979), ch. 8: beams on springs",
-    signature="the wing is held back towards its rest position near one place, in vacuum as in air; less so the "
-    "faster it flaps, as inertia grows and the spring does not",
+    law="F = -k (x - x_0) - c v,     P = c |v|^2",
+    source="Rayleigh, The Theory of Sound (1877), ch. IV: potential energy and dissipation function of a point; "
+    "Blevins, Formulas for Natural Frequency and Mode Shape (1979), ch. 8: beams on springs",
+    signature="the wing is held back towards its rest position near one place, in vacuum as in air; less so at higher "
+    "flap frequencies, where inertia grows and the spring does not",
     confused_with=("lumped_mass", "cubic_stiffness", "damage"),
     wing=_wing,
 )

@@ -1,4 +1,4 @@
-"""One suite over all evaluators: the same bits, and manners when something goes wrong."""
+"""Every evaluator gives identical numbers, and reports failures of models and workers in the same way."""
 
 from __future__ import annotations
 
