@@ -159,17 +159,17 @@ def strip_middles(structure: Structure) -> Array:
     return np.asarray((middle - edges[0]) / (edges[-1] - edges[0]))
 
 
-def _push(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _push(frame: Any, moment: int) -> None:
     """The normal force on each strip."""
     _series(frame, PUSH_N)
 
 
-def _roll(frame: Any, moment: int) -> None:  # noqa: ARG001
+def _roll(frame: Any, moment: int) -> None:
     """The moment of the forces about the middle of their strip."""
     _series(frame, PUSH_L)
 
 
-def _turn(frame: Any, moment: int) -> None:  # noqa: ARG001
+def _turn(frame: Any, moment: int) -> None:
     """The moment about the span."""
     _series(frame, PUSH_M)
 

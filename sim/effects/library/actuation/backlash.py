@@ -17,7 +17,7 @@ from wingfit.sim.kernels.laws import connector_port
 _EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """A pin about x that turns freely by half the play, b / 2, to either side, in series with the spring of rotation.
 
     The spring keeps -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
@@ -28,7 +28,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
     """
     port = connector_port(frame)
     for c in range(port.places):
-        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, whoever it is
+        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, in any individual
             continue
         half, h = load(port.parameters, 1, c), load(port.parameters, 2, c)
         g1, g2 = load(port.parameters, 3, c), load(port.parameters, 4, c)

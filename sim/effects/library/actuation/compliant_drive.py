@@ -9,14 +9,14 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.motor import AVERAGING, DROOP, FOLLOWING, HOLDING, MOTOR
 
-# Of the angular rate. A lead is taken back, and the mean load learnt, within a beat: e^(-2 pi) is left after it. Slower
-# ones would see less of the load within the beat, and ask for a third more beats on the way to the periodic motion.
+# Over the angular rate. A lead decays, and the mean load is learnt, within a beat: e^(-2 pi) remains after it. Slower
+# rates would react less to the load within the beat, but need a third more beats to the periodic motion.
 GOVERNOR = 1.0
 LEARNING = 1.0
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """A governor that asks for the speed -d (P - P_m) - g tau, and a motor that gets there in T."""
+    """A governor that demands the relative speed -d (P - P_m) - g tau, and a motor that follows within t."""
     motor = np.zeros((MOTOR, LANES))
     motor[DROOP], motor[FOLLOWING] = values["d"], 1.0 / values["t"]
     motor[HOLDING] = GOVERNOR * scene.angular_rate / values["t"]

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
 from wingfit.sim.kernels.lanes.vector import load, store
@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 DEFICIT = (0.165, 0.335)  # R. T. Jones (1940): phi(s) = 1 - sum_i DEFICIT_i exp(-RATE_i s), s in half chords
 RATE = (0.0455, 0.3)  # per half chord travelled
-_FELT = 0.1  # a late circulation, as speed times lift coefficient, moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the integral of a lagging circulation, as speed times lift coefficient
 
 
 def wagner(s: npt.ArrayLike) -> Array:
@@ -40,11 +40,7 @@ def _lag(scene: VehicleScene, values: Values) -> None:
     flow.circulation = delayed
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("circulation", lambda: _lag(scene, values))
-
-
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """The same on strips: of twice Gamma over the chord, which is speed times lift coefficient."""
     port = strip_port(frame)
     for s in range(port.places):
@@ -64,7 +60,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    seconds = _FELT / scene.angular_rate
+    seconds = _SCALE / scene.angular_rate
     scene.add_strip_law(_law, [values["share"], values["rate"]], states=[seconds, seconds])
 
 
@@ -84,5 +80,5 @@ EFFECT = Effect(
     signature="lift is late and varies less, by the same number of half chords travelled at any flap frequency",
     confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("circulation", _lag),
 )

@@ -35,7 +35,7 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     scene.fling = scene.fling + values["coefficient"] * fling_near(r / chord * np.sin(values["clearance"]))
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Gamma = C c^2 omega / 2 of a strip that turns nose down from a plane above, which mirrors the wing.
 
     It falls with the distance of mid-chord from the plane, and with the angle to it: open at 45 degrees, two plates

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
 from wingfit.sim.kernels.lanes.lanewise import exponential
@@ -17,7 +17,7 @@ from wingfit.sim.vehicle.states import separate, steady_attachment
 
 _RECENT = 0.25  # chords travelled over which the rate of alpha of a strip is taken
 _STEEPEST = 50.0  # exponent beyond which exp only overflows
-_METRES = 0.01  # m, felt of either state
+_METRES = 0.01  # m of motion of the wing per unit of either state
 
 
 def _stall(scene: VehicleScene, values: Values) -> None:
@@ -33,11 +33,7 @@ def _stall(scene: VehicleScene, values: Values) -> None:
     separate(attached, values["share"], scene.wings.rotation, flow.circulation)
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("circulation", lambda: _stall(scene, values))
-
-
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """The same on strips, whose states are the separated part 1 - X, and alpha as it was a moment ago.
 
     That follows alpha with _RECENT chords travelled; by what it is behind, alpha' is known without accelerations.
@@ -87,5 +83,5 @@ EFFECT = Effect(
     signature="lift breaks down late in each stroke at high angles of attack and recovers along a loop",
     confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("circulation", _stall),
 )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import AREA, CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
 from wingfit.sim.kernels.lanes.vector import load, load1, root, store
@@ -15,7 +15,7 @@ from wingfit.sim.kernels.laws import BEFORE, strip_port
 from wingfit.sim.vehicle.states import settled_inflow
 
 _STILL = 1e-12  # m^2/s^2, keeps the mass flow differentiable in still air
-_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def apparent_mass(density: Array, area: Array) -> Array:
@@ -54,10 +54,6 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     settled_inflow(thrust(inflow) + slope * inflow, slope, flux, mass, stream, 2.0 * scene.step, inflow)
     between = 0.5 * (inflow + np.roll(inflow, -1, axis=1))
     scene.inflow = scene.inflow + np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
-
-
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("inflow", lambda: _induce(scene, values))
 
 
 def slices(edges: Array) -> Array:
@@ -101,7 +97,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     mass = depth * values["inertia"]  # over density and area
     area = structure.wiring.geometry[:, AREA] / slices(edges)
     parameters = [0.5 * area[:, None] * values["share"] / mass, 2.0 / mass]
-    scene.add_strip_law(_law, parameters, states=[_FELT / scene.angular_rate] * 3, before=True)
+    scene.add_strip_law(_law, parameters, states=[_SCALE / scene.angular_rate] * 3, before=True)
 
 
 EFFECT = Effect(
@@ -118,5 +114,5 @@ EFFECT = Effect(
     signature="less force on average, most in hover and least in fast flight",
     confused_with=("tip_loss", "airspeed_error", "residual_air"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("inflow", _induce),
 )

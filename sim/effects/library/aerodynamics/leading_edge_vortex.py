@@ -24,7 +24,7 @@ from wingfit.sim.kernels.laws import strip_port
 _BLEND = math.radians(10.0)  # over which the vortex takes over
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha in the place of the affine laws, in the part w of them.
 
     Together C_N = 2 C_l sin alpha along the normal, and nothing along the chord: without suction at the leading edge

@@ -14,7 +14,7 @@ from wingfit.sim.kernels.laws import strip_port
 _POINTS = ((-0.430568, 0.173927), (-0.169991, 0.326073), (0.169991, 0.326073), (0.430568, 0.173927))
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Pressure rho / 2 C |w| w at every point of the chord, w = u_n + theta' x being the stream along the normal there.
 
     A strip that does not pitch has C_N = C |sin alpha| sin alpha (the cross-flow principle); one that only pitches

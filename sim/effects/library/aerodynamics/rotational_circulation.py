@@ -13,7 +13,7 @@ from wingfit.sim.kernels.laws import strip_port
 _LEVER = 0.75 - 0.5  # of a chord: from where the strip's angle of attack is taken to the point that sets circulation
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Gamma = C_r (3/4 - x_0) c^2 theta' / 2, that is twice Gamma over the chord more to speed times lift coefficient.
 
     x_0 = 1/2, the strip's flow being that of its middle. In flow from behind the point is at 1/4 and the flow's

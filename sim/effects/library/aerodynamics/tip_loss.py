@@ -36,7 +36,7 @@ def strip_factors(structure: Structure, spacing: Array) -> Array:
     return np.asarray(np.einsum("sp,spw->sw", weight / weight.sum(axis=1, keepdims=True), factor))
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Circulation times the strip's factor."""
     port = strip_port(frame)
     for s in range(port.places):

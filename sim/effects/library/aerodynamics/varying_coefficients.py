@@ -7,8 +7,8 @@ import numpy as np
 from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
-REFERENCE_FREQUENCY = 12.0  # Hz: there, and at the pitch below, coefficients are what their genes say
-REFERENCE_PITCH = 1.0  # rad; both lie amid the eight tests of the source
+REFERENCE_FREQUENCY = 12.0  # Hz: at this and the pitch below, coefficients equal their genes
+REFERENCE_PITCH = 1.0  # rad; both lie among the eight tests of the source
 LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
 
 

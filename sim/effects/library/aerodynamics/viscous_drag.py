@@ -21,7 +21,7 @@ def viscosity(temperature: float) -> float:
     return 1.458e-6 * temperature * math.sqrt(temperature) / (temperature + 110.4)
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """C_D = 2.656 / sqrt(Re) along the chord, Re of the chord and of the stream along it."""
     port = strip_port(frame)
     for s in range(port.places):

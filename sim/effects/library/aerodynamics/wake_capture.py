@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CHORD_X, MEAN_CHORD, NORMAL_X, SPEED, STREAM_C, STREAM_N
@@ -17,7 +17,7 @@ from wingfit.sim.vehicle.states import overtake
 
 _RECENT = 1 / 64  # of a beat, over which the velocity of a strip is taken
 _STILL = 1e-12  # m^2/s^2, keeps the part of the wake that goes along defined where the wing rests
-_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def _meet_wake(scene: VehicleScene, values: Values) -> None:
@@ -33,10 +33,6 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
     air = scene.follow(1.0 / (values["chords"][:, None] * places.chord), own)
     overtake(own, values["share"], air)
     scene.wings.gust(flow, air)
-
-
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("wake", lambda: _meet_wake(scene, values))
 
 
 def _law(frame: Any, moment: int) -> None:
@@ -72,7 +68,7 @@ def _law(frame: Any, moment: int) -> None:
 
 def _wing(scene: WingScene, values: Values) -> None:
     recent = np.full(LANES, scene.condition.flap_frequency / _RECENT)
-    seconds = [_FELT / scene.angular_rate] * 4
+    seconds = [_SCALE / scene.angular_rate] * 4
     scene.add_strip_law(_law, [values["share"], values["chords"], recent], states=seconds, before=True)
 
 
@@ -92,5 +88,5 @@ EFFECT = Effect(
     "circulation; it decays within the stroke, and a first stroke from rest has none",
     confused_with=("circulation_lag", "clap_and_peel", "drive_harmonics"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("wake", _meet_wake),
 )

@@ -11,8 +11,8 @@ from wingfit.sim.effects.ports.observation import Sampling, fault_of_forces
 def _observe(sampling: Sampling, values: Values) -> None:
     part, natural, damping = (values[name][:, None] for name in ("part", "frequency", "damping"))
     ratio = sampling.harmonics / natural
-    felt = 1.0 / (1.0 - ratio * ratio + 2j * (damping * ratio))
-    sampling.filtered(np.asarray(1.0 + part * (felt - 1.0), np.complex128))
+    passed = 1.0 / (1.0 - ratio * ratio + 2j * (damping * ratio))
+    sampling.filtered(np.asarray(1.0 + part * (passed - 1.0), np.complex128))
 
 
 EFFECT = fault_of_forces(

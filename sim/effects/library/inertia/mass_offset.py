@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -31,10 +31,6 @@ def _shift_mass(scene: VehicleScene, values: Values) -> None:
     scene.push(moment * x, moment * z)
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("mass", lambda: _shift_mass(scene, values))
-
-
 EFFECT = Effect(
     name="mass_offset",
     title="Centre of mass off its place along the chord",
@@ -48,5 +44,5 @@ EFFECT = Effect(
     signature="torsion and force in phase with the accelerations of flap and pitch, in vacuum as in air",
     confused_with=("lumped_mass", "drive_harmonics", "stroke_bias"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("mass", _shift_mass),
 )

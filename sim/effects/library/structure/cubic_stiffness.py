@@ -15,7 +15,7 @@ from wingfit.sim.kernels.laws import connector_port
 _SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangent loses 5/4 of it at most
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """A potential of s, the sine of the bending, from the axial part of Q.
 
     V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2: cubic for c = 0, else

@@ -11,11 +11,11 @@ from wingfit.sim.kernels.lanes.lanewise import power
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, magnitude, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-_METRES = [0.1, 0.1]  # one radian is felt a chord away
+_METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 _TINY = 1e-30
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """z' = r - beta |r| |z|^(n - 1) z - gamma r |z|^n, z in parts of its largest and beta + gamma = 1; moment -k z."""
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)

@@ -12,13 +12,13 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-_METRES = [0.1]  # a bending of one radian is felt a chord away
+_METRES = [0.1]  # m/rad: one radian of bending moves a point one chord away
 _FOAM_ROW = 4  # of stiffness: stretching along the span, which the rods leave to the foam
 _TINY = 1e-30
 _SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic motion depends on how it began
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Moment -k h, h being what of w is beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
 
     Dahl's friction: pulled on, rods slip the more the nearer h is to its largest; pulled back, they hold as springs.
@@ -28,7 +28,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
     stored, lost = load0(port.stored), load0(port.lost)
     for c in range(port.places):
-        if port.parameters[4, c, 0] == 0.0:  # no rods here, whoever it is
+        if port.parameters[4, c, 0] == 0.0:  # no rods here, in any individual
             store1(rate, c, 0.0)
             store1(decay, c, 0.0)
             store1(drive, c, 0.0)

@@ -10,7 +10,7 @@ from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
 from wingfit.sim.kernels.laws import point_port
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """Force -k (x - x_0) - c v on the point, in the world; parameters are k, c and the three coordinates of x_0."""
     port = point_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)

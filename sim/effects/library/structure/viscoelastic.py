@@ -10,10 +10,10 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-_METRES = [0.1, 0.1]  # a strain of one radian is felt a chord away
+_METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws have it)
+def _law(frame: Any, moment: int) -> None:
     """A Maxwell element about x and y, beside the spring and the damper: z' = r - z / tau, wrench -k z."""
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
