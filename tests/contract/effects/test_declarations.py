@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.sim.effects.rigs import bare, rig_of
+from tests.sim.effects.rigs import bare, recordings, rig_of
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis.rigs import subject_of
+from wingfit.records import Dataset
 from wingfit.sim.effects.contract import FAMILIES, Effect
 from wingfit.sim.effects.registry import EFFECTS
 
@@ -99,3 +102,12 @@ def test_a_contradictory_declaration_is_rejected(name: str, changes: dict[str, A
 def test_every_port_takes_some_family_and_every_family_has_a_port() -> None:
     assert {effect.port for effect in EFFECTS.values()} == set(FAMILIES)
     assert {effect.family for effect in EFFECTS.values()} == {family for taken in FAMILIES.values() for family in taken}
+
+
+@pytest.mark.parametrize("kind", ["wing", "vehicle"])
+def test_the_diagnosis_suspects_every_effect_that_is_no_term_of_the_model(kind: str) -> None:
+    model = bare(kind)
+    dataset = Dataset(kind, rig_of(model), (recordings(kind)["air"],))
+    suspects = [one.name for one in subject_of(dataset, CalibrationSpec(division="4")).suspects]
+    terms = getattr(model, "terms", ())
+    assert suspects == [name for name, where in CASES if where == kind and name not in terms]
