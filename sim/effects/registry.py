@@ -82,5 +82,5 @@ def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
         if not EFFECTS[name].applies_to(rig):
             kind = "wing" if isinstance(rig, Wing) else "vehicle"
             known = ", ".join(n for n, effect in EFFECTS.items() if effect.applies_to(rig))
-            raise ValueError(f"effect {name!r} does not apply to a {kind}; applicable are {known}: remove it")
+            raise ValueError(f"effect {name!r} does not apply to a {kind}; there are {known}: remove it")
     return tuple(effect for name, effect in EFFECTS.items() if name in wanted)
