@@ -65,6 +65,7 @@ def _describe(effect: Effect) -> None:
         ["acts on", f"{effect['port']} of a {' or '.join(effect['applies_to'])}"],
         ["power", "any" if effect["power"] == "any" else f"{effect['power']} only"],
         ["memory", effect["memory"] or "none"],
+        *(["law" if k == 0 else "", line] for k, line in enumerate(effect["law"].splitlines())),
         ["source", effect["source"]],
         ["looks like", effect["signature"]],
         ["confused with", ", ".join(effect["confused_with"]) or "–"],

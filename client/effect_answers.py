@@ -29,6 +29,7 @@ class Effect(TypedDict):
     port: str
     power: str
     memory: str | None
+    law: str
     source: str
     signature: str
     confused_with: list[str]

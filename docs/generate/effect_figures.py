@@ -1,7 +1,7 @@
-"""``python -m docs.generate.effect_figures [NAME ...]`` draws what effects do, all without names.
+"""Draw the figures of effects: ``python -m docs.generate.effect_figures [NAME ...]``, all of them without names.
 
-Each effect at its typical size against the nominal rig, without noise, solved with fixed steps: what it does to markers
-of the Robird's wing over the beat and over conditions, aligned as a recording is; and to the forces of the DelFly.
+Each effect at its typical size on the nominal rig, without noise, solved with fixed steps: its change of the markers of
+the Robird's wing over the beat and over conditions, aligned as a recording is, and of the forces of the DelFly.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ Array = npt.NDArray[np.float64]
 FOLDER = Path(__file__).parents[2] / "docs" / "effects" / "figures"
 LAG, FREQUENCY, AIRSPEED, EMPTY = math.radians(3.0), 3.0, 6.0, 10.0  # rad, Hz, m/s, mbar
 FREQUENCIES, AIRSPEEDS, PRESSURES = (2.0, 3.0, 4.0), (1.0, 3.5, 6.0, 8.5, 11.0), (10.0, 100.0, 300.0, 1000.0)
-OF_PRESSURE = ("residual_air", "added_mass")  # which the density of the air sets rather than its speed
-IN_VACUUM = ("residual_air",)  # drawn over the beat there
-GROWING = ("strobe_rate", "balance_drift")  # no two beats of a recording alike: drawn over all of it
-TRIAL = 3  # of the DelFly's eight tests, counted from 0: drawn over the beat
-LEAST = 0.01  # mm or mN, either way: no axis is finer
+OF_PRESSURE = ("residual_air", "added_mass")  # effects that depend on air density rather than airspeed
+IN_VACUUM = ("residual_air",)  # effects drawn over the beat in vacuum
+GROWING = ("strobe_rate", "balance_drift")  # effects that change from beat to beat: drawn over the whole recording
+TRIAL = 3  # test of the DelFly, from 0, that is drawn over the beat
+LEAST = 0.01  # mm or mN: smallest range of an axis to either side
 
 
 def panels(effect: Effect) -> list[Panel]:
-    """All panels of an effect: a row of three for the wing, a row of two for the vehicle, as far as it applies."""
+    """Panels of an effect: three in a row for the wing and two for the vehicle, where it applies."""
     made = {"wing": wing_panels, "vehicle": vehicle_panels}
     rigs = [rig_of(kind, quick=False) for kind in made]
     return [panel for rig in rigs if effect.applies_to(rig.description) for panel in made[rig.kind](rig, effect)]
@@ -75,12 +75,12 @@ def wing_panels(rig: Rig, effect: Effect) -> list[Panel]:
 
 
 def over_the_beat(rig: Rig, effect: Effect, recording: Recording, change: Array) -> Panel:
-    """What two markers do, along the axis on which they do most."""
+    """Displacement of two markers over the beat, along the axis of largest displacement."""
     wing = _wing_of(rig)
     shown = shown_markers(wing, effect)
     tracks = rig.unit * change.reshape(len(change), -1, 3)[:, list(shown.values())]
     squares = (tracks**2).sum(axis=(0, 1))
-    axis = int(np.argmax(squares >= 0.999 * squares.max()))  # the first of equals, whatever their rounding
+    axis = int(np.argmax(squares >= 0.999 * squares.max()))  # the first of axes that are equal within rounding
     if effect.name in GROWING:
         x, label, order = recording.times, "time, s", np.arange(len(recording.times))
     else:
@@ -95,7 +95,7 @@ def over_the_beat(rig: Rig, effect: Effect, recording: Recording, change: Array)
 
 
 def shown_markers(wing: Wing, effect: Effect) -> dict[str, int]:
-    """Two markers by what they are: of a fault of one marker that and its neighbour."""
+    """Indices of two markers by name: tip and mid-span, or the marker of a single-marker fault and its neighbour."""
 
     def at(station: float, chord: float) -> npt.NDArray[np.intp]:
         return np.asarray(nearest(wing, {"station": np.array([station]), "chord": np.array([chord])})[0])

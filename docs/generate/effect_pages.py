@@ -1,7 +1,7 @@
-"""Parts of docs/effects that follow from the code: ``python -m docs.generate.effect_pages`` writes them.
+"""Write the generated parts of docs/effects: ``python -m docs.generate.effect_pages``.
 
-A page is written by hand but for what stands between ``<!-- NAME -->`` and ``<!-- end of NAME -->``: that is taken from
-the effect's declaration, and a test says where it is stale.
+A page is written by hand except between ``<!-- NAME -->`` and ``<!-- end of NAME -->``: these blocks are generated from
+the effect's declaration, and a test fails where they are stale.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ FOLDER = ROOT / "docs" / "effects"
 INDEX = FOLDER.parent / "effects.md"
 _MEASURES: dict[Measure, str] = {"span": "spans", "chord": "mean chords", "mass": "wing masses"}
 _POWERS = {
-    "conservative": "It keeps energy: over a beat it neither gives nor takes any.",
+    "conservative": "It conserves energy: over a beat it neither gives nor takes any.",
     "dissipative": "It only takes energy.",
-    "any": "It may give energy or take it.",
+    "any": "It may give or take energy.",
 }
 
 
@@ -31,7 +31,7 @@ def page_of(name: str) -> Path:
 
 
 def filled(text: str, blocks: dict[str, str]) -> str:
-    """``text`` with its ``blocks``, by their names, up to date; ValueError for one that has no place in it."""
+    """``text`` with its named ``blocks`` updated; ValueError for a block without its pair of comments in it."""
     for name, block in blocks.items():
         opening, closing = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, found, rest = text.partition(opening)
@@ -43,12 +43,19 @@ def filled(text: str, blocks: dict[str, str]) -> str:
 
 
 def blocks_of(effect: Effect) -> dict[str, str]:
-    """What follows from an effect's declaration, by the names of the blocks of its page."""
-    return {"genes": genes(effect), "signature": signature(effect), "power": power(effect), "source": source(effect)}
+    """Generated blocks of the page of an effect, by name."""
+    law = "\n".join(f"    {line}" for line in effect.law.splitlines())
+    return {
+        "law": law,
+        "genes": genes(effect),
+        "signature": signature(effect),
+        "power": power(effect),
+        "source": source(effect),
+    }
 
 
 def genes(effect: Effect) -> str:
-    """Table of the genes. Bounds that grow with the rig are told in parts of it."""
+    """Table of the genes. Bounds that grow with the rig are multiples of its span, mean chord or wing mass."""
     lines = ["| gene | kind | unit | bounds | typical | what it is |", "|---|---|---|---|---|---|"]
     for one in effect.parameters:
         kind = "size" if one in effect.size else "place" if one.place else "shape"
@@ -63,21 +70,21 @@ def _of(parameter: Parameter) -> str:
 
 
 def signature(effect: Effect) -> str:
-    """How to know it in a recording, and what for it may be taken."""
+    """How it looks in a recording, and the effects that look alike."""
     others = ", ".join(f"[{EFFECTS[name].title}]({name}.md)" for name in effect.confused_with)
     return f"{effect.signature[0].upper()}{effect.signature[1:]}. Easily confused with: {others}."
 
 
 def power(effect: Effect) -> str:
-    """Where it acts, what it does with energy, and what it remembers."""
-    memory = f"It remembers {effect.memory}." if effect.memory else "It has no memory."
+    """Port, energy exchange and internal states."""
+    memory = f"Internal states: {effect.memory}." if effect.memory else "It has no internal states."
     if effect.port == "observation":
-        return f"Acts on what is observed, after the simulation: it has no part in the energy. {memory}"
+        return f"Port: observation. It acts after the simulation and exchanges no energy. {memory}"
     return f"Port: {effect.port}. {_POWERS[effect.power]} {memory}"
 
 
 def source(effect: Effect) -> str:
-    """Where the law is from, and where it is tested."""
+    """Source of the law, and its test file."""
     (tests,) = (ROOT / "tests" / "sim" / "effects").glob(f"*/test_{effect.name}.py")
     return f"{effect.source}.\n\nTests: `{tests.relative_to(ROOT)}`."
 
@@ -99,7 +106,7 @@ def index() -> str:
 
 
 def files(names: Iterable[str]) -> dict[Path, dict[str, str]]:
-    """Blocks of every file: the index and the pages of ``names``."""
+    """Generated blocks of every file: the index and the pages of ``names``."""
     return {INDEX: {"effects": index()}} | {page_of(name): blocks_of(EFFECTS[name]) for name in names}
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import BaseModel
 
-Applies = Literal["wing", "vehicle"]
+from wingfit.records.genes import Scale
+from wingfit.sim.effects.contract import Family, Measure, Port, Power, RigKind
 
 
 class ParameterOut(BaseModel):
@@ -18,11 +17,11 @@ class ParameterOut(BaseModel):
 
     name: str
     unit: str
-    of: Literal["span", "chord", "mass"] | None
+    of: Measure | None
     lower: float
     upper: float
     typical: float
-    scale: Literal["log", "linear"]
+    scale: Scale
     size: bool
     place: bool
     description: str
@@ -36,14 +35,15 @@ class EffectOut(BaseModel):
 
     name: str
     title: str
-    family: Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
-    port: Literal["inertia", "connector", "drive", "air", "observation"]
-    power: Literal["conservative", "dissipative", "any"]
+    family: Family
+    port: Port
+    power: Power
     memory: str | None
+    law: str
     source: str
     signature: str
     confused_with: list[str]
-    applies_to: list[Applies]
+    applies_to: list[RigKind]
     parameters: list[ParameterOut]
 
 

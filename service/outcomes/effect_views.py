@@ -28,6 +28,7 @@ def _effect(found: Effect) -> EffectOut:
         port=found.port,
         power=found.power,
         memory=found.memory or None,
+        law=found.law,
         source=found.source,
         signature=found.signature,
         confused_with=list(found.confused_with),

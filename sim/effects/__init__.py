@@ -1,1 +1,1 @@
-"""The physics that a recording may contain and a baseline model may lack: one file per effect, and a contract."""
+"""Physics and measurement faults that a recording may contain and a model may lack: one file each, and a contract."""

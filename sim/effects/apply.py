@@ -1,4 +1,4 @@
-"""Effects on an observation, applied to those individuals for which they are on."""
+"""Apply effects on an observation to the individuals for which they are on."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Array = npt.NDArray[np.float64]
 
 
 def observed(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, kind: str) -> list[Effect]:
-    """Effects that act on the observation of some of ``genomes`` [B, G]."""
+    """Effects on observations of ``kind`` ("tracks", "forces") that are on in at least one of ``genomes`` [B, G]."""
     return [e for e in effects if e.observe and kind in e.observed and not e.off(e.values(genes, genomes)).all()]
 
 
 def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sampling: Sampling) -> None:
-    """Let each effect act on those of ``genomes`` [B, G] for which it is on: nobody's numbers depend on others."""
+    """Change ``sampling`` by each effect in turn, only for those of ``genomes`` [B, G] in which it is on."""
     for effect in effects:
         values = effect.values(genes, genomes)
         on = np.flatnonzero(~effect.off(values))

@@ -1,11 +1,12 @@
 """What every effect declares, and the three places where it may act: a wing, a vehicle, an observation.
 
-An effect has a size: parameters of which zero switches it off exactly. Its other parameters say where it acts and how;
-they have no meaning at size zero. All become genes, which a calibration searches like any other.
+An effect has sizes: parameters that switch it off exactly where all of them are zero. Its other parameters say where it
+acts and how; they have no meaning then. All become genes, which a calibration searches like any other.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
@@ -24,11 +25,20 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
-Port = Literal["inertia", "connector", "drive", "air", "observation"]
+Port = Literal["inertia", "connector", "point", "drive", "air", "observation"]
 Power = Literal["conservative", "dissipative", "any"]
 Measure = Literal["span", "chord", "mass"]
 RigKind = Literal["wing", "vehicle"]
 Values = Mapping[str, Array]  # parameters of one effect by name, one value per individual
+FAMILIES: dict[Port, tuple[Family, ...]] = {
+    "inertia": ("inertia", "aerodynamics"),
+    "connector": ("structure", "actuation"),
+    "point": ("structure", "actuation"),
+    "drive": ("actuation",),
+    "air": ("aerodynamics",),
+    "observation": ("measurement",),
+}
+"""Families of effects that each port takes. A load of the air belongs on the air's ports, where it counts as such."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +48,11 @@ class Parameter:
     Attributes:
         name: short; the gene is called EFFECT.NAME.
         unit: of the gene; "1" without dimension.
-        lower, upper: bounds, in ``unit`` or, where ``of`` is given, in parts of that measure of the rig.
-        typical: a size that is met in practice; of the other parameters, their nominal value. As the bounds.
-        description: what it is.
-        of: the measure of the rig that bounds and typical value are parts of: its span (m), its mean chord (m) or the
-            mass of the wing (kg).
+        lower, upper: bounds, in ``unit`` or, where ``of`` is given, as multiples of that measure of the rig.
+        typical: a size met in practice; for the other parameters, their nominal value. In the unit of the bounds.
+        description: what it is, for users.
+        of: the measure of the rig that scales bounds and typical value: its span (m), its mean chord (m) or the mass of
+            the wing (kg).
         place: whether it says where on the wing the effect acts.
         scale: how a search spreads over the bounds.
     """
@@ -60,24 +70,24 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One piece of physics, or one fault of a measurement.
+    """One piece of physics, or one fault of a measurement. ValueError where :data:`FAMILIES` or the law contradict it.
 
     Attributes:
-        name: of the file as well, and of the page docs/effects/NAME.md.
-        title: for people.
-        family: what kind of thing it is.
+        name: also of its file, and of its page docs/effects/NAME.md.
+        title: for users.
+        family: kind of physics.
         port: where it enters the model.
-        size: zero of all of these switches it off exactly.
+        size: parameters that switch it off exactly where all are zero.
         shape: the other parameters.
-        power: what its own law does with energy: "conservative" only keeps it (over a beat it gives and takes none),
-            "dissipative" takes some at every instant, "any" promises nothing: it gives energy, or changes what the
-            wing's other laws take. Of the air both promises hold in still air only: a stream pushes.
+        power: energy exchange of its own law: "conservative" gives and takes none over a beat, "dissipative" takes some
+            at every instant, "any" makes no promise. Laws of the air keep both promises in still air only.
         memory: its internal states in words; empty where it has none.
+        law: its equations, one a line, with the names of its parameters; at least one of the sizes is among them.
         source: where the law is from (author, year, equation).
         signature: one line: what it looks like in a recording.
         confused_with: names of effects that look alike.
-        wing, vehicle: what it does to a scene before it is simulated; None where it does not apply.
-        observe: what it does to a simulated beat on its way into the recording; None where nothing.
+        wing, vehicle: changes a scene before it is simulated; None where the effect does not apply.
+        observe: changes a simulated beat on its way into the recording; for the port "observation" alone.
         observed: kinds of recording that ``observe`` acts on.
     """
 
@@ -86,6 +96,7 @@ class Effect:
     family: Family
     port: Port
     size: tuple[Parameter, ...]
+    law: str
     source: str
     signature: str
     confused_with: tuple[str, ...]
@@ -97,29 +108,47 @@ class Effect:
     observe: Callable[[Sampling, Values], None] | None = None
     observed: tuple[Literal["tracks", "forces"], ...] = ()
 
+    def __post_init__(self) -> None:
+        if self.family not in FAMILIES[self.port]:
+            raise ValueError(
+                f"effect {self.name!r}: family {self.family!r} does not fit port {self.port!r}, which takes "
+                f"{' or '.join(map(repr, FAMILIES[self.port]))}: change the family, or act through another port"
+            )
+        observing = self.port == "observation"
+        if bool(self.observe) != observing or bool(self.observed) != observing:
+            raise ValueError(
+                f"effect {self.name!r} on port {self.port!r}: observe and observed belong to port 'observation', and "
+                "both are needed there"
+            )
+        if "=" not in self.law or not {p.name for p in self.size} & set(re.findall(r"\w+", self.law)):
+            raise ValueError(
+                f"effect {self.name!r}: its law {self.law!r} must be an equation that names at least one of its sizes "
+                f"{', '.join(p.name for p in self.size)}: write it with the names of the parameters"
+            )
+
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All: sizes, then the others."""
+        """Sizes, then the others."""
         return (*self.size, *self.shape)
 
     @property
     def rigs(self) -> tuple[RigKind, ...]:
-        """Whose models can contain it."""
+        """Kinds of rig that it applies to."""
         on_wing = self.wing is not None or "tracks" in self.observed
         on_vehicle = self.vehicle is not None or "forces" in self.observed
         both: tuple[tuple[RigKind, bool], ...] = (("wing", on_wing), ("vehicle", on_vehicle))
         return tuple(rig for rig, acts in both if acts)
 
     def applies_to(self, rig: Wing | Vehicle) -> bool:
-        """Whether a model of ``rig`` can contain it."""
+        """Whether it applies to ``rig``."""
         return ("wing" if isinstance(rig, Wing) else "vehicle") in self.rigs
 
     def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
-        """Genes for ``rig``: switched off, all else at its typical value."""
+        """Genes for ``rig``: sizes nominally zero, the others at their typical values."""
         return tuple(self._gene(parameter, rig) for parameter in self.parameters)
 
     def typical(self, rig: Wing | Vehicle) -> dict[str, float]:
-        """Values of the genes for ``rig`` at which the effect is as large as it is met in practice."""
+        """Typical values of all genes for ``rig``, in their units."""
         return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters}
 
     def values(self, genes: tuple[Gene, ...], genomes: Array) -> dict[str, Array]:
@@ -128,7 +157,7 @@ class Effect:
         return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
 
     def off(self, values: Values) -> npt.NDArray[np.bool_]:
-        """Which individuals [B] it is switched off for."""
+        """Whether it is switched off, for each individual [B]."""
         return np.asarray(np.all([values[p.name] == 0.0 for p in self.size], axis=0))
 
     def _gene(self, parameter: Parameter, rig: Wing | Vehicle) -> Gene:
@@ -137,6 +166,18 @@ class Effect:
         lower, upper = parameter.lower * unit, parameter.upper * unit
         name = f"{self.name}.{parameter.name}"
         return Gene(name, parameter.unit, nominal, lower, upper, parameter.scale, parameter.description)
+
+
+def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
+    """Shape parameters of an effect at one place of the wing, by the typical place."""
+    return (
+        Parameter(
+            "station", "1", 0.0, 1.0, station, "place along the span, fraction of it from root to tip", place=True
+        ),
+        Parameter(
+            "chord", "1", 0.0, 1.0, chord, "place along the chord, fraction of it from the leading edge", place=True
+        ),
+    )
 
 
 def measure(rig: Wing | Vehicle, of: Measure | None) -> float:

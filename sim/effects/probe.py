@@ -1,7 +1,7 @@
-"""A known load on the wing, given by its place along the span and in the beat, or a known motion of its drive.
+"""A given load on the wing, by its place along the span and its phase, or a given motion of its drive.
 
-A probe, no suspect: what the tracks answer to it tells which load is missing where a model and a recording differ, or
-which motion. It is not in the registry: a search for what is missing must not name it.
+The response of the tracks to it shows which load or motion is missing where model and recording differ. It is not in
+the registry, because a search for missing physics must not propose it.
 """
 
 from __future__ import annotations
@@ -19,27 +19,26 @@ from wingfit.sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE,
 from wingfit.sim.kernels.jit import inlined
 from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-LARGEST = 1000.0  # N/m, of a gene: far beyond what a wing bears
-_FURTHEST = 90.0  # deg, likewise of what a rod turns further
-_THINNEST = 1e-9  # kg/m^3: loads are told as parts of the air's, so that there must be some
-_CUTS = 1200  # of the span, for the means of its hats
+LARGEST = 1000.0  # N/m, bound of a gene: far beyond the strength of a wing
+_FURTHEST = 90.0  # deg, bound of the additional angle of a rod
+_THINNEST = 1e-9  # kg/m^3: the loads are given as loads of the air, in proportion to its density
+_CUTS = 1200  # pieces of the span over which the hat functions are averaged
 
 
 @dataclass(frozen=True)
 class Probe:
     """A force per metre of span, N/m: hat functions over ``stations`` times a Fourier series of the drive phase.
 
-    ``stations`` in parts of the span, rising from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency. It acts
-    along the normal of the wing where it is, upward, and is spread over the chord. With ``turning`` there is a moment
-    about the span as well, nose up, N m/m: a force before or behind the middle of the chord is both. With ``driving``
-    both rods turn further by such a series each, deg, the rear one later by its lag. The genes of the effects
-    (:meth:`effects`) are numbered station by station, forces first, rods last: constant, cosines, sines
-    (:meth:`terms`).
+    ``stations`` are fractions of the span, increasing from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency.
+    The force acts upward along the normal of the wing and is spread over the chord. ``turning`` adds a moment about the
+    span, nose up, N m/m. ``driving`` adds such a series to the angle of each rod, deg, later by its lag for the rear
+    one. The genes of the effects (:meth:`effects`) are ordered station by station, forces first, rods last, each as
+    constant, cosines, sines (:meth:`terms`).
     """
 
     stations: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -56,17 +55,17 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of its genes, P = stations times (1 + 2 harmonics), twice that with moments; and of two rods."""
+        """Number of genes: stations times (1 + 2 harmonics), twice that with moments, and those of two rods."""
         return self.loads + (2 * (1 + 2 * self.harmonics) if self.driving else 0)
 
     @property
     def loads(self) -> int:
-        """Number of those that are forces or moments."""
+        """Number of genes that are forces or moments."""
         return self.forces * (2 if self.turning else 1)
 
     @property
     def forces(self) -> int:
-        """Number of those that are forces."""
+        """Number of genes that are forces."""
         return len(self.stations) * (1 + 2 * self.harmonics)
 
     def terms(self, phase: npt.ArrayLike) -> Array:
@@ -75,14 +74,14 @@ class Probe:
         return np.concatenate([np.ones((*turn.shape[:-1], 1)), np.cos(turn), np.sin(turn)], axis=-1)
 
     def hats(self, span: npt.ArrayLike) -> Array:
-        """Hat functions [..., stations] at parts of the ``span`` [...]."""
+        """Hat functions [..., stations] at fractions of the ``span`` [...]."""
         y = np.asarray(span, float)
         return np.stack([np.interp(y, self.stations, row) for row in np.eye(len(self.stations))], axis=-1)
 
     def on_strips(self, structure: Structure) -> tuple[Array, Array]:
         """Force on each strip per size of each hat [S, stations], m, and its moment about the strip's middle, m^2.
 
-        The moment is about the chord, tip up: a load acts on the strip that it lies on, where it lies.
+        The moment is about the chord, tip up. Each piece of load acts on the strip under it.
         """
         edges = structure.planform.strips(structure.division)
         span = (np.arange(_CUTS) + 0.5) / _CUTS
@@ -94,14 +93,14 @@ class Probe:
         return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
     def effects(self) -> tuple[Effect, ...]:
-        """Load and motion as effects, for :class:`sim.wing.flexible_wing.FlexibleWing`, whose field ``probe`` it is."""
+        """Load and motion as effects of a :class:`wingfit.sim.wing.flexible_wing.FlexibleWing` with this probe."""
         return (self._load(), self._motion()) if self.driving else (self._load(),)
 
     @property
     def _series(self) -> dict[str, str]:
         """Names of the terms, and what they are."""
         kinds = {"c": "cosine", "s": "sine"}
-        terms = {f"{kind}{k}": f"{told} {k}" for kind, told in kinds.items() for k in range(1, self.harmonics + 1)}
+        terms = {f"{kind}{k}": f"{word} {k}" for kind, word in kinds.items() for k in range(1, self.harmonics + 1)}
         return {"0": "constant", **terms}
 
     def _motion(self) -> Effect:
@@ -111,12 +110,15 @@ class Probe:
             family="actuation",
             port="drive",
             size=tuple(
-                Parameter(f"{rod}_{name}", "deg", -_FURTHEST, _FURTHEST, 0.1, f"{rod} rod turns further, {told}")
+                Parameter(
+                    f"{rod}_{name}", "deg", -_FURTHEST, _FURTHEST, 0.1, f"additional angle of the {rod} rod, {term}"
+                )
                 for rod in ("front", "rear")
-                for name, told in self._series.items()
+                for name, term in self._series.items()
             ),
+            law="zeta_front = zeta + front_0 + sum_k front_ck cos k psi + front_sk sin k psi, and the rear rod alike",
             source="Fourier series of the drive phase, for each rod",
-            signature="whatever one wishes",
+            signature="any",
             confused_with=(),
             wing=_drive,
         )
@@ -135,14 +137,15 @@ class Probe:
                     -LARGEST,
                     LARGEST,
                     1.0,
-                    f"{told} per metre of span at {y:g} of it, {what}",
+                    f"{what} per metre of span at {y:g} of it, {term}",
                 )
-                for load, unit, told in loads
+                for load, unit, what in loads
                 for j, y in enumerate(self.stations)
-                for name, what in self._series.items()
+                for name, term in self._series.items()
             ),
-            source="sum of hats of the span times Fourier series of the drive phase: any load, as well as these can",
-            signature="whatever one wishes",
+            law="f = sum_j hat_j(y) (j_0 + sum_k j_ck cos k psi + j_sk sin k psi), with 0_0 at the root",
+            source="hat functions of the span times Fourier series of the drive phase",
+            signature="any",
             confused_with=(),
             wing=partial(_wing, self),
         )
@@ -157,25 +160,23 @@ def strip_middles(structure: Structure) -> Array:
 
 
 def _push(frame: Any, moment: int) -> None:
-    """F = sum of a_k cos k psi + b_k sin k psi per strip, with what the step's method asks of its rate of change."""
-    if moment == AFTER:
-        _series(frame, PUSH_N)
+    """The normal force on each strip."""
+    _series(frame, PUSH_N)
 
 
 def _roll(frame: Any, moment: int) -> None:
-    """The same of the moment by which forces act beside the middle of their strip."""
-    if moment == AFTER:
-        _series(frame, PUSH_L)
+    """The moment of the forces about the middle of their strip."""
+    _series(frame, PUSH_L)
 
 
 def _turn(frame: Any, moment: int) -> None:
-    """The same of a moment about the span."""
-    if moment == AFTER:
-        _series(frame, PUSH_M)
+    """The moment about the span."""
+    _series(frame, PUSH_M)
 
 
 @inlined
 def _series(frame: Any, which: int) -> None:
+    """Add sum_k a_k cos k psi + b_k sin k psi to a load, with the stage's share of its rate of change in a step."""
     port = strip_port(frame)
     harmonics = len(port.parameters) // 2
     share = load1(port.clock, SHARE)

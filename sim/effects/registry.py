@@ -8,14 +8,15 @@ from importlib import import_module
 from wingfit.records import Vehicle, Wing
 from wingfit.sim.effects.contract import Effect
 
-# One line each: a file of the library that declares EFFECT.
+# Files of the library, each of which declares EFFECT.
 _PLACES: tuple[str, ...] = (
-    # structure: what changes the springs before what takes its measure from them
+    # structure: changes of the springs before effects in proportion to their stiffness
     "structure.damage",
     "structure.cubic_stiffness",
     "structure.rod_slip",
     "structure.hysteresis",
     "structure.viscoelastic",
+    "structure.tether",
     # inertia
     "inertia.lumped_mass",
     "inertia.mass_offset",
@@ -28,8 +29,8 @@ _PLACES: tuple[str, ...] = (
     "actuation.hinge_offset",
     "actuation.compliant_drive",
     "actuation.backlash",
-    # aerodynamics, in the order in which each sees what the last changed: stream, coefficients of the angle of attack,
-    # circulation of all kinds, wake
+    # aerodynamics, each acting on the result of those before: stream, coefficients of the angle of attack, circulation,
+    # wake
     "aerodynamics.residual_air",
     "aerodynamics.airspeed_error",
     "aerodynamics.added_mass",
@@ -44,7 +45,7 @@ _PLACES: tuple[str, ...] = (
     "aerodynamics.tip_loss",
     "aerodynamics.induced_inflow",
     "aerodynamics.wake_capture",
-    # measurement, on the way of a track: wing, image, tracker, frame
+    # measurement of tracks, along the path of the signal: wing, image, tracker, frame
     "cameras.marker_slip",
     "cameras.rolling_shutter",
     "cameras.camera_desync",
@@ -53,13 +54,13 @@ _PLACES: tuple[str, ...] = (
     "cameras.tracker_lag",
     "cameras.camera_rotation",
     "cameras.camera_shift",
-    # of a force: axes, mount, amplifier
+    # measurement of forces: axes, mount, amplifier
     "balance.balance_tilt",
     "balance.balance_resonance",
     "balance.filter_delay",
     "balance.balance_offset",
     "balance.balance_drift",
-    # of both
+    # measurement of both
     "recording.scale_error",
     "recording.clock_offset",
     "recording.strobe_rate",
@@ -71,7 +72,7 @@ EFFECTS: dict[str, Effect] = {
 
 
 def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
-    """The effects called ``names``, in the order of the registry; ValueError for one unknown, repeated or of no use."""
+    """Effects by ``names``, in the order of the registry; ValueError if unknown, repeated or not for ``rig``."""
     wanted = list(names)
     for name in wanted:
         if name not in EFFECTS:
@@ -81,5 +82,5 @@ def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
         if not EFFECTS[name].applies_to(rig):
             kind = "wing" if isinstance(rig, Wing) else "vehicle"
             known = ", ".join(n for n, effect in EFFECTS.items() if effect.applies_to(rig))
-            raise ValueError(f"effect {name!r} does not apply to a {kind}; there are {known}: leave it out")
+            raise ValueError(f"effect {name!r} does not apply to a {kind}; there are {known}: remove it")
     return tuple(effect for name, effect in EFFECTS.items() if name in wanted)

@@ -88,14 +88,20 @@ class Laws(NamedTuple):
     """Compiled laws of the effects chosen.
 
     ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, where in
-    ``parameters`` [., W] and in the states [Z, W] they start, where in ``axes`` its states' axes start. ``axes``: of
-    each state per connector, 0..5 as in stiffness. ``size`` [Z]: a state times this is comparable with metres.
+    ``parameters`` [., W] and in the states [Z, W] they start; of a strip whether it is called BEFORE the flow is known,
+    of a connector where in ``axes`` its states' axes start. ``axes``: of each state per connector, 0..5 as in
+    stiffness. ``size`` [Z]: a state times this is comparable with metres. ``point`` [L, 5]: address of the law, number
+    of parameters and of points, where in ``parameters`` and among the points they start; ``bodies`` [P] of the points,
+    and where they lie on these, ``arms`` [P, 3, W].
     ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
     """
 
     strip: Index
     connector: Index
+    point: Index
     axes: Index
+    bodies: Index
+    arms: Array
     parameters: Array
     size: Array
     motor: Array
@@ -182,8 +188,16 @@ class Work(NamedTuple):
     push: Array
     rods: Array
     clock: Array
+    place: Array
+    turn: Array
+    point_twist: Array
+    point_wrench: Array
+    point_k: Array
+    point_d: Array
+    drag: Array
     strip_frames: Index
     connector_frames: Index
+    point_frames: Index
     parameters: Array
     density: Array
     wind: Array
@@ -213,7 +227,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
     motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
-    joints = (c if len(laws.connector) else 0, 6)
+    joints, points = (c if len(laws.connector) else 0, 6), len(laws.bodies)
     blocks = n + 2 * len(wiring.below) + c - wiring.driven
     scratch = several(
         {
@@ -259,6 +273,13 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
             "push": joints,
             "rods": (2, 3),
             "clock": (CLOCK,),
+            "place": (points, 3),
+            "turn": (points, 9),
+            "point_twist": (points, 6),
+            "point_wrench": (points, 6),
+            "point_k": (points, 36),
+            "point_d": (points, 36),
+            "drag": (points, 36),
         }
     )
     work = Work(
@@ -266,6 +287,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
         against=aligned(-lanes.damping),
         strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
         connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
+        point_frames=np.zeros((len(laws.point), FRAME), np.int64),
         # whose addresses are in the frames, so that they live as long
         parameters=laws.parameters,
         density=setting.density,
@@ -286,6 +308,11 @@ def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> Non
         tangents = (work.z_tangent[kind, row[4] :] for kind in (DECAY, DRIVE, PULL))
         states = (work.z[row[4] :], work.z_rate[row[4] :], *tangents)
         work.connector_frames[k] = _frame(len(wiring.first), row, (laws.parameters[row[3] :], *states, *joints))
+    points = (work.place, work.turn, work.point_twist, work.point_wrench, work.point_k, work.point_d)
+    for k, row in enumerate(laws.point):
+        own_points = (array[row[4] :] for array in points)
+        arrays = (laws.parameters[row[3] :], *own_points, work.lost, work.stored, work.clock)
+        work.point_frames[k] = _frame(int(row[2]), row, arrays)
 
 
 def _frame(places: int, row: Index, arrays: tuple[Array, ...]) -> list[int]:

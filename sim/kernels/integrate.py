@@ -39,6 +39,7 @@ from wingfit.sim.kernels.laws import AFTER, BEFORE, call
 from wingfit.sim.kernels.linear import factor, solve, subtract_column
 from wingfit.sim.kernels.masses import add_energies, add_mass_blocks, add_mass_terms, add_momentum
 from wingfit.sim.kernels.motor import give_way, rods_of
+from wingfit.sim.kernels.points import add_point_blocks, add_point_terms, add_point_wrenches, follow_points
 from wingfit.sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
 from wingfit.sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
 from wingfit.sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
@@ -135,6 +136,21 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
         work.flow, work.loads, len(laws.strip) > 0,
         work.R, work.V, w_, work.normal_damping, work.air_power, work.air_force,
     )  # fmt: skip
+    if len(laws.point):
+        point_forces(lanes, work)
+
+
+@kernel
+def point_forces(lanes: Lanes, work: Work) -> None:
+    """Add the wrenches of the laws of points to those of the bodies, and what they lose and keep to the lanes."""
+    laws = lanes.laws
+    work.point_wrench[:] = 0.0
+    work.point_k[:] = 0.0
+    work.point_d[:] = 0.0
+    follow_points(laws.bodies, laws.arms, work.R, work.p, work.V, work.place, work.turn, work.point_twist)
+    for k in range(len(laws.point)):
+        call(laws.point[k, 0], work.point_frames[k].ctypes.data, AFTER)
+    add_point_wrenches(laws.bodies, laws.arms, work.R, work.point_wrench, work.wrench)
 
 
 @kernel
@@ -143,7 +159,8 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     laws = lanes.laws
     work.induced[:] = 0.0
     for k in range(len(laws.strip)):
-        call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, BEFORE)
+        if laws.strip[k, 5]:
+            call(laws.strip[k, 0], work.strip_frames[k].ctypes.data, BEFORE)
     strip_flow(
         wiring.strip_start, wiring.weight, wiring.centroid, setting.wind, lanes.coefficients,
         work.induced, work.R, work.p, work.V, work.flow, work.loads,
@@ -211,6 +228,11 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
         add_mass_blocks(
             lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R0, work.V0, hg, work.blocks
         )
+    if len(lanes.laws.point):
+        add_point_blocks(
+            lanes.laws.bodies, lanes.laws.arms, work.R0, work.V0, work.point_wrench, work.point_k, work.point_d, hg,
+            work.drag, work.blocks,
+        )  # fmt: skip
     factor(wiring.order, wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
@@ -231,6 +253,8 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
         add_mass_terms(
             lanes.pairs, lanes.masses, lanes.weighing, setting.wind, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench
         )
+    if len(lanes.laws.point):
+        add_point_terms(lanes.laws.bodies, work.drag, r_xi, wrench)
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)
     if len(work.z):
         start_states(wiring, lanes.laws, setting.step, COUPLING[stage], stage, work)

@@ -1,11 +1,11 @@
 """Compiled laws of effects, called by address: the integrator is compiled once, whichever effects are on.
 
 A law is a function ``law(frame, moment)`` that is compiled by itself, cached by the content of its own file and of the
-kernels, and only where it is used (:func:`address`). ``strip_port(frame)`` or ``connector_port(frame)`` opens what it
-may read and add to; arrays end in the lanes, to be used with the functions of :mod:`wingfit.sim.kernels.lanes.vector`.
-Laws of the air are called at two moments of every stage: BEFORE the flow of the strips is known, when they may set the
-induced velocity from their states, and AFTER it, when they change the loads and give the rates of their states. Laws of
-connectors are called once, AFTER.
+kernels, and only where it is used (:func:`address`). ``strip_port(frame)``, ``connector_port(frame)`` or
+``point_port(frame)`` opens what it may read and add to; arrays end in the lanes, to be used with the functions of
+:mod:`wingfit.sim.kernels.lanes.vector`. Laws of the air are called at two moments of every stage: BEFORE the flow of
+the strips is known, when they may set the induced velocity from their states, and AFTER it, when they change the loads
+and give the rates of their states. Laws of connectors and of points are called once, AFTER.
 """
 
 from __future__ import annotations
@@ -82,6 +82,30 @@ class ConnectorPort(NamedTuple):
     stored: Array
 
 
+class PointPort(NamedTuple):
+    """What a law of points of bodies sees. P points; parameters [N, P, W] are its own; all else is in the world.
+
+    A point lies elsewhere in each individual, often on another body: where all parameters are zero, the law must give
+    nothing. Read: ``place`` [P, 3, W] (m), ``turn`` [P, 9, W], the rotation of the body, ``twist`` [P, 6, W], its
+    angular velocity and the velocity of the point (rad/s, m/s), ``clock`` as for a strip. Add to: ``wrench``
+    [P, 6, W], moment about the point and force on it (N m, N); ``stiffness`` and ``damping`` [P, 36, W], minus its
+    derivatives by the motion (rotation, displacement) and by the twist, 6 x 6 row by row; ``lost`` and ``stored`` [W],
+    power that the wing loses (W; what it is given counts as negative) and energy stored (J).
+    """
+
+    places: int
+    parameters: Array
+    place: Array
+    turn: Array
+    twist: Array
+    wrench: Array
+    stiffness: Array
+    damping: Array
+    lost: Array
+    stored: Array
+    clock: Array
+
+
 @intrinsic
 def _doubles(typingctx: Any, address: Any) -> Any:  # noqa: ARG001
     """An address as a pointer to floats."""
@@ -147,6 +171,25 @@ def connector_port(frame: Any) -> ConnectorPort:
         carray(_doubles(frame[14]), (C, 6, LANES)),
         carray(_doubles(frame[15]), (LANES,)),
         carray(_doubles(frame[16]), (LANES,)),
+    )
+
+
+@inlined
+def point_port(frame: Any) -> PointPort:
+    """Open the frame of a law of points of bodies."""
+    K, P = frame[0], frame[1]
+    return PointPort(
+        K,
+        carray(_doubles(frame[3]), (P, K, LANES)),
+        carray(_doubles(frame[4]), (K, 3, LANES)),
+        carray(_doubles(frame[5]), (K, 9, LANES)),
+        carray(_doubles(frame[6]), (K, 6, LANES)),
+        carray(_doubles(frame[7]), (K, 6, LANES)),
+        carray(_doubles(frame[8]), (K, 36, LANES)),
+        carray(_doubles(frame[9]), (K, 36, LANES)),
+        carray(_doubles(frame[10]), (LANES,)),
+        carray(_doubles(frame[11]), (LANES,)),
+        carray(_doubles(frame[12]), (CLOCK, LANES)),
     )
 
 

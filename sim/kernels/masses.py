@@ -23,9 +23,11 @@ from wingfit.sim.kernels.connectors import add_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
+    Six,
     Three,
     add_to_block,
     cross,
+    load_block,
     load_vector,
     plus,
     product,
@@ -39,22 +41,6 @@ from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-Six = tuple[Nine, Nine, Nine, Nine]
-
-
-@inlined
-def _quarter(masses: Array, k: int, at: int) -> Nine:
-    """Three rows and columns of matrix k from element ``at`` on."""
-    return (
-        load(masses, k, at), load(masses, k, at + 1), load(masses, k, at + 2),
-        load(masses, k, at + 6), load(masses, k, at + 7), load(masses, k, at + 8),
-        load(masses, k, at + 12), load(masses, k, at + 13), load(masses, k, at + 14),
-    )  # fmt: skip
-
-
-@inlined
-def _matrix(masses: Array, k: int) -> Six:
-    return _quarter(masses, k, 0), _quarter(masses, k, 3), _quarter(masses, k, 18), _quarter(masses, k, 21)
 
 
 @inlined
@@ -101,7 +87,7 @@ def add_momentum(
     """Add what turning does to the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
-        M, omega = _matrix(masses, k), load_vector(V, i, 0)
+        M, omega = load_block(masses, k), load_vector(V, i, 0)
         h, p = _times(M, load_vector(V, j, 0), load_vector(V, j, 3))
         t, s, f = cross(h, omega), cross(p, load_vector(V, i, 3)), cross(p, omega)
         add_wrench(wrench, i, (t[0] + s[0], t[1] + s[1], t[2] + s[2]), f)
@@ -142,7 +128,7 @@ def add_mass_blocks(
     """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
     for k in range(weighing):
         i = pairs[k, 0]
-        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
+        M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         h, p = _times(M, omega, v)
         zero = scaled(0.0, M[0])
         own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
@@ -152,7 +138,7 @@ def add_mass_blocks(
         turned = scaled(length * gravity, skew((load(R, i, 6), load(R, i, 7), load(R, i, 8))))
         add_to_block(blocks, i, (skew_times(_first_moment(M), turned), zero, product(M[3], turned), zero))
     for k in range(weighing, len(pairs)):
-        j, M = pairs[k, 1], _matrix(masses, k)
+        j, M = pairs[k, 1], load_block(masses, k)
         omega, w = load_vector(V, j, 0), _in_body(R, j, wind)
         v, factor = load_vector(V, j, 3), 1.0 / length
         A = (scaled(factor, M[0]), scaled(factor, M[1]), scaled(factor, M[2]), scaled(factor, M[3]))
@@ -206,7 +192,7 @@ def add_mass_terms(
     """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
-        M, omega, v = _matrix(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
+        M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         x, y = load_vector(X, j, 0), load_vector(X, j, 3)
         u, w = load_vector(lead, j, 0), load_vector(lead, j, 3)
         a, b = _times(
@@ -256,7 +242,7 @@ def add_energies(
     """Add the kinetic energy of all pairs and the height of those of weight."""
     for k in range(len(pairs)):
         i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
-        M, own = _matrix(masses, k), _relative(V, R, i, wind, air)
+        M, own = load_block(masses, k), _relative(V, R, i, wind, air)
         h, q = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
         omega = load_vector(V, i, 0)
         work = h[0] * omega[0] + h[1] * omega[1] + h[2] * omega[2] + q[0] * own[0] + q[1] * own[1] + q[2] * own[2]

@@ -23,6 +23,7 @@ from wingfit.sim.kernels.connectors import add_wrench, coupling_wrench, damper_w
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
+    Six,
     Three,
     add_to_block,
     axial,
@@ -52,7 +53,6 @@ from wingfit.sim.kernels.lanes.vector import load, load1, store
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
-Six = tuple[Nine, Nine, Nine, Nine]  # moment-rotation, moment-translation, force-rotation, force-translation
 
 
 @inlined

@@ -37,9 +37,10 @@ _AERODYNAMICS = (
 )
 _SHARES = (0.4, 0.3, 0.2, 0.1)
 
-_NO_LAW = np.zeros((0, 6), np.int64)
+_NO_LAW, _NOWHERE = np.zeros((0, 6), np.int64), np.zeros(0, np.int64)
 NO_LAWS = Laws(
-    _NO_LAW, _NO_LAW, np.zeros(0, np.int64), np.zeros((0, LANES)), np.zeros(0), np.zeros((0, LANES))
+    strip=_NO_LAW, connector=_NO_LAW, point=_NO_LAW[:, :5], axes=_NOWHERE, bodies=_NOWHERE,
+    arms=np.zeros((0, 3, LANES)), parameters=np.zeros((0, LANES)), size=np.zeros(0), motor=np.zeros((0, LANES)),
 )  # fmt: skip
 
 STRUCTURAL = tuple(row[0] for row in _STRUCTURE)

@@ -20,7 +20,7 @@ from wingfit.sim.kernels.air import strip_forces
 from wingfit.sim.kernels.arrays import NOW, Lanes, Setting, State, Wiring, Work, new_work
 from wingfit.sim.kernels.bodies import kinetic_and_height
 from wingfit.sim.kernels.connectors import twists
-from wingfit.sim.kernels.integrate import airflow, forces
+from wingfit.sim.kernels.integrate import airflow, forces, point_forces
 from wingfit.sim.kernels.lanes.memory import aligned
 from wingfit.sim.kernels.masses import add_energies
 from wingfit.sim.model import Solution
@@ -103,6 +103,8 @@ class Outputs:
         sections: loads through the cuts between strips, root first.
         strips: air loads, root first.
         air_wrench: [n, N, 6] of the air on each body, in its frame at its centre of mass.
+        held: [n, N, 6], as ``air_wrench``, of what effects apply at points of the wing, such as a tether.
+        held_lost, held_stored: [n] power that these take (W) and energy that they store (J).
         lift_axis, thrust_axis: unit vectors in the world. In wind: perpendicular to the stream (in the plane of flow
             and vertical), and against it; without wind: up, and forward (-x). The side force is along y, outboard.
         kinetic, elastic, gravitational: [n] energies, J; gravitational is zero at z = 0.
@@ -116,6 +118,9 @@ class Outputs:
     sections: tuple[Section, ...]
     strips: tuple[Strip, ...]
     air_wrench: Array
+    held: Array
+    held_lost: Array
+    held_stored: Array
     lift_axis: Array
     thrust_axis: Array
     kinetic: Array
@@ -136,7 +141,7 @@ class Outputs:
     @property
     def dissipated(self) -> Array:
         """Power lost in all dampers [n], W."""
-        return np.asarray(sum(connector.dissipated for connector in self.connectors))
+        return np.asarray(sum(connector.dissipated for connector in self.connectors) + self.held_lost)
 
     @property
     def balance(self) -> Balance:
@@ -193,10 +198,13 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
         sections=_sections(structure, motion, sums),
         strips=_strips(structure, sums),
         air_wrench=sums.air_wrench,
+        held=sums.held,
+        held_lost=sums.held_lost,
+        held_stored=sums.held_stored,
         lift_axis=np.array([-np.sin(incidence), 0.0, np.cos(incidence)]),
         thrust_axis=-np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
         kinetic=sums.kinetic,
-        elastic=sums.stored.sum(axis=1),
+        elastic=sums.stored.sum(axis=1) + sums.held_stored,
         gravitational=sums.gravitational,
     )
 
@@ -209,7 +217,8 @@ class _Sums:
         self.wrench, self.twist = np.zeros((n, connectors, 6)), np.zeros((n, connectors, 6))
         self.lost, self.stored = np.zeros((n, connectors)), np.zeros((n, connectors))
         self.on_rods = np.zeros((n, 2, 6))
-        self.air_wrench = np.zeros((n, bodies, 6))
+        self.air_wrench, self.held = np.zeros((n, bodies, 6)), np.zeros((n, bodies, 6))
+        self.held_lost, self.held_stored = np.zeros(n), np.zeros(n)
         self.strip_force, self.strip_power = np.zeros((n, strips, 3)), np.zeros((n, strips))
         self.kinetic, self.gravitational = np.zeros(n), np.zeros(n)
 
@@ -236,7 +245,8 @@ class _Parts(NamedTuple):
             states = np.append(states, first + c + count * np.arange(kept))
         own = laws._replace(
             strip=laws.strip[:0], connector=np.array(rows, np.int64).reshape(-1, 6), size=laws.size[states],
-            parameters=aligned(laws.parameters[parameters]), motor=laws.motor[:0],
+            parameters=aligned(laws.parameters[parameters]), motor=laws.motor[:0], point=laws.point[:0],
+            bodies=laws.bodies[:0], arms=laws.arms[:0],
         )  # fmt: skip
         lanes = group._replace(
             stiffness=group.stiffness[one], damping=group.damping[one], coupling=group.coupling[one],
@@ -279,7 +289,7 @@ def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _
 
 
 def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """Flow and laws of the air for the whole wing, then the forces one strip at a time."""
+    """Flow and laws of the air for the whole wing, then the forces one strip at a time; and what holds points."""
     w, here, group = parts
     work, n = new_work(*parts), len(w.mass)
     kinetic, height = np.zeros(LANES), np.zeros(LANES)
@@ -300,6 +310,11 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
             )  # fmt: skip
             sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:kept], power[:kept]
         sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:kept, :n]
+        for array in (work.wrench, work.lost, work.stored):
+            array[:] = 0.0
+        point_forces(group, work)
+        sums.held[rows] = np.moveaxis(work.wrench, -1, 0)[:kept, :n]
+        sums.held_lost[rows], sums.held_stored[rows] = work.lost[:kept], work.stored[:kept]
         kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
         add_energies(
             group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,

@@ -22,7 +22,7 @@ from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, pr
 from wingfit.calibration.summary import summarise
 from wingfit.records import Dataset, Gene, Genome, Recording
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.model import Array, Observation, genome_batch
 from wingfit.sim.wing.genes import AERODYNAMIC, STRUCTURAL
@@ -31,7 +31,7 @@ SHIFT = ("camera_shift.x", "camera_shift.y", "camera_shift.z")
 SPEC = CalibrationSpec(division="4", effects=("camera_shift",), population=6, max_generations=2, seed=7)
 
 
-def _unseen(sampling: Sampling, values: Values) -> None:
+def _unseen(scene: WingScene, values: Values) -> None:
     """Tracks show nothing of it."""
 
 
@@ -42,14 +42,14 @@ def bump(monkeypatch: pytest.MonkeyPatch) -> Effect:
         name="bump",
         title="A bump",
         family="aerodynamics",
-        port="observation",
+        port="air",
         size=(Parameter("size", "1", -1.0, 1.0, 0.3, "height"),),
         shape=(Parameter("place", "1", 0.0, 1.0, 0.5, "where", place=True),),
+        law="y = size",
         source="none",
         signature="a bump",
         confused_with=(),
-        observe=_unseen,
-        observed=("tracks",),
+        wing=_unseen,
     )
     monkeypatch.setitem(EFFECTS, "bump", found)
     return found

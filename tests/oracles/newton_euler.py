@@ -24,7 +24,7 @@ def newton_euler(model: FlexibleWing, outputs: Outputs, motion: State, condition
     """[n, N, 6] sum of the wrenches on every body in its frame, and rate of momentum by finite differences."""
     w, n = model.structure.wiring, len(model.structure.bodies)
     R = motion.R.reshape(len(motion.R), -1, 3, 3)
-    applied = outputs.air_wrench.copy()
+    applied = outputs.air_wrench + outputs.held
     down = np.array([0.0, 0.0, -condition.gravity])
     applied[:, :, 3:] += w.mass[:, None] * np.einsum("tnji,j->tni", R[:, :n], down)
     for c, load in enumerate(outputs.connectors):

@@ -228,7 +228,8 @@ def _loads(size: float, n: int = 16) -> Outputs:
     strips = (Strip("strip 1", (0.03, 0.2), force, -size * wave**2), Strip("strip 2", (0.2, 0.3), force, 0 * wave))
     return Outputs(
         phase, 0.25, (motor, motor), (connector,), (Section("root", 0.03, six), Section("strips 1-2", 0.2, six / 2)),
-        strips, np.zeros((n, 2, 6)), np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]), wave**2, wave**2, wave,
+        strips, np.zeros((n, 2, 6)), np.zeros((n, 2, 6)), np.zeros(n), np.zeros(n),
+        np.array([0.0, 0.0, 1.0]), np.array([-1.0, 0.0, 0.0]), wave**2, wave**2, wave,
         solution=Solution(96, 5, 2e-5),
     )  # fmt: skip
 

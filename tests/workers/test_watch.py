@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.contract.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
 from tests.workers import pendulum
-from tests.workers.test_evaluators import DISTRIBUTED, assert_same_bits, environment, reference
 from wingfit.workers import EvaluatorKind, RunningEvaluator, WorkerLostError, make_evaluator, watch
 from wingfit.workers.watch import (
     ENOUGH,

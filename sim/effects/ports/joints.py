@@ -1,4 +1,4 @@
-"""Where the connectors of a wing lie and what they join, for effects of the structure."""
+"""Direction, length and place of the connectors of a wing, for effects of the structure."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Joints:
-    """Of C connectors.
+    """Geometry of C connectors.
 
     Attributes:
         along_span: [C]: joins neighbours along the span (or the root with its drive), bends about the chord and twists
-            about the span; else neighbours along the chord, the other way round.
-        part: [C]: length of wing that it stands for, as a part of the span: an angle over this is a curvature in
-            radians over the span, which means the same in every division.
-        within: [C]: joins two bodies of the wing; the others join the root to a driving rod. There bending is left to
-            the plain spring, which the play of ``backlash`` is in series with: a law beside it would bridge the play.
-        reach: [C, 2]: from and to which part of the span, from root to tip, that wing lies.
+            about the span; otherwise neighbours along the chord, with the axes exchanged.
+        part: [C]: length of wing that it represents, as a fraction of the span: an angle divided by it is a curvature
+            in radians over the span, which is the same in every discretisation.
+        within: [C]: joins two bodies of the wing; the others join the root to a driving rod. Effects do not act on
+            their bending, because a law in parallel would bridge the play of ``backlash``.
+        reach: [C, 2]: where that wing begins and ends, as fractions of the span from root to tip.
     """
 
     along_span: npt.NDArray[np.bool_]
@@ -33,7 +33,7 @@ class Joints:
 
     @classmethod
     def of(cls, structure: Structure) -> Joints:
-        """Those of a wing."""
+        """Geometry of the connectors of a wing."""
         edges = structure.planform.strips(structure.division)
         root, span = edges[0], edges[-1] - edges[0]
         along = np.array([c.modulus == SPANWISE_MODULUS for c in structure.connectors])
@@ -48,11 +48,11 @@ class Joints:
         return cls(along, part, within, reach)
 
     def out_of_plane(self, stiffness: Array) -> tuple[Array, Array]:
-        """Of stiffness [C, 6, W] that about x and about y [C, W], without what the root bends about x."""
+        """Stiffness about x and y [C, W] from ``stiffness`` [C, 6, W]; zero for the bending of the root about x."""
         return np.where(self.within[:, None], stiffness[:, 0], 0.0), stiffness[:, 1]
 
     def bending(self, stiffness: Array) -> tuple[Array, Array]:
-        """Of :meth:`out_of_plane`, each zero where that is torsion."""
+        """As :meth:`out_of_plane`, zero where the axis is that of torsion."""
         about_x, about_y = self.out_of_plane(stiffness)
         along = self.along_span[:, None]
         return np.where(along, about_x, 0.0), np.where(along, 0.0, about_y)

@@ -1,4 +1,4 @@
-"""Which marker a fault concerns, and where its neighbours say it would be if it sat elsewhere on the wing."""
+"""The marker nearest to a place, and the tangents of the wing at a marker, for faults of single markers."""
 
 from __future__ import annotations
 
@@ -6,20 +6,17 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import Wing
-from wingfit.sim.effects.contract import Array, Parameter, Values
+from wingfit.sim.effects.contract import Array, Values, place
 
-PLACE = (
-    Parameter("station", "1", 0.0, 1.0, 0.7, "span station of the place, in parts of the span", place=True),
-    Parameter("chord", "1", 0.0, 1.0, 0.5, "place along the chord, in parts of it from the leading edge", place=True),
-)
-_NEAR = 0.05  # of the span: neighbours so far away count for exp(-1/2)
+PLACE = place(0.7, 0.5)
+_NEAR = 0.05  # of the span: distance at which a neighbour has the weight exp(-1/2)
 
 
 def nearest(wing: Wing, values: Values) -> npt.NDArray[np.intp]:
-    """Markers [B, M] of ``wing`` from the nearest to the place PLACE [B] at rest to the farthest.
+    """Markers [B, M] of ``wing``, sorted by their distance at rest from the places PLACE [B].
 
-    A fault concerns this marker or that and never a mixture, so what is observed jumps as the place goes from one to
-    the next. A search by slopes holds a place; one by trial finds it.
+    A fault affects one marker and never a mixture, so the observation jumps where the place comes nearer to another
+    marker. A gradient search keeps the marker; a trial of places finds it.
     """
     y, leading, chord = (np.array([getattr(s, a) for s in wing.stations]) for a in ("y", "leading_edge", "chord"))
     at = y[0] + values["station"] * (y[-1] - y[0])
@@ -30,9 +27,9 @@ def nearest(wing: Wing, values: Values) -> npt.NDArray[np.intp]:
 
 
 def tangents(wing: Wing, marker: int) -> Array:
-    """Weights [2, M] that make of the markers' positions the derivatives along x and y at ``marker`` at rest.
+    """Weights [2, M] of the markers' positions that give the derivatives along x and y at rest at ``marker``.
 
-    Least squares of a plane through the markers around it: exact wherever the wing turns and stretches evenly.
+    From a weighted least-squares plane through the markers around it: exact for a uniform rotation and strain.
     """
     rest = np.array([m.position[:2] for m in wing.markers])
     apart = rest - rest[marker]

@@ -1,30 +1,34 @@
-"""A simulated beat on its way into a recording: what faults of cameras, clocks and balances act on."""
+"""A simulated beat on its way into a recording, which faults of cameras, clocks and balances change."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import Recording, Vehicle, Wing
+from wingfit.sim.effects.contract import Array, Effect
 
-Array = npt.NDArray[np.float64]
+fault_of_tracks = partial(Effect, family="measurement", port="observation", observed=("tracks",))
+fault_of_forces = partial(Effect, family="measurement", port="observation", observed=("forces",))
+fault_of_recordings = partial(Effect, family="measurement", port="observation", observed=("tracks", "forces"))
 
 
 @dataclass
 class Sampling:
-    """One beat of B individuals, and when it is looked at. Effects change it in place.
+    """One beat of B individuals and the instants at which it is sampled. Effects change it in place.
 
     Attributes:
-        rig: what was recorded.
-        recording: the conditions and the instants.
-        beat: what is measured over one beat at n equal steps from drive phase 0 (a period). Of tracks [B, n, M, 3], in
-            m, all markers of the wing in its order; of forces [B, n, 2], in N, along body x and z, whichever of them
-            the recording has: a tilted balance mixes them.
-        times: [B, T], s: instants at which it is sampled; at first those of the recording.
-        added: [B, T, C] is added to what was sampled; C as in the recording. At first zero.
+        rig: the wing or vehicle that was recorded.
+        recording: its conditions and instants.
+        beat: the measured quantity at n equal steps over one beat from drive phase 0. Tracks [B, n, M, 3], in m, of all
+            markers of the wing in its order; forces [B, n, 2], in N, along body x and z, both even if the recording has
+            one of them, as a tilted balance mixes them.
+        times: [B, T], s: instants at which it is sampled, initially those of the recording.
+        added: [B, T, C], added after sampling; C channels as in the recording. Initially zero.
     """
 
     rig: Wing | Vehicle
@@ -37,19 +41,19 @@ class Sampling:
     def wing(self) -> Wing:
         """The wing; ValueError for a vehicle."""
         if not isinstance(self.rig, Wing):
-            raise ValueError(f"vehicle {self.rig.name!r} was recorded as forces; this fault is one of tracks")
+            raise ValueError(f"vehicle {self.rig.name!r} has recordings of forces, not of tracks: remove the fault")
         return self.rig
 
     @property
     def vehicle(self) -> Vehicle:
         """The vehicle; ValueError for a wing."""
         if not isinstance(self.rig, Vehicle):
-            raise ValueError(f"wing {self.rig.name!r} was recorded as tracks; this fault is one of forces")
+            raise ValueError(f"wing {self.rig.name!r} has recordings of tracks, not of forces: remove the fault")
         return self.rig
 
     @property
     def kind(self) -> str:
-        """Tracks or forces."""
+        """Kind of the recording: "tracks" or "forces"."""
         return self.recording.kind
 
     def filtered(self, gain: npt.NDArray[np.complex128]) -> None:
@@ -66,9 +70,10 @@ class Sampling:
 
 
 def between(beat: Array) -> Callable[[Array], Array]:
-    """What the periodic ``beat`` [n, M, I] of an individual is at phases [n, M], in beats later than each step.
+    """Interpolator of a periodic ``beat`` [n, M, I]: takes delays [n, M] in beats and returns [n, M, I].
 
-    Cubic between the steps, through values and slopes: off by (2 pi k / n)^4 / 384 of harmonic k.
+    Element [j, m] is marker m at the time of step j plus its delay. Cubic Hermite interpolation with spectral slopes:
+    the error is (2 pi k / n)^4 / 384 of harmonic k.
     """
     n, columns = len(beat), np.arange(beat.shape[1])
     turn = (2j * np.pi / n * np.arange(n // 2 + 1))[:, None, None]

@@ -1,7 +1,7 @@
 """A pair of cameras above the wing, for faults that differ between the two images.
 
-Pinhole cameras at equal heights look down along -z; the line between them is parallel to the span. Where a point lies
-is found from the two images as photogrammetry does: its distance from their difference.
+Pinhole cameras at equal heights look down along -z; the line between them is parallel to the span. Points are
+triangulated from the two images: the distance follows from the disparity.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ Array = npt.NDArray[np.float64]
 
 PLACES = (
     Parameter("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),
-    Parameter("y", "m", 0.0, 1.0, 0.5, "y of that point", "span"),
+    Parameter("y", "m", 0.0, 1.0, 0.5, "y of the point that both cameras aim at", "span"),
     Parameter("distance", "m", 2.0, 10.0, 2.5, "height of the cameras above z = 0", "span"),
-    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras, in parts of their height"),
+    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras over their height"),
 )
-"""Shape parameters of an effect that needs the cameras: a metre or two away, seen under some 20 degrees."""
+"""Shape parameters of an effect that depends on the cameras; typically a metre or two away, 20 degrees apart."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class Stereo:
 
     @classmethod
     def of(cls, values: Values) -> Stereo:
-        """The pair that the parameters PLACES [B] describe."""
+        """The pair of cameras with the parameters PLACES [B]."""
         x, y, distance, base = (values[p.name][:, None, None] for p in PLACES)
         return cls(x, y, distance, base * distance)
 
     def image(self, points: Array, side: float) -> tuple[Array, Array]:
-        """Images [B, n, M] of ``points`` [B, n, M, 3], in focal lengths, from the image of the point aimed at.
+        """Images [B, n, M] of ``points`` [B, n, M, 3], in focal lengths from the image of the point aimed at.
 
         ``side`` is -1 for the camera nearer the root and 1 for the other.
         """
@@ -57,7 +57,7 @@ class Stereo:
         return u, v
 
     def points(self, inner: tuple[Array, Array], outer: tuple[Array, Array]) -> Array:
-        """Points [B, n, M, 3] that have the images ``inner`` and ``outer``; where rays miss, half-way between them.
+        """Points [B, n, M, 3] with the images ``inner`` and ``outer``; half-way between rays that do not meet.
 
         Distance = base / disparity (Hartley and Zisserman 2004, Multiple View Geometry; parallel cameras).
         """

@@ -1,4 +1,4 @@
-"""A vehicle about to be simulated: what effects may change."""
+"""Input of the simulation of a vehicle, which effects change."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from wingfit.records import Condition, Vehicle, WingMotion
 from wingfit.sim.atmosphere import density
+from wingfit.sim.effects.contract import Values
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
@@ -24,15 +25,16 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 ROTATION_POINT = 0.75  # Eq. 4
-# What each stage of a scene changes may be read in those that come after it.
+# Stages of a scene, in order: each reads what the stages before have changed.
 Stage = Literal["mass", "inflow", "wake", "circulation"]
+Change = Callable[["VehicleScene", Values], None]
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What all individuals share: the vehicle in a condition, and how finely a beat is computed.
+    """What all individuals share: the vehicle, its condition, and the resolution of a beat.
 
-    ``motion`` is that of the recording or, without one, of the vehicle; ``r`` [E] are the middles of the elements, m.
+    ``motion`` is the recording's or, without one, the vehicle's; ``r`` [E] are the middles of the elements, m.
     """
 
     vehicle: Vehicle
@@ -44,22 +46,27 @@ class Setting:
     r: Array
 
 
+def deferred(stage: Stage, change: Change) -> Change:
+    """``change`` of a scene, deferred to ``stage``, after all effects have made their immediate changes."""
+    return lambda scene, values: scene.after(stage, lambda: change(scene, values))
+
+
 @dataclass
 class VehicleScene:
     """B individuals of one vehicle in one condition. Effects change it in place.
 
-    What depends on nothing that effects change is set at once, in the order of the registry: the drive, stream, mass
-    and loading. What reads these or the flow waits for its stage (:meth:`after`).
+    Effects set drive, stream, mass and loading at once, in the order of the registry. Changes that depend on these or
+    on the flow are deferred to their stage (:meth:`after`).
 
     Attributes:
-        setting: what all share.
+        setting: shared by all individuals.
         genes: coefficients and parameters of the motion by name, [B]; zero for a term that is off.
         flap: series [B, K + 1] of the flap angle in rad, Re sum_k flap_k exp(2 pi i k t*).
         airspeed: [B], m/s.
         density: [B] of the air, kg/m^3.
-        mass_factor: [B], what the mass of the wings is multiplied by.
+        mass_factor: [B], factor on the mass of the wings.
         inflow: [B, n], m/s: added to the stream along body x over the beat.
-        loading: [B, E + 8]: what circulation is multiplied by at the elements, then at the stations.
+        loading: [B, E + 8]: factor on circulation at the elements, then at the stations.
         fling: [B]: coefficient of circulation 1/2 C c^2 (-theta_w') while the wings peel, beyond that of the terms.
         added: [B, 2, n]: forces of all wings along body x and z besides those of the terms, N.
     """
@@ -107,11 +114,11 @@ class VehicleScene:
         return 1.0 / (self.setting.condition.flap_frequency * self.setting.instants)
 
     def after(self, stage: Stage, action: Callable[[], None]) -> None:
-        """Do ``action`` when ``stage`` comes, after all effects have set what they can at once."""
+        """Defer ``action`` to ``stage``, after all effects have made their immediate changes."""
         self._waiting.setdefault(stage, []).append(action)
 
     def settle(self) -> None:
-        """Do what waits, stage by stage."""
+        """Run the deferred actions, stage by stage."""
         for stage in get_args(Stage):
             for action in self._waiting.pop(stage, []):
                 action()
@@ -126,7 +133,7 @@ class VehicleScene:
 
     @cached_property
     def angles(self) -> Angles:
-        """Motion of the wings, which stays as it is from then on."""
+        """Motion of the wings; the flap angle is read-only after the first access."""
         self.flap.setflags(write=False)
         own = self.setting
         return angles_of(
@@ -143,18 +150,18 @@ class VehicleScene:
 
     @cached_property
     def stations(self) -> Stations:
-        """Eight places along the wing."""
+        """Eight stations along the wing."""
         return stations(self.setting.vehicle, self.setting.motion)
 
     def load(self, law: Callable[[Array], Array]) -> None:
-        """Multiply circulation by ``law``, which is given distances from the flapping axis [m] and returns [B, m]."""
+        """Multiply circulation by ``law``, a function of distances [m] from the flapping axis that returns [B, m]."""
         self.loading *= law(np.concatenate([self.setting.r, self.stations.r]))
 
     # -- for effects of the flow -------------------------------------------------------------------------------
 
     @cached_property
     def wings(self) -> StationedWings:
-        """The wings at eight stations; motion, stream and loading stay as they are from then on."""
+        """The wings at eight stations; motion, stream and loading are read-only after the first access."""
         own = self.setting.vehicle
         for read in (self.airspeed, self.density, self.loading, self.fling):
             read.setflags(write=False)
@@ -169,7 +176,7 @@ class VehicleScene:
 
     @cached_property
     def flow(self) -> Flow:
-        """The flow at the stations, for effects to change; the inflow stays as it is from then on."""
+        """The flow at the stations, which effects change; the inflow is read-only after the first access."""
         self.inflow.setflags(write=False)
         flow = self.wings.flow(self.forward(self.inflow))
         self._base = self.wings.forces(flow)
@@ -206,7 +213,7 @@ class VehicleScene:
             yield set_side(rows, self.setting.vehicle, self._flap, below, upper)
 
     def finish(self) -> Array:
-        """All forces besides those of the terms [B, 2, n], N: what effects added, and what they changed in the flow."""
+        """Forces beyond those of the terms [B, 2, n], N: added by effects, and from their changes of the flow."""
         if self._base is None:
             return self.added
         return np.asarray(self.added + (self.wings.forces(self.flow) - self._base))
@@ -222,10 +229,10 @@ class VehicleScene:
         return np.cos(flap[:, 0]), np.sin(flap[:, 0]), flap[:, 1]
 
     def _turning(self) -> tuple[Array, Array]:
-        """[B, n] each, rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, and what fling adds to it.
+        """Rates [B, n] in rad/s that replace C_R theta_w' in Eq. 2 at the pitch station: of rotation and of fling.
 
-        The term puts C_F in the place of C_R while the wings peel (Eqs. 4, 7). Here that of C_R goes on, and C_F + C_R
-        is added: the two are the same until one of them is late or stalls, which fling between two wings does not.
+        The term of the model replaces C_R by C_F while the wings peel (Eqs. 4, 7). Here C_R continues and C_F + C_R is
+        added, which is the same unless rotation lags or stalls; fling between two wings does neither.
         """
         on, rate = float("clap_and_peel" in self.setting.terms), self.angles.pitch[:, 1]
         rotation, fling = self._coefficients("C_r", "C_F").T[:, :, None]
@@ -234,5 +241,5 @@ class VehicleScene:
         return np.asarray(turn * rate), np.asarray(-more * self.angles.peel * rate)
 
     def _coefficients(self, *names: str) -> Array:
-        """Genes [B, names], zero for terms that are off."""
+        """Values of genes [B, names]; zero for terms that are off."""
         return np.stack([self.genes.get(name, np.zeros(len(self))) for name in names], axis=1)

@@ -1,4 +1,4 @@
-"""A wing about to be simulated, eight individuals at a time: what effects may change."""
+"""Input of the simulation of a wing, eight individuals at a time, which effects change."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from wingfit.sim.wing.structure import Structure
 
 Array = npt.NDArray[np.float64]
 
-_SEA_LEVEL, _LEAST_FELT = 1.2, 1e-3  # kg/m^3; part
-_LEAST_STROKE = 0.01  # rad, of a drive that is held
+_SEA_LEVEL, _LEAST_SCALE = 1.2, 1e-3  # kg/m^3; fraction
+_LEAST_STROKE = 0.01  # rad, for a drive that does not move
 
 
 @dataclass
 class WingScene:
-    """What the kernels will be given for one group of lanes under a condition. Effects change it in place.
+    """Input of the kernels for one group of lanes under a condition. Effects change it in place.
 
-    Every lane is an individual for which the effect is on. ``lanes``: stiffness, damping, coefficients, shares and
-    ``hinge`` (:class:`wingfit.sim.kernels.arrays.Lanes`); change their values. ``density`` [W], ``wind`` [3, W]: of the
-    stream. ``rods``: how they are driven; ``motor`` [MOTOR, W] or empty: how the drive gives way to its load
+    Every lane is an individual in which the effect is on. ``lanes``: stiffness, damping, coefficients, shares and
+    ``hinge`` (:class:`wingfit.sim.kernels.arrays.Lanes`); change their values. ``density`` [W] and ``wind`` [3, W] of
+    the stream. ``rods``: their drive; ``motor`` [MOTOR, W] or empty: a compliant drive
     (:mod:`wingfit.sim.kernels.motor`). The methods add masses and laws.
     """
 
@@ -44,6 +44,9 @@ class WingScene:
     _air: dict[tuple[int, int], Array] = field(default_factory=dict)
     _strip: list[list[int]] = field(default_factory=list)
     _connector: list[list[int]] = field(default_factory=list)
+    _point: list[list[int]] = field(default_factory=list)
+    _bodies: list[int] = field(default_factory=list)
+    _arms: list[Array] = field(default_factory=list)
     _parameters: list[Array] = field(default_factory=list)
     _axes: list[int] = field(default_factory=list)
     _sizes: list[Array] = field(default_factory=list)
@@ -61,9 +64,9 @@ class WingScene:
         return 2 * np.pi * self.condition.flap_frequency
 
     def body_at(self, station: Array, fraction: Array) -> tuple[npt.NDArray[np.int64], Array]:
-        """Bodies [W] under places of the wing, and the places [W, 3] from their centres of mass, m.
+        """Bodies [W] under places of the wing, and the places [W, 3] relative to their centres of mass, m.
 
-        ``station``: part of the span from root to tip, ``fraction``: part of the chord from the leading edge.
+        ``station``: fraction of the span from root to tip, ``fraction``: of the chord from the leading edge.
         """
         planform, division = self.structure.planform, self.structure.division
         edges = planform.strips(division)
@@ -77,9 +80,9 @@ class WingScene:
         return body, np.stack([x, y, np.zeros_like(x)], axis=1) - centre
 
     def add_mass(self, body: int, mass: Array, first_moment: Array, second_moment: Array) -> None:
-        """Add weight to a body: ``mass`` [W] (kg), its first moment [3, W] (kg m) and its inertia [3, 3, W] (kg m^2).
+        """Add to a body ``mass`` [W] (kg), a first moment [3, W] (kg m) and an inertia [3, 3, W] (kg m^2).
 
-        Both about the body's centre of mass, in its frame; a mass that moves within a body has no mass of its own.
+        Both about the body's centre of mass, in its frame. To shift mass within a body, give a ``mass`` of zero.
         """
         block = np.zeros((6, 6, LANES))
         skew = np.zeros((3, 3, LANES))
@@ -91,40 +94,62 @@ class WingScene:
         self._weights[body] = self._weights.get(body, 0.0) + block
 
     def add_point_mass(self, body: int, mass: Array, place: Array) -> None:
-        """Add a point of ``mass`` [W] (kg) at ``place`` [3, W] (m) from a body's centre of mass."""
+        """Add a point of ``mass`` [W] (kg) at ``place`` [3, W] (m) relative to a body's centre of mass."""
         square = np.eye(3)[:, :, None] * (place**2).sum(axis=0) - place[:, None] * place[None]
         self.add_mass(body, mass, mass * place, mass * square)
 
     def add_air(self, first: int, second: int, block: Array) -> None:
-        """Add [6, 6, W] to the matrix that joins the momenta of air moved by two bodies (moment, force; turn, move).
+        """Add [6, 6, W] to the matrix of added mass between two bodies: (moment, force) by (rotation, translation).
 
-        Bodies of one strip only; for two different ones give both orders, each the transpose of the other. Air is moved
-        along the normal: of the block only the rows and columns of turning about x and y and moving along z count.
+        Bodies of one strip only; for two different bodies add both orders, each the transpose of the other. Air moves
+        along the normal: only the rows and columns of rotation about x and y and of translation along z are used.
         """
         self._air[first, second] = self._air.get((first, second), 0.0) + block
 
-    def add_strip_law(self, law: Law, parameters: list[Array], states: list[float] | None = None) -> None:
-        """Let a law of the air act on every strip.
+    def add_strip_law(
+        self, law: Law, parameters: list[Array], states: list[float] | None = None, *, before: bool = False
+    ) -> None:
+        """Let a law of the air act on every strip, ``before`` the flow of the strips is known as well as after it.
 
-        ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: one number for each of its states, by
-        which a state is multiplied to be comparable with metres of motion (for the way to the periodic motion), in air
-        of sea level: in thinner air it is felt less.
+        ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: for each of its states a factor that
+        makes it comparable with metres of motion (in the search for the periodic motion) at sea level; in thinner air
+        it is reduced in proportion to the density.
         """
-        felt = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_FELT)
-        sizes = [size * min(felt, 1.0) for size in states or []]
+        scale = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_SCALE)
+        sizes = [size * min(scale, 1.0) for size in states or []]
         self._add(self._strip, len(self.structure.wiring.geometry), law, parameters, sizes)
+        self._strip[-1][5] = int(before)
 
     def add_connector_law(
         self, law: Law, parameters: list[Array], axes: list[int] | None = None, states: list[float] | None = None
     ) -> None:
         """Let a law act on every connector; ``parameters`` [W] or [C, W].
 
-        ``axes``: of each state, the axis along which it pulls: 0 to 2 rotation about x, y, z of the first body, 3 to 5
+        ``axes``: for each state, the axis of its wrench: 0 to 2 rotation about x, y, z of the first body, 3 to 5
         translation; ``states`` as for a strip.
         """
         self._add(self._connector, len(self.structure.connectors), law, parameters, states or [])
         self._connector[-1][5] = len(self._axes)
         self._axes += axes or []
+
+    def add_point_law(self, law: Law, station: Array, fraction: Array, parameters: list[Array]) -> None:
+        """Let a law apply a wrench at a place of the wing, given as in :meth:`body_at`; ``parameters`` [W] each.
+
+        Where the place lies on different bodies in different individuals, each of these bodies has a point, with
+        parameters of zero in the other individuals.
+        """
+        found, arms = self.body_at(station, fraction)
+        bodies = np.unique(found)
+        here = found == bodies[:, None]
+        self._add(self._point, len(bodies), law, [np.where(here, values, 0.0) for values in parameters], [])
+        self._point[-1][2:] = [len(bodies), self._point[-1][3], len(self._bodies)]
+        self._bodies += bodies.tolist()
+        self._arms += [np.where(lanes, arms.T, 0.0) for lanes in here]
+
+    def at_rest(self, station: Array, fraction: Array) -> Array:
+        """Positions at rest of places of the wing in the world, [3, W] m."""
+        found, arms = self.body_at(station, fraction)
+        return np.asarray((arms + np.array([self.structure.bodies[n].centre for n in found])).T)
 
     def _add(self, laws: list[list[int]], places: int, law: Law, parameters: list[Array], states: list[float]) -> None:
         at, first = sum(map(len, self._parameters)), sum(map(len, self._sizes))
@@ -134,14 +159,14 @@ class WingScene:
 
     @property
     def _motor_sizes(self) -> Array:
-        """Of the motor's states, if it gives way: a lead is felt as motion at the speed of the outer wing."""
+        """Factors for the states of a compliant motor, if any: a lead counts as motion at the speed of the tip."""
         wing = self.structure.planform.wing
-        stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as told: the same for every individual
+        stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as described: the same for every individual
         lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)
         return np.array([lead, lead / self.angular_rate, 1e-3] if len(self.motor) else [])
 
     def frozen(self) -> Lanes:
-        """What the kernels are given."""
+        """Lanes with all added masses and laws, for the kernels."""
         solid = sorted(self._weights)
         pairs = [(n, n, n) for n in solid]
         pairs += [(i, j, self.structure.position[i, j]) for i, j in sorted(self._air)]
@@ -149,7 +174,10 @@ class WingScene:
         laws = Laws(
             strip=np.array(self._strip, np.int64).reshape(-1, 6),
             connector=np.array(self._connector, np.int64).reshape(-1, 6),
+            point=np.array(self._point, np.int64).reshape(-1, 5),
             axes=np.array(self._axes, np.int64),
+            bodies=np.array(self._bodies, np.int64),
+            arms=aligned(np.array(self._arms).reshape(-1, 3, LANES)),
             parameters=aligned(np.concatenate([*self._parameters, np.zeros((0, LANES))])),
             size=np.concatenate([*self._sizes, self._motor_sizes]),
             motor=aligned(self.motor),
@@ -162,5 +190,5 @@ class WingScene:
         )
 
     def setting(self, steps: int) -> Setting:
-        """The condition as the kernels see it, with ``steps`` a beat."""
+        """The condition for the kernels, with ``steps`` per beat."""
         return setting(self.condition, steps)._replace(density=aligned(self.density), wind=aligned(self.wind))

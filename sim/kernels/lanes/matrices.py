@@ -14,6 +14,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, store
 Array = npt.NDArray[np.float64]
 Three = tuple[Vector, Vector, Vector]
 Nine = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]
+Six = tuple[Nine, Nine, Nine, Nine]  # 6 x 6: moment-rotation, moment-translation, force-rotation, force-translation
 
 
 @inlined
@@ -196,6 +197,22 @@ def co_stiffness_matrix(K: Nine) -> Nine:
 
 
 @inlined
+def _quarter(blocks: Array, m: int, at: int) -> Nine:
+    """The quarter of block m that starts at element ``at``."""
+    return (
+        load(blocks, m, at), load(blocks, m, at + 1), load(blocks, m, at + 2),
+        load(blocks, m, at + 6), load(blocks, m, at + 7), load(blocks, m, at + 8),
+        load(blocks, m, at + 12), load(blocks, m, at + 13), load(blocks, m, at + 14),
+    )  # fmt: skip
+
+
+@inlined
+def load_block(blocks: Array, m: int) -> Six:
+    """The 6 x 6 matrix of block m of ``blocks`` [NB, 36, W]."""
+    return _quarter(blocks, m, 0), _quarter(blocks, m, 3), _quarter(blocks, m, 18), _quarter(blocks, m, 21)
+
+
+@inlined
 def _add_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
     """Add A to the quarter of block m that starts at element ``at``."""
     store(blocks, m, at, load(blocks, m, at) + A[0])
@@ -210,7 +227,7 @@ def _add_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
 
 
 @inlined
-def add_to_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> None:
+def add_to_block(blocks: Array, m: int, A: Six) -> None:
     """Add the 6 x 6 matrix of four to block m of ``blocks`` [NB, 36, W]."""
     _add_quarter(blocks, m, 0, A[0])
     _add_quarter(blocks, m, 3, A[1])
@@ -233,7 +250,7 @@ def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
 
 
 @inlined
-def set_block(blocks: Array, m: int, A: tuple[Nine, Nine, Nine, Nine]) -> None:
+def set_block(blocks: Array, m: int, A: Six) -> None:
     """Put the 6 x 6 matrix of four into block m of ``blocks`` [NB, 36, W]."""
     _set_quarter(blocks, m, 0, A[0])
     _set_quarter(blocks, m, 3, A[1])

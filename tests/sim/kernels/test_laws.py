@@ -17,10 +17,11 @@ from tests.sim.wing.test_rigid import SMALL, TwoBodies
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES
-from wingfit.sim.kernels.arrays import ALPHA, PUSH_N, SPEED, STREAM_N, Lanes, State, new_work
+from wingfit.sim.kernels.arrays import ALPHA, NOW, PUSH_N, SHARE, SPEED, START, STREAM_N, Lanes, State, new_work
 from wingfit.sim.kernels.integrate import forces
+from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store, store1
-from wingfit.sim.kernels.laws import AFTER, BEFORE, connector_port, strip_port
+from wingfit.sim.kernels.laws import AFTER, BEFORE, connector_port, point_port, strip_port
 from wingfit.sim.solver.scene import at_rest
 from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.division import Division
@@ -67,12 +68,11 @@ def _blowing(frame: Any, moment: int) -> None:
             store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + given)
 
 
-def _still(frame: Any, moment: int) -> None:
+def _still(frame: Any, moment: int) -> None:  # noqa: ARG001
     """No state; shows that the law after it finds its own."""
     port = strip_port(frame)
     for s in range(port.places):
-        if moment == AFTER:
-            store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + 100.0 * load(port.parameters, 1, s))
+        store(port.loads, s, PUSH_N, load(port.loads, s, PUSH_N) + 100.0 * load(port.parameters, 1, s))
 
 
 def test_a_law_sees_its_own_parameters_and_states() -> None:
@@ -89,7 +89,7 @@ def test_a_law_sees_its_own_parameters_and_states() -> None:
         for law in connectors:
             parameters, axes = ([first], [0, 4]) if law is _one else ([a, b], [2])
             scene.add_connector_law(law, parameters, axes=axes, states=[1.0] * len(axes))
-        scene.add_strip_law(_blowing, [given], states=[1.0])
+        scene.add_strip_law(_blowing, [given], states=[1.0], before=True)
         group, here = scene.frozen(), scene.setting(100)
         work, rest = new_work(w, here, group), at_rest(structure)
         work.R[:], work.p[:], work.V[:] = rest.R, rest.p, rest.V
@@ -113,6 +113,32 @@ def test_a_law_sees_its_own_parameters_and_states() -> None:
         np.testing.assert_allclose(np.sign(work.flow[:, ALPHA]), np.sign(scene.wind[2] + up))
         found.append(work.wrench)
     assert np.abs(found[0]).max() > 0
+
+
+def _shaker(frame: Any, moment: int) -> None:  # noqa: ARG001
+    """An upward force a cos psi, with the stage's share of its change in the step."""
+    port = point_port(frame)
+    now, start = cosine_and_sine(load1(port.clock, NOW)), cosine_and_sine(load1(port.clock, START))
+    for p in range(port.places):
+        force = load(port.parameters, 0, p) * (now[0] - load1(port.clock, SHARE) * start[1])
+        store(port.wrench, p, 5, load(port.wrench, p, 5) + force)
+
+
+def test_a_force_at_a_point_that_depends_on_time_keeps_the_order() -> None:
+    """A free body, shaken at its centre: z = a / (m omega^2) (1 - cos omega t)."""
+    structure = build(plank(), Division.parse("2x1"))
+    group = loaded(structure, {})
+    structure, group = with_connectors(structure, group, np.zeros(len(structure.connectors), bool))
+    omega, mass, errors = 2 * np.pi, structure.bodies[0].mass, []
+    for steps in (10, 20, 40):
+        scene = WingScene.of(structure, vacuum(0.0, 0.0, 3.0), group)
+        quarter, middle = np.full(LANES, 0.25), np.full(LANES, 0.5)
+        scene.add_point_law(_shaker, quarter, middle, [np.full(LANES, mass * omega**2)])
+        trace = march(structure, scene.frozen(), vacuum_here(1 / steps), at_rest(structure), steps)
+        expected = 1 - np.cos(omega * np.arange(steps) / steps)
+        errors.append(float(np.abs(trace.p[:, 0, 2, 0] - trace.p[0, 0, 2, 0] - expected).max()))
+    assert errors[-1] < 1e-5
+    assert order(errors) > ORDER - 0.25
 
 
 def _maxwell(frame: Any, moment: int) -> None:  # noqa: ARG001

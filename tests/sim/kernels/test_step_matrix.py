@@ -16,9 +16,10 @@ from wingfit.sim.kernels.arrays import Lanes, Setting, State, Wiring, Work, new_
 from wingfit.sim.kernels.bodies import move
 from wingfit.sim.kernels.integrate import GAMMA, forces, linearise
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-from wingfit.sim.kernels.laws import connector_port
+from wingfit.sim.kernels.laws import connector_port, point_port
 from wingfit.sim.kernels.linear import solve
 from wingfit.sim.kernels.masses import add_mass_blocks
+from wingfit.sim.kernels.points import add_point_blocks
 from wingfit.sim.kernels.stages import coupled_rates, keep_stage
 from wingfit.sim.kernels.states import keep_tangents
 from wingfit.sim.kernels.tangents import add_connectors, start_blocks
@@ -119,6 +120,39 @@ def joints(scene: WingScene, rng: np.random.Generator) -> None:
     scene.add_connector_law(_joint, given, axes=[0, 1, 2, 3, 4, 5], states=[1.0] * 6)
 
 
+def _guy(frame: Any, moment: int) -> None:  # noqa: ARG001
+    """A force and a moment at a point that depend on its place, rotation and twist: all blocks of both matrices.
+
+    f = -s |x|^2 x - d v - q omega,  m = g e_x x n - r x - q omega - d v,  n being the body's normal.
+    """
+    port = point_port(frame)
+    for p in range(port.places):
+        s, d, q = load(port.parameters, 0, p), load(port.parameters, 1, p), load(port.parameters, 2, p)
+        g, r = load(port.parameters, 3, p), load(port.parameters, 4, p)
+        x, y, z = load(port.place, p, 0), load(port.place, p, 1), load(port.place, p, 2)
+        normal = (load(port.turn, p, 2), load(port.turn, p, 5), load(port.turn, p, 8))
+        upright = (0.0 * g, -g * normal[2], g * normal[1])
+        square = x * x + y * y + z * z
+        for i in range(3):
+            here, omega, v = load(port.place, p, i), load(port.twist, p, i), load(port.twist, p, 3 + i)
+            store(port.wrench, p, i, load(port.wrench, p, i) + upright[i] - r * here - q * omega - d * v)
+            store(port.wrench, p, 3 + i, load(port.wrench, p, 3 + i) - s * square * here - d * v - q * omega)
+            for at, gain in ((7 * i, q), (7 * i + 3, d), (7 * i + 18, q), (7 * i + 21, d)):
+                store(port.damping, p, at, load(port.damping, p, at) + gain)
+            for at, gain in ((7 * i, -g * normal[0]), (6 * i, g * normal[i]), (7 * i + 3, r), (7 * i + 21, s * square)):
+                store(port.stiffness, p, at, load(port.stiffness, p, at) + gain)
+            for j in range(3):
+                at = 21 + 6 * i + j
+                store(port.stiffness, p, at, load(port.stiffness, p, at) + 2.0 * s * here * load(port.place, p, j))
+
+
+def points(scene: WingScene, rng: np.random.Generator) -> None:
+    """Two laws at points, each elsewhere in each lane: some share a body."""
+    for _ in range(2):
+        given = [rng.uniform(0.5, 2.0, LANES) * size for size in (2e3, 2.0, 0.02, 5.0, 3.0)]
+        scene.add_point_law(_guy, rng.uniform(0.0, 1.0, LANES), rng.uniform(0.0, 1.0, LANES), given)
+
+
 def rates(case: Case, xi: Array, V: Array, z: Array) -> tuple[Array, Array, Array]:
     """Rates of coordinates, wrenches [N + 2, 6, W], rates of states, at a displacement, more twist and more state."""
     work, rate = case.work, np.zeros_like(xi)
@@ -185,6 +219,10 @@ def assembled(case: Case, lane: int) -> Array:
     add_mass_blocks(
         group.pairs, group.masses, group.weighing, here.gravity, here.wind, work.R, work.V, LENGTH, work.blocks
     )
+    add_point_blocks(
+        group.laws.bodies, group.laws.arms, work.R, work.V, work.point_wrench, work.point_k, work.point_d, LENGTH,
+        work.drag, work.blocks,
+    )  # fmt: skip
     found, blocks = np.zeros((n + 2, 6, n + 2, 6)), work.blocks[..., lane].reshape(-1, 6, 6)
     for k in range(n):
         found[k, :, k] = blocks[k]
@@ -210,6 +248,12 @@ def assert_same(found: Array, expected: Array) -> None:
     assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
 
+def assemble_and_differentiate(*changes: Change) -> None:
+    """Check the matrix of a bent wing with effects in one lane."""
+    case, lane = bent("3,2", *changes, coupled=True), 5
+    assert_same(assembled(case, lane)[:-12], by_differences(case, lane)[:-12])
+
+
 @pytest.mark.parametrize(("division", "coupled"), [("3,2", False), ("3,2", True), ("1,1,1", False)])
 def test_matrix_is_the_exact_derivative(division: str, coupled: bool) -> None:
     case, lane = bent(division, coupled=coupled), 3
@@ -217,12 +261,13 @@ def test_matrix_is_the_exact_derivative(division: str, coupled: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    "changes", [(weights,), (moved_air,), (joints,), (weights, moved_air, joints)], ids=["weight", "air", "law", "all"]
+    "changes",
+    [(weights,), (moved_air,), (joints,), (points,), (weights, moved_air, joints, points)],
+    ids=["weight", "air", "connectors", "points", "all"],
 )
 def test_matrix_is_the_exact_derivative_with_effects(changes: tuple[Change, ...]) -> None:
-    """Weights, air that the bodies of a strip move together, and a law of the connectors with its states eliminated."""
-    case, lane = bent("3,2", *changes, coupled=True), 5
-    assert_same(assembled(case, lane)[:-12], by_differences(case, lane)[:-12])
+    """Weights, air that the bodies of a strip move together, laws of connectors with states, and laws of points."""
+    assemble_and_differentiate(*changes)
 
 
 def test_air_in_wind_is_in_the_matrix() -> None:
@@ -234,7 +279,14 @@ def test_air_in_wind_is_in_the_matrix() -> None:
 
 @pytest.mark.parametrize(
     ("division", "changes"),
-    [("4", ()), ("11", ()), ("24", ()), ("2x5", ()), ("11", (weights, moved_air, joints)), ("2x5", (moved_air,))],
+    [
+        ("4", ()),
+        ("11", ()),
+        ("24", ()),
+        ("2x5", ()),
+        ("11", (weights, moved_air, joints, points)),
+        ("2x5", (moved_air,)),
+    ],
 )
 def test_solving_undoes_the_product_with_the_matrix(division: str, changes: tuple[Change, ...]) -> None:
     case, rng = bent(division, *changes), np.random.default_rng(2)

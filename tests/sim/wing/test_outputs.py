@@ -204,7 +204,7 @@ def test_every_section_carries_weight_air_and_inertia_of_all_that_is_outboard(fo
     R = motion.R.reshape(len(motion.R), -1, 3, 3)[:, :n]
     _, needed = newton_euler(model, outputs, motion, TUNNEL)
     weight = np.array([[0.0], [0.0], [-TUNNEL.gravity]]) * w.mass
-    from_outside = outputs.air_wrench.copy()
+    from_outside = outputs.air_wrench + outputs.held
     from_outside[:, :, 3:] += np.einsum("tnji,jn->tni", R, weight)
     through = needed - from_outside
     moment, force = (np.einsum("tnij,tnj->tni", R, through[:, :, part]) for part in (slice(0, 3), slice(3, 6)))

@@ -17,7 +17,7 @@ from wingfit.sim.kernels.laws import connector_port
 _EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:
     """A pin about x that turns freely by half the play, b / 2, to either side, in series with the spring of rotation.
 
     The spring keeps -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
@@ -28,7 +28,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
     """
     port = connector_port(frame)
     for c in range(port.places):
-        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, whoever it is
+        if port.parameters[0, c, 0] == 0.0:  # a joint within the wing, in any individual
             continue
         half, h = load(port.parameters, 1, c), load(port.parameters, 2, c)
         g1, g2 = load(port.parameters, 3, c), load(port.parameters, 4, c)
@@ -63,12 +63,13 @@ EFFECT = Effect(
     title="Backlash",
     family="actuation",
     port="connector",
-    size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "whole angle about x by which the wing turns freely on its rods"),),
+    size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "full angle about x through which the wing turns freely"),),
     power="conservative",
+    law="M_x = 0                                    |phi| < b / 2\nM_x = -r sin(phi - sign(phi) b / 2)        beyond",
     source="dead band between two stops (Dubowsky and Freudenstein 1971, Journal of Engineering for Industry 93, 305; "
     "Nordin and Gutman 2002, Automatica 38, 1633, sect. 2), in series with the spring of Fasse (1997)",
-    signature="the wing lags by half the play after each reversal of the load at the root and jumps across; the jump "
-    "has one size, however small the load",
+    signature="the wing lags by half the play after each reversal of the load at the root and then jumps across; the "
+    "size of the jump does not depend on the load",
     confused_with=("stroke_amplitude", "compliant_drive"),
     wing=_wing,
 )

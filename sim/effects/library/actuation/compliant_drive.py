@@ -1,4 +1,4 @@
-"""A drive whose speed drops under load: the rods come late where the wing asks for power."""
+"""A drive whose speed drops under load: the rods are late where the wing needs power."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.motor import AVERAGING, DROOP, FOLLOWING, HOLDING, MOTOR
 
-# Of the angular rate. A lead is taken back, and the mean load learnt, within a beat: e^(-2 pi) is left after it. Slower
-# ones would see less of the load within the beat, and ask for a third more beats on the way to the periodic motion.
+# Over the angular rate. A lead decays, and the mean load is learnt, within a beat: e^(-2 pi) remains after it. Slower
+# rates would react less to the load within the beat, but need a third more beats to the periodic motion.
 GOVERNOR = 1.0
 LEARNING = 1.0
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """A governor that asks for the speed -d (P - P_m) - g tau, and a motor that gets there in T."""
+    """A governor that demands the relative speed -d (P - P_m) - g tau, and a motor that follows within t."""
     motor = np.zeros((MOTOR, LANES))
     motor[DROOP], motor[FOLLOWING] = values["d"], 1.0 / values["t"]
     motor[HOLDING] = GOVERNOR * scene.angular_rate / values["t"]
@@ -31,20 +31,16 @@ EFFECT = Effect(
     port="drive",
     size=(
         Parameter(
-            "d",
-            "1/W",
-            0.0,
-            0.02,
-            0.005,
-            "part of its speed that the motor loses per watt drawn, where the load changes much faster than the beat",
+            "d", "1/W", 0.0, 0.02, 0.005, "relative loss of motor speed per watt, for loads much faster than the beat"
         ),
     ),
-    shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time in which the motor follows its load", scale="log"),),
-    memory="the lead of the crank, the error of its speed, and the mean load",
+    shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time constant with which the motor follows its load", scale="log"),),
+    memory="the lead of the crank, its speed error and the mean load",
+    law="tau' = sigma\nsigma' = -(d (P - P_m) + sigma) / t - (2 pi f / t) tau\nP_m' = 2 pi f (P - P_m)",
     source="speed over torque of a direct-current motor, and its mechanical time constant (Hughes 1990, Electric "
     "Motors and Drives, ch. 3), governed to a mean speed (Maxwell 1868, On Governors)",
-    signature="the stroke is late after each phase of heavy load, two in a beat, and catches up between them; "
-    "grows with frequency and air density",
+    signature="the stroke is late after each phase of heavy load, two in a beat, and catches up between them; grows "
+    "with flap frequency and air density",
     confused_with=("drive_harmonics", "phase_lag_error"),
     wing=_wing,
 )

@@ -1,4 +1,4 @@
-"""The drive adds second, third and fourth harmonics to the stroke that it is said to make."""
+"""The drive adds second, third and fourth harmonics to the described stroke."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
 HARMONICS = {2: 0.02, 3: 0.02, 4: 0.01}
-"""Those added, with typical sizes: of a four-bar linkage that is off, each is smaller than the one before."""
+"""Order and typical size of each; in a four-bar linkage with wrong lengths each is smaller than the one before."""
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
@@ -40,15 +40,13 @@ EFFECT = Effect(
             -5.0 * typical,
             5.0 * typical,
             typical,
-            f"{'cosine' if wave == 'cos' else 'sine'} of harmonic {k} of the drive, in parts of its first harmonic",
+            f"{'cosine' if wave == 'cos' else 'sine'} of harmonic {k} of the drive over the first harmonic",
         )
         for k, typical in HARMONICS.items()
         for wave in ("cos", "sin")
     ),
-    source=(
-        "zeta + a_1 sum_k [cos_k cos(2 pi k t*) + sin_k sin(2 pi k t*)], k = 2, 3, 4: the leading errors of a four-bar "
-        "linkage whose lengths are off (Freudenstein 1955)"
-    ),
+    law="zeta' = zeta + a_1 (cos2 cos 2 psi + sin2 sin 2 psi + ... + cos4 cos 4 psi + sin4 sin 4 psi)",
+    source="the leading errors of a four-bar linkage with wrong lengths (Freudenstein 1955)",
     signature="the same error two to four times a beat at the same drive phases in every condition",
     confused_with=("stroke_amplitude", "tracker_lag"),
     wing=_wing,

@@ -1,4 +1,4 @@
-"""The axis about which the drive turns the rods is not where the wing's description has it."""
+"""The axis about which the drive turns the rods lies elsewhere than described."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ EFFECT = Effect(
     family="actuation",
     port="drive",
     size=tuple(
-        Parameter(axis, "m", -0.4, 0.4, 0.03, f"how far the true axis lies {where} the one told", of="chord")
+        Parameter(axis, "m", -0.4, 0.4, 0.03, f"distance of the true axis {where} the described one", of="chord")
         for axis, where in (("y", "outboard of"), ("z", "above"))
     ),
-    source="rotation about a displaced axis, p' = s + R (p - s) (Euler 1776; Goldstein 1950, Classical Mechanics, "
-    "sect. 4-6); van der Grinten names the distance between axis and wing as a likely cause of an error of 2 cm",
-    signature="all markers are off by the same vector at one phase; it turns with the flap angle and is zero at angle "
-    "zero, in every condition",
+    law="s = s_described + (0, y, z),     p' = s + R (p - s)",
+    source="rotation about a displaced axis (Euler 1776; Goldstein 1950, Classical Mechanics, sect. 4-6); van der "
+    "Grinten names the distance between axis and wing as a likely cause of an error of 2 cm",
+    signature="all markers are off by the same vector at one phase; it turns with the flap angle and is zero at flap "
+    "angle zero, in every condition",
     confused_with=("stroke_amplitude", "camera_shift", "hinge_tilt"),
     wing=_wing,
 )

@@ -22,14 +22,14 @@ EFFECT = Effect(
     port="drive",
     size=tuple(
         Parameter(
-            axis, "rad", -0.2, 0.2, 0.03, f"component along {axis} of the rotation from the axis told to the true"
+            axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation from the described axis to the true one"
         )
         for axis in "yz"
     ),
-    source="rotation about a tilted axis by the formula of Rodrigues (1840); the tilt itself is the rotation vector "
-    "(0, y, z)",
-    signature="the wing sweeps fore and aft, or twists, in proportion to the flap angle, slow or fast, with or without "
-    "air",
+    law="u = R(0, y, z) e_x,     R_rod = cos phi I + sin phi u~ + (1 - cos phi) u u^T",
+    source="rotation about a tilted axis by the formula of Rodrigues (1840); the tilt is the rotation vector (0, y, z)",
+    signature="the wing sweeps fore and aft, or twists, in proportion to the flap angle, at any flap frequency, with "
+    "or without air",
     confused_with=("camera_rotation", "hinge_offset", "phase_lag_error"),
     wing=_wing,
 )

@@ -1,4 +1,4 @@
-"""The rear driving rod is later than it is said to be."""
+"""The rear driving rod lags more than described."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ EFFECT = Effect(
     title="Phase lag error",
     family="actuation",
     port="drive",
-    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "by which the rear rod is later than told, of drive phase"),),
-    source="flap angle of the rear rod at drive phase psi - lag - angle (van der Grinten, section III-F: lags of 0, 3 "
-    "and 7 degrees); shift theorem of Fourier series (Bracewell 1965, ch. 6)",
-    signature="twist in phase with the flap rate, most where the wing moves fastest, the same in every condition",
+    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "drive phase of the rear rod's additional lag"),),
+    law="zeta_rear(psi) = zeta(psi - lag - angle)",
+    source="van der Grinten, section III-F: lags of 0, 3 and 7 degrees; shift theorem of Fourier series (Bracewell "
+    "1965, ch. 6)",
+    signature="twist in phase with the flap rate, largest where the wing moves fastest, the same in every condition",
     confused_with=("hinge_tilt", "rolling_shutter"),
     wing=_wing,
 )

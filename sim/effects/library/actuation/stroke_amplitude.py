@@ -1,4 +1,4 @@
-"""The wings flap further than they are said to."""
+"""The stroke amplitude is larger than described."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ EFFECT = Effect(
     title="Stroke amplitude error",
     family="actuation",
     port="drive",
-    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "part by which all harmonics of the stroke are larger than told"),),
-    source=(
-        "every harmonic k > 0 of the flap angle is multiplied by 1 + part, rates and accelerations with it; "
-        "wing pitch that follows the stroke does so (Armanini et al. 2016, Eqs. 17, 20-21)"
-    ),
-    signature="forces grow with the square, displacements in proportion, with hardly a change of shape over the beat",
+    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of the stroke; positive if larger than described"),),
+    law="zeta(t) = zeta_0 + (1 + part) sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
+    source="every harmonic of the flap angle but the mean is scaled, rates and accelerations with it; wing pitch that "
+    "follows the stroke is scaled too (Armanini et al. 2016, Eqs. 17, 20-21)",
+    signature="forces grow with the square and displacements in proportion, with hardly a change of shape over the "
+    "beat",
     confused_with=("scale_error", "residual_air"),
     wing=_wing,
     vehicle=_vehicle,

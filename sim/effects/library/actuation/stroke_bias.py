@@ -1,4 +1,4 @@
-"""The wings flap about another angle than they are said to."""
+"""The mean flap angle differs from the described one."""
 
 from __future__ import annotations
 
@@ -20,9 +20,11 @@ EFFECT = Effect(
     title="Stroke bias",
     family="actuation",
     port="drive",
-    size=(Parameter("angle", "rad", -0.2, 0.2, 0.03, "what is added to the flap angle at every phase"),),
-    source="the mean of the flap angle is larger by angle (eta of Armanini et al. 2016, Eqs. 20-21)",
-    signature="a constant rotation of the wing about its flapping axis; of forces, the pitch that follows the stroke",
+    size=(Parameter("angle", "rad", -0.2, 0.2, 0.03, "angle added to the flap angle at every phase"),),
+    law="zeta(t) = zeta_0 + angle + sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
+    source="mean flap angle, eta of Armanini et al. (2016), Eqs. 20-21",
+    signature="a constant rotation of the wing about its flapping axis; in forces, the wing pitch that follows the "
+    "stroke",
     confused_with=("camera_rotation", "balance_tilt"),
     wing=_wing,
     vehicle=_vehicle,

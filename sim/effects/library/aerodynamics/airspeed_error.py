@@ -1,4 +1,4 @@
-"""The stream is faster than it is said to be: a blocked tunnel, or an anemometer that is off."""
+"""The stream is faster than described: tunnel blockage, or a wrong anemometer."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ EFFECT = Effect(
     title="Airspeed error, tunnel blockage",
     family="aerodynamics",
     port="air",
-    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "part by which the stream at the wing is faster than told"),),
-    source="U' = U (1 + part); solid and wake blockage speed a closed tunnel up so (Barlow, Rae and Pope 1999, ch. 10)",
+    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of airspeed; positive if faster than described"),),
+    law="U' = U (1 + part)",
+    source="solid and wake blockage raise the speed of a closed tunnel like this (Barlow, Rae and Pope 1999, ch. 10)",
     signature="an error that grows with airspeed and is absent without a stream",
     confused_with=("residual_air", "induced_inflow"),
     wing=_wing,

@@ -1,4 +1,4 @@
-"""Circulation follows the wing late, while the vortices that it sheds are near (Wagner)."""
+"""Circulation lags behind the wing's motion while the shed vortices are near (Wagner)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
 from wingfit.sim.kernels.lanes.vector import load, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 
 Array = npt.NDArray[np.float64]
 
 DEFICIT = (0.165, 0.335)  # R. T. Jones (1940): phi(s) = 1 - sum_i DEFICIT_i exp(-RATE_i s), s in half chords
 RATE = (0.0455, 0.3)  # per half chord travelled
-_FELT = 0.1  # a late circulation, as speed times lift coefficient, moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the integral of a lagging circulation, as speed times lift coefficient
 
 
 def wagner(s: npt.ArrayLike) -> Array:
@@ -40,14 +40,8 @@ def _lag(scene: VehicleScene, values: Values) -> None:
     flow.circulation = delayed
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("circulation", lambda: _lag(scene, values))
-
-
 def _law(frame: Any, moment: int) -> None:
     """The same on strips: of twice Gamma over the chord, which is speed times lift coefficient."""
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         share = load(port.parameters, 0, s)
@@ -66,7 +60,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    seconds = _FELT / scene.angular_rate
+    seconds = _SCALE / scene.angular_rate
     scene.add_strip_law(_law, [values["share"], values["rate"]], states=[seconds, seconds])
 
 
@@ -75,13 +69,16 @@ EFFECT = Effect(
     title="Lagged circulation (Wagner, Theodorsen)",
     family="aerodynamics",
     port="air",
-    size=(Parameter("share", "1", 0.0, 1.5, 1.0, "part of Wagner's deficit; 1 is a thin wing in plane flow"),),
-    shape=(Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states in parts of that in plane flow", scale="log"),),
-    memory="two late circulations at each station or strip",
+    size=(Parameter("share", "1", 0.0, 1.5, 1.0, "fraction of Wagner's deficit; 1 is a thin wing in plane flow"),),
+    shape=(
+        Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states as a fraction of that in plane flow", scale="log"),
+    ),
+    memory="two lagging circulations at each station or strip",
+    law="x_i' = rate b_i (2 V / c) (Gamma_0 - x_i),     i = 1, 2\nGamma = Gamma_0 - share sum_i a_i (Gamma_0 - x_i)",
     source="Wagner (1925) in the approximation of R. T. Jones (1940, NACA Report 681), which for a steady swing is "
     "Theodorsen's function (1935, NACA Report 496); states: Leishman (2006, ch. 8)",
-    signature="lift that comes late and swings less, by the same half chords at any frequency",
+    signature="lift is late and varies less, by the same number of half chords travelled at any flap frequency",
     confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("circulation", _lag),
 )

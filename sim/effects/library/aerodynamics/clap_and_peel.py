@@ -1,4 +1,4 @@
-"""Wings that meet and peel apart fling circulation about themselves."""
+"""Wings that touch and peel apart produce circulation (fling)."""
 
 from __future__ import annotations
 
@@ -6,16 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CHORD_Y, CHORD_Z, CIRCULATION, MEAN_CHORD, PITCH_RATE, PLACE_Y, PLACE_Z
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
-
-Array = npt.NDArray[np.float64]
+from wingfit.sim.kernels.laws import strip_port
 
 NEAR = 0.2  # chords from mid-chord to the mirror plane at which fling has fallen to a half
 _PHASES = 360  # at which the top of the stroke is looked for
@@ -44,8 +41,6 @@ def _law(frame: Any, moment: int) -> None:
     It falls with the distance of mid-chord from the plane, and with the angle to it: open at 45 degrees, two plates
     make no more circulation than each by itself.
     """
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         sine, cosine = load(port.parameters, 1, s), load(port.parameters, 2, s)
@@ -75,17 +70,16 @@ EFFECT = Effect(
     port="air",
     size=(
         Parameter(
-            "coefficient",
-            "1",
-            0.0,
-            8.0,
-            2.7,
-            "circulation while the wings peel, in 1/2 c^2 (-theta_w'), beyond that of one pitching wing: C_F + C_R",
+            "coefficient", "1", 0.0, 8.0, 2.7, "C_F + C_R: circulation while the wings peel, in 1/2 c^2 (-theta_w')"
         ),
     ),
-    shape=(Parameter("clearance", "rad", 0.0, 0.5, 0.0, "angle of wing and mirror plane at the top of the stroke"),),
-    source="Armanini et al. (2016), Eq. 7: Gamma = 1/2 C_F c^2 theta_fling' from t* = 0 until the wings stop peeling; "
-    "of a wing its fall with gap and angle by potential flow (Weis-Fogh 1973; Lighthill 1973)",
+    shape=(
+        Parameter("clearance", "rad", 0.0, 0.5, 0.0, "angle between wing and mirror plane at the top of the stroke"),
+    ),
+    law="Gamma_f = (coefficient / 2) c^2 max(-theta', 0) g(h / c) max(1 - 2^(1/2) sin chi, 0)\n"
+    "g(d) = 1 / (1 + (d / 0.2)^2)",
+    source="Armanini et al. (2016), Eq. 7: fling from t* = 0 until the wings stop peeling; for a wing its decay with "
+    "gap and angle by potential flow (Weis-Fogh 1973; Lighthill 1973)",
     signature="a peak of force at the start of the beat, while the wings open, and nothing after",
     confused_with=("wake_capture", "drive_harmonics"),
     wing=_wing,

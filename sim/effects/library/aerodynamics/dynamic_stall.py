@@ -1,4 +1,4 @@
-"""The flow leaves the upper surface late and comes back late: dynamic stall with one state."""
+"""The flow separates from the upper surface late and reattaches late: dynamic stall with one state."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
 from wingfit.sim.kernels.lanes.lanewise import exponential
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, magnitude, root, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.vehicle.states import separate, steady_attachment
 
 _RECENT = 0.25  # chords travelled over which the rate of alpha of a strip is taken
 _STEEPEST = 50.0  # exponent beyond which exp only overflows
-_METRES = 0.01  # m, felt of either state
+_METRES = 0.01  # m of motion of the wing per unit of either state
 
 
 def _stall(scene: VehicleScene, values: Values) -> None:
@@ -33,17 +33,11 @@ def _stall(scene: VehicleScene, values: Values) -> None:
     separate(attached, values["share"], scene.wings.rotation, flow.circulation)
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("circulation", lambda: _stall(scene, values))
-
-
 def _law(frame: Any, moment: int) -> None:
     """The same on strips, whose states are the separated part 1 - X, and alpha as it was a moment ago.
 
     That follows alpha with _RECENT chords travelled; by what it is behind, alpha' is known without accelerations.
     """
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         chords = load(port.flow, s, SPEED) * (1.0 / port.geometry[s, MEAN_CHORD])
@@ -73,20 +67,21 @@ EFFECT = Effect(
     title="Dynamic stall",
     family="aerodynamics",
     port="air",
-    size=(Parameter("share", "1", 0.0, 1.0, 0.5, "part of Kirchhoff's loss of lift; 1 is all of it"),),
+    size=(Parameter("share", "1", 0.0, 1.0, 0.5, "fraction of Kirchhoff's loss of lift; 1 is the full loss"),),
     shape=(
-        Parameter("angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow leaves half of the chord"),
-        Parameter("width", "rad", 0.02, 0.3, 0.08, "over which it leaves", scale="log"),
-        Parameter("delay", "1", 0.2, 10.0, 0.5, "tau_1: of relaxation, in chords travelled", scale="log"),
-        Parameter("advance", "1", 0.0, 10.0, 2.0, "tau_2: of the onset with the rate of alpha, in chords travelled"),
+        Parameter("angle", "rad", 0.15, 1.2, 0.4, "angle of attack with steady flow separated from half of the chord"),
+        Parameter("width", "rad", 0.02, 0.3, 0.08, "range of angles over which it separates", scale="log"),
+        Parameter("delay", "1", 0.2, 10.0, 0.5, "tau_1: relaxation of separation, in chords travelled", scale="log"),
+        Parameter("advance", "1", 0.0, 10.0, 2.0, "tau_2: delay of onset with the rate of alpha, in chords travelled"),
     ),
-    memory="the attached part of the chord at each station or strip; of a strip also its last angle of attack",
-    source=(
-        "Goman and Khrabrov (1994, Journal of Aircraft 31, 1109): tau_1 X' + X = X_0(alpha - tau_2 alpha'), with "
-        "X_0 = 1 / (1 + exp((alpha - angle) / width)); Kirchhoff's law of lift, ((1 + sqrt X) / 2)^2"
-    ),
-    signature="lift breaks down late in each stroke at high angles of attack and comes back with a loop",
+    memory="the attached fraction of the chord at each station or strip; of a strip also its last angle of attack",
+    law="(delay c / V) X' = X_0(alpha - advance (c / V) alpha') - X\n"
+    "X_0(alpha) = 1 / (1 + exp((alpha - angle) / width))\n"
+    "Gamma_alpha' = Gamma_alpha (1 - share (1 - ((1 + X^(1/2)) / 2)^2))",
+    source="Goman and Khrabrov (1994, Journal of Aircraft 31, 1109): delayed separation point X; Kirchhoff's law of "
+    "lift, ((1 + sqrt X) / 2)^2",
+    signature="lift breaks down late in each stroke at high angles of attack and recovers along a loop",
     confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("circulation", _stall),
 )

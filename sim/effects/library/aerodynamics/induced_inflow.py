@@ -1,24 +1,21 @@
-"""What the air carries moves the air: wings meet a stream of their own making."""
+"""The force on the wings accelerates the air: wings meet the inflow that they induce."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import AREA, CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
 from wingfit.sim.kernels.lanes.vector import load, load1, root, store
 from wingfit.sim.kernels.laws import BEFORE, strip_port
 from wingfit.sim.vehicle.states import settled_inflow
 
-Array = npt.NDArray[np.float64]
-
 _STILL = 1e-12  # m^2/s^2, keeps the mass flow differentiable in still air
-_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def apparent_mass(density: Array, area: Array) -> Array:
@@ -57,10 +54,6 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     settled_inflow(thrust(inflow) + slope * inflow, slope, flux, mass, stream, 2.0 * scene.step, inflow)
     between = 0.5 * (inflow + np.roll(inflow, -1, axis=1))
     scene.inflow = scene.inflow + np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
-
-
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("inflow", lambda: _induce(scene, values))
 
 
 def slices(edges: Array) -> Array:
@@ -104,7 +97,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     mass = depth * values["inertia"]  # over density and area
     area = structure.wiring.geometry[:, AREA] / slices(edges)
     parameters = [0.5 * area[:, None] * values["share"] / mass, 2.0 / mass]
-    scene.add_strip_law(_law, parameters, states=[_FELT / scene.angular_rate] * 3)
+    scene.add_strip_law(_law, parameters, states=[_SCALE / scene.angular_rate] * 3, before=True)
 
 
 EFFECT = Effect(
@@ -112,12 +105,14 @@ EFFECT = Effect(
     title="Induced inflow",
     family="aerodynamics",
     port="air",
-    size=(Parameter("share", "1", 0.0, 2.0, 0.5, "force that drives the inflow, in parts of the thrust or lift"),),
-    shape=(Parameter("inertia", "1", 0.1, 3.0, 1.0, "mass of that air, in parts of a disc's", scale="log"),),
+    size=(Parameter("share", "1", 0.0, 2.0, 0.5, "fraction of the thrust or lift that drives the inflow"),),
+    shape=(Parameter("inertia", "1", 0.1, 3.0, 1.0, "mass of that air over the apparent mass of a disc", scale="log"),),
     memory="the mean inflow through the swept disc; of a wing in a tunnel the inflow of each strip",
+    law="m v' + 2 rho A V_T v = share T(v)             vehicle\n"
+    "m v' = -share L - 2 rho A |U + v| v           each strip of a wing",
     source="momentum theory (Glauert 1926) with the apparent mass of Pitt and Peters (1981, Vertica 5, 21)",
-    signature="less force on average, most so in hover and least in fast flight",
+    signature="less force on average, most in hover and least in fast flight",
     confused_with=("tip_loss", "airspeed_error", "residual_air"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("inflow", _induce),
 )

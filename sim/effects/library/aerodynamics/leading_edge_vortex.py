@@ -1,4 +1,4 @@
-"""Lift beyond attached flow: a vortex stays over the leading edge, and the force stands square on the wing."""
+"""Lift beyond attached flow: a vortex stays over the leading edge, and the force is normal to the wing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from wingfit.sim.kernels.arrays import (
     STREAM_N,
 )
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, magnitude, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 
 _BLEND = math.radians(10.0)  # over which the vortex takes over
 
@@ -32,8 +32,6 @@ def _law(frame: Any, moment: int) -> None:
     many forms this has one coefficient, goes to 90 degrees, and is what flapping wings were measured to have; the
     suction analogy (Polhamus 1966) is for slender wings in steady flow.
     """
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     P, flow, loads = port.parameters, port.flow, port.loads
     for s in range(port.places):
@@ -64,14 +62,17 @@ EFFECT = Effect(
     title="Leading-edge vortex",
     family="aerodynamics",
     port="air",
-    size=(Parameter("part", "1", 0.0, 1.0, 0.5, "part of the affine laws that it replaces; 1 is all of them"),),
+    size=(Parameter("part", "1", 0.0, 1.0, 0.5, "fraction of the affine coefficients that it replaces"),),
     shape=(
-        Parameter("coefficient", "1", 0.5, 3.0, 1.58, "C_l, half the coefficient of the force on the wing at 90 deg"),
+        Parameter("coefficient", "1", 0.5, 3.0, 1.58, "half the coefficient of the force on the wing at 90 deg"),
         Parameter("angle", "rad", 0.0, 0.8, 0.26, "angle of attack at which attached flow ends"),
     ),
-    source="Ellington et al., Nature 384, 626 (1996); Dickinson, Lehmann and Sane, Science 284, 1954 (1999): C_L goes "
-    "up and down by 1.58 and C_D by 1.55 with about twice the angle; Armanini et al. (2016), Eq. 3",
-    signature="other lift and drag at large angles of attack, amid fast strokes; nothing while the flow is attached",
+    law="C_L' = (1 - w) C_L + w coefficient sin 2 alpha\n"
+    "C_D' = (1 - w) C_D + w 2 coefficient sin^2 alpha\n"
+    "w = part x^2 (3 - 2 x),     x = (|alpha| - angle) / 10 deg, limited to 0..1",
+    source="Ellington et al., Nature 384, 626 (1996); Dickinson, Lehmann and Sane, Science 284, 1954 (1999): C_L "
+    "varies by 1.58 and C_D by 1.55 with about twice the angle; Armanini et al. (2016), Eq. 3",
+    signature="other lift and drag at large angles of attack during fast strokes; nothing while the flow is attached",
     confused_with=("dynamic_stall", "plate_drag"),
     wing=_wing,
 )

@@ -1,4 +1,4 @@
-"""Pressure drag of a plate that the air strikes across: what it meets of the stream square to it pushes it."""
+"""Pressure drag of a plate from the component of the stream along its normal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from wingfit.sim.effects.contract import Effect, Parameter, Values
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import DRAG_SLOPE, MEAN_CHORD, PITCH_RATE, PUSH_M, PUSH_N, STREAM_N
 from wingfit.sim.kernels.lanes.vector import load, magnitude, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 
 # Gauss and Legendre's four points of the chord, from its middle, and their weights: within 1 % where the flow turns.
 _POINTS = ((-0.430568, 0.173927), (-0.169991, 0.326073), (0.169991, 0.326073), (0.430568, 0.173927))
@@ -20,8 +20,6 @@ def _law(frame: Any, moment: int) -> None:
     A strip that does not pitch has C_N = C |sin alpha| sin alpha (the cross-flow principle); one that only pitches
     about its middle is held back by the moment rho / 2 C |theta'| theta' c^4 / 32 per span.
     """
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         un, turn = load(port.flow, s, STREAM_N), load(port.flow, s, PITCH_RATE)
@@ -48,12 +46,13 @@ EFFECT = Effect(
     port="air",
     size=(
         Parameter(
-            "coefficient", "1", 0.0, 2.0, 0.5, "of drag at 90 deg beyond that of the affine law; a plate has 1.2 to 2"
+            "coefficient", "1", 0.0, 2.0, 0.5, "drag at 90 deg beyond that of the affine law; a plate has 1.2 to 2"
         ),
     ),
     power="dissipative",
-    source="Hoerner, Fluid-Dynamic Drag (1965), ch. III: plates across the stream and the cross-flow principle; of the "
-    "form C_Dpi/2 sin^2 alpha of Armanini et al. (2016), Eq. 11",
+    law="dF_n = coefficient (rho / 2) |w| w dx dy,     w = u_n + theta' x",
+    source="Hoerner, Fluid-Dynamic Drag (1965), ch. III: plates across the stream and the cross-flow principle; of "
+    "the form C_Dpi/2 sin^2 alpha of Armanini et al. (2016), Eq. 11",
     signature="the wing is held back across its plane by the square of its speed there, at any airspeed",
     confused_with=("leading_edge_vortex", "viscous_drag"),
     wing=_wing,

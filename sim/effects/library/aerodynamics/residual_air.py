@@ -1,4 +1,4 @@
-"""The air is denser than its pressure and temperature say: a chamber that is not as empty as its gauge reads."""
+"""The air is denser than its pressure and temperature imply: a vacuum chamber whose gauge reads too low."""
 
 from __future__ import annotations
 
@@ -18,9 +18,14 @@ EFFECT = Effect(
     title="Residual air, density error",
     family="aerodynamics",
     port="air",
-    size=(Parameter("density", "kg/m^3", -0.01, 0.1, 0.02, "density of the air beyond that of the ideal gas told"),),
-    source="rho = p / (R T) + density, with the ideal gas law (Clapeyron 1834); never below zero",
-    signature="aerodynamic forces in what is called a vacuum; in open air, a change in proportion of all of them",
+    size=(
+        Parameter(
+            "density", "kg/m^3", -0.01, 0.1, 0.02, "density beyond that at the described pressure and temperature"
+        ),
+    ),
+    law="rho = max(p / (R T) + density, 0)",
+    source="ideal gas law (Clapeyron 1834) with an error of density; never below zero",
+    signature="aerodynamic forces in what is described as a vacuum; in open air, a proportional change of all of them",
     confused_with=("airspeed_error", "scale_error", "stroke_amplitude"),
     wing=_change,
     vehicle=_change,

@@ -8,7 +8,7 @@ from wingfit.sim.effects.contract import Effect, Parameter, Values
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, MEAN_CHORD, PITCH_RATE
 from wingfit.sim.kernels.lanes.vector import load, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 
 _LEVER = 0.75 - 0.5  # of a chord: from where the strip's angle of attack is taken to the point that sets circulation
 
@@ -19,8 +19,6 @@ def _law(frame: Any, moment: int) -> None:
     x_0 = 1/2, the strip's flow being that of its middle. In flow from behind the point is at 1/4 and the flow's
     sense is the other: Gamma is the same, and the force, Gamma times the stream, changes sides.
     """
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         lever = load(port.parameters, 0, s) * (_LEVER * port.geometry[s, MEAN_CHORD])
@@ -37,11 +35,12 @@ EFFECT = Effect(
     title="Rotational circulation",
     family="aerodynamics",
     port="air",
-    size=(Parameter("coefficient", "1", -10.0, 10.0, 6.2832, "C_r, of rotational circulation; of thin airfoils 2 pi"),),
-    source="Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002), Gamma_r = pi (3/4 - x_0) omega c^2; "
+    size=(Parameter("coefficient", "1", -10.0, 10.0, 6.2832, "rotational circulation; 2 pi for thin airfoils"),),
+    law="Gamma_r = coefficient (3/4 - x_0) c^2 theta' / 2,     x_0 = 1/2",
+    source="Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002): pi (3/4 - x_0) omega c^2; "
     "Ellington, Philosophical Transactions B 305, 79 (1984); Armanini et al. (2016), Eqs. 2 and 4",
-    signature="a force across the stream where the wing pitches fast, at the stroke's ends; grows with density, pitch "
-    "rate and speed",
+    signature="a force across the stream where the wing pitches fast, at the ends of the stroke; grows with density, "
+    "pitch rate and speed",
     confused_with=("added_mass", "wake_capture", "circulation_lag"),
     wing=_wing,
 )

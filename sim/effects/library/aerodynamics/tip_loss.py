@@ -5,17 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE
 from wingfit.sim.kernels.lanes.vector import load, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
+from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 _PIECES = 64  # of a strip
 
@@ -41,8 +38,6 @@ def strip_factors(structure: Structure, spacing: Array) -> Array:
 
 def _law(frame: Any, moment: int) -> None:
     """Circulation times the strip's factor."""
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         factor = load(port.parameters, 0, s)
@@ -65,11 +60,10 @@ EFFECT = Effect(
     family="aerodynamics",
     port="air",
     size=(
-        Parameter(
-            "spacing", "m", 0.0, 2.0, 0.5, "distance between the vortex sheets of successive strokes", of="chord"
-        ),
+        Parameter("spacing", "m", 0.0, 2.0, 0.5, "distance between vortex sheets of successive strokes", of="chord"),
     ),
-    source="Prandtl in Betz (1919); Glauert (1935, Aerodynamic Theory, division L, chapter VII): F = 2/pi arccos e^-f",
+    law="F = (2 / pi) arccos exp(-pi (R - r) / spacing)",
+    source="Prandtl in Betz (1919); Glauert (1935, Aerodynamic Theory, division L, chapter VII)",
     signature="less load and less bending of the outer wing only, at the phases of large lift",
     confused_with=("induced_inflow", "residual_air", "dynamic_stall"),
     wing=_wing,

@@ -1,4 +1,4 @@
-"""Coefficients of circulation that are not the same in slow flight as in fast flight."""
+"""Coefficients of circulation that change with the flight condition."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
-REFERENCE_FREQUENCY = 12.0  # Hz: there, and at the pitch below, coefficients are what their genes say
-REFERENCE_PITCH = 1.0  # rad; both lie amid the eight tests of the source
+REFERENCE_FREQUENCY = 12.0  # Hz: at this and the pitch below, coefficients equal their genes
+REFERENCE_PITCH = 1.0  # rad; both lie among the eight tests of the source
 LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
 
 
@@ -38,23 +38,17 @@ EFFECT = Effect(
     family="aerodynamics",
     port="air",
     size=(
-        Parameter("lift_by_frequency", "1", -8.0, 8.0, -3.5, "change of C_l or K_l with f / 12 Hz, in parts"),
-        Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "change of C_l or K_l with body pitch, in parts"),
-        Parameter(
-            "fling_by_frequency", "1", -8.0, 8.0, 1.6, "change of the fling coefficient with f / 12 Hz, in parts"
-        ),
-        Parameter(
-            "fling_by_pitch", "1/rad", -2.0, 2.0, 0.3, "change of the fling coefficient with body pitch, in parts"
-        ),
+        Parameter("lift_by_frequency", "1", -8.0, 8.0, -3.5, "relative change of C_l or K_l with f / 12 Hz"),
+        Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "relative change of C_l or K_l with body pitch"),
+        Parameter("fling_by_frequency", "1", -8.0, 8.0, 1.6, "relative change of fling with f / 12 Hz"),
+        Parameter("fling_by_pitch", "1/rad", -2.0, 2.0, 0.3, "relative change of fling with body pitch"),
     ),
-    source=(
-        "Armanini et al. (2016), Eq. 23: C_l and C_F are affine in flap frequency and body pitch, C_r is their mean; "
-        "sizes from Table 8"
-    ),
-    signature=(
-        "each recording by itself fits, all together do not: lift falls short in some conditions and is too large in "
-        "others, with the same shape over the beat"
-    ),
+    law="C_l' = C_l max(1 + lift_by_frequency (f / f_0 - 1) + lift_by_pitch (theta_b - theta_0), 0)\n"
+    "C_F' = C_F max(1 + fling_by_frequency (f / f_0 - 1) + fling_by_pitch (theta_b - theta_0), 0)",
+    source="Armanini et al. (2016), Eq. 23: C_l and C_F are affine in flap frequency and body pitch, C_r is their "
+    "mean; sizes from Table 8",
+    signature="each recording fits by itself, all together do not: lift is too small in some conditions and too large "
+    "in others, with the same shape over the beat",
     confused_with=("circulation_lag", "tip_loss", "mass_offset"),
     vehicle=_vary,
 )

@@ -6,15 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import MEAN_CHORD, PUSH_C, STREAM_C
 from wingfit.sim.kernels.lanes.vector import load, magnitude, root, store
-from wingfit.sim.kernels.laws import AFTER, strip_port
-
-Array = npt.NDArray[np.float64]
+from wingfit.sim.kernels.laws import strip_port
 
 _BLASIUS = 2 * 1.328  # both faces
 
@@ -26,8 +23,6 @@ def viscosity(temperature: float) -> float:
 
 def _law(frame: Any, moment: int) -> None:
     """C_D = 2.656 / sqrt(Re) along the chord, Re of the chord and of the stream along it."""
-    if moment != AFTER:
-        return
     port = strip_port(frame)
     for s in range(port.places):
         along = load(port.flow, s, STREAM_C)
@@ -49,11 +44,16 @@ EFFECT = Effect(
     family="aerodynamics",
     port="air",
     size=(
-        Parameter("part", "1", 0.0, 20.0, 2.0, "friction in parts of that on a smooth flat plate; rough skin has more"),
+        Parameter(
+            "part", "1", 0.0, 20.0, 2.0, "skin friction over that of a smooth flat plate; above 1 for rough skin"
+        ),
     ),
     power="dissipative",
-    source="Blasius (1908): 1.328 / sqrt(Re) a face of a plate; Schlichting (1979), Boundary-Layer Theory, ch. VII",
-    signature="a pull backwards as the 3/2 power of the speed; in thin air it falls as the root of the density only",
+    law="F_c = part (rho / 2) S 2.656 (nu / c)^(1/2) |u_c|^(1/2) u_c",
+    source="Blasius (1908): 1.328 / sqrt(Re) for each face of a plate; Schlichting (1979), Boundary-Layer Theory, ch. "
+    "VII",
+    signature="a backward force that grows with the 3/2 power of speed; in thin air it falls with the square root of "
+    "density only",
     confused_with=("plate_drag", "residual_air"),
     wing=_wing,
 )

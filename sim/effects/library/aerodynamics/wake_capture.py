@@ -1,4 +1,4 @@
-"""After each reversal the wing meets the air that its last stroke set in motion."""
+"""After each reversal the wing meets the air that its previous stroke set in motion."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CHORD_X, MEAN_CHORD, NORMAL_X, SPEED, STREAM_C, STREAM_N
@@ -17,7 +17,7 @@ from wingfit.sim.vehicle.states import overtake
 
 _RECENT = 1 / 64  # of a beat, over which the velocity of a strip is taken
 _STILL = 1e-12  # m^2/s^2, keeps the part of the wake that goes along defined where the wing rests
-_FELT = 0.1  # a velocity of the air moves the wing by this part of its own way
+_SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def _meet_wake(scene: VehicleScene, values: Values) -> None:
@@ -33,10 +33,6 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
     air = scene.follow(1.0 / (values["chords"][:, None] * places.chord), own)
     overtake(own, values["share"], air)
     scene.wings.gust(flow, air)
-
-
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("wake", lambda: _meet_wake(scene, values))
 
 
 def _law(frame: Any, moment: int) -> None:
@@ -72,8 +68,8 @@ def _law(frame: Any, moment: int) -> None:
 
 def _wing(scene: WingScene, values: Values) -> None:
     recent = np.full(LANES, scene.condition.flap_frequency / _RECENT)
-    seconds = [_FELT / scene.angular_rate] * 4
-    scene.add_strip_law(_law, [values["share"], values["chords"], recent], states=seconds)
+    seconds = [_SCALE / scene.angular_rate] * 4
+    scene.add_strip_law(_law, [values["share"], values["chords"], recent], states=seconds, before=True)
 
 
 EFFECT = Effect(
@@ -81,17 +77,16 @@ EFFECT = Effect(
     title="Wake capture",
     family="aerodynamics",
     port="air",
-    size=(Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the wake, in parts of the wing's own before"),),
-    shape=(Parameter("chords", "1", 0.5, 10.0, 2.0, "chords travelled in which the wake fades", scale="log"),),
+    size=(Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the wake over the wing's earlier velocity"),),
+    shape=(Parameter("chords", "1", 0.5, 10.0, 2.0, "chords travelled in which the wake decays", scale="log"),),
     memory="the velocity of the wake at each station or strip; of a strip also its own last velocity",
-    source=(
-        "what remains of force after quasi-steady terms at reversal: Dickinson, Lehmann and Sane (1999), Sane and "
-        "Dickinson (2002); of a wake that moves as the wing did, and of the first stroke from rest, which has none: "
-        "Birch and Dickinson (2003). One fading state is the least model of it"
-    ),
-    signature="soon after each reversal a push the way the last stroke went, which enlarges what circulation there is; "
-    "it dies out within the stroke, and a first stroke from rest has none",
+    law="w' = (V / (chords c)) (u - w)\nvelocity of the air = share (w - k u),     k = w.u / u^2, limited to 0..1",
+    source="force that remains after quasi-steady terms at stroke reversal: Dickinson, Lehmann and Sane (1999), Sane "
+    "and Dickinson (2002); no wake in the first stroke from rest: Birch and Dickinson (2003). One decaying state is "
+    "the simplest model of it",
+    signature="soon after each reversal a push in the direction of the previous stroke, which increases the existing "
+    "circulation; it decays within the stroke, and a first stroke from rest has none",
     confused_with=("circulation_lag", "clap_and_peel", "drive_harmonics"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("wake", _meet_wake),
 )

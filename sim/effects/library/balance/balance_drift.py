@@ -1,11 +1,11 @@
-"""The zero of the balance wanders: steadily, and as it warms up."""
+"""The zero of the balance drifts: steadily, and as it warms up."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_forces
 from wingfit.sim.effects.ports.weights import along_axes
 
 
@@ -17,14 +17,12 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.added += since * steady[:, None] + warm * thermal[:, None]
 
 
-EFFECT = Effect(
+EFFECT = fault_of_forces(
     name="balance_drift",
     title="Balance drift",
-    family="measurement",
-    port="observation",
     size=(
         *(
-            Parameter(axis, "1/s", -0.1, 0.1, 0.005, f"steady drift along {axis}, in weights of the vehicle per second")
+            Parameter(axis, "1/s", -0.1, 0.1, 0.005, f"steady drift along {axis}, in weights per second")
             for axis in "xz"
         ),
         *(
@@ -32,12 +30,11 @@ EFFECT = Effect(
             for axis in "xz"
         ),
     ),
-    shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "in which the balance has warmed up to 63 %", scale="log"),),
+    shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "time constant of warming", scale="log"),),
     memory="temperature of the gauges, from the first sample of a recording",
-    source="F' = F + a t + b (1 - exp(-t / tau)): zero drift and first-order warming of strain gauges (Doebelin 2004, "
-    "Measurement Systems)",
+    law="F' = F + m g [(x, z) t + (thermal_x, thermal_z) (1 - exp(-t / time))]",
+    source="zero drift and first-order warming of strain gauges (Doebelin 2004, Measurement Systems)",
     signature="the mean over a beat moves from the first to the last beat; the shape of the beat stays",
     confused_with=("balance_offset",),
     observe=_observe,
-    observed=("forces",),
 )

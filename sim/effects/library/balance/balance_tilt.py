@@ -1,11 +1,11 @@
-"""The axes of the balance are turned against those of the body."""
+"""The axes of the balance are rotated relative to those of the body."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_forces
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -14,16 +14,14 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = np.stack([c * x - s * z, s * x + c * z], axis=-1)
 
 
-EFFECT = Effect(
+EFFECT = fault_of_forces(
     name="balance_tilt",
     title="Balance axes tilted",
-    family="measurement",
-    port="observation",
-    size=(Parameter("angle", "rad", -0.2, 0.2, 0.02, "by which the balance's x is nose up from the body's x"),),
-    source="rotation of axes, X' = X cos a - Z sin a, Z' = X sin a + Z cos a (Barlow, Rae and Pope 1999, Low-Speed "
-    "Wind Tunnel Testing, chapter 7: alignment of a balance)",
+    size=(Parameter("angle", "rad", -0.2, 0.2, 0.02, "nose-up angle from the body's x axis to the balance's"),),
+    law="X' = X cos angle - Z sin angle\nZ' = X sin angle + Z cos angle",
+    source="rotation of axes (Barlow, Rae and Pope 1999, Low-Speed Wind Tunnel Testing, chapter 7: alignment of a "
+    "balance)",
     signature="each force axis shows a part of the other, alike at every phase and in every condition",
     confused_with=("balance_offset", "scale_error"),
     observe=_observe,
-    observed=("forces",),
 )

@@ -1,11 +1,11 @@
-"""The amplifier of the balance low-passes one way, and so delays."""
+"""The amplifier of the balance is a causal low-pass filter, which delays."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_forces
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -13,22 +13,17 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(1.0 / (1.0 + s + values["second"][:, None] * s * s))
 
 
-EFFECT = Effect(
+EFFECT = fault_of_forces(
     name="filter_delay",
     title="Filter delay",
-    family="measurement",
-    port="observation",
-    size=(Parameter("delay", "s", 0.0, 0.02, 0.001, "tau: delay of a slow signal"),),
+    size=(Parameter("delay", "s", 0.0, 0.02, 0.001, "delay of a slow signal"),),
     shape=(
-        Parameter(
-            "second", "1", 0.0, 1.0, 0.5, "b: 0 for a filter of first order, 1/3 for Bessel, 1/2 for Butterworth"
-        ),
+        Parameter("second", "1", 0.0, 1.0, 0.5, "0 for a filter of first order, 1/3 for Bessel, 1/2 for Butterworth"),
     ),
     memory="the filter's output and its rate",
-    source="1 / (1 + tau s + b (tau s)^2) (Tietze, Schenk and Gamm 2008, Electronic Circuits: low-pass "
-    "filters of first and second order)",
-    signature="forces lag, and higher harmonics are smaller as well; the more, the faster the wing flaps",
+    law="F_k' = F_k / (1 + s + second s^2),     s = 2 pi i k f delay",
+    source="low-pass filters of first and second order (Tietze, Schenk and Gamm 2008, Electronic Circuits)",
+    signature="forces lag and higher harmonics are smaller; both grow with the flap frequency",
     confused_with=("clock_offset", "circulation_lag", "balance_resonance"),
     observe=_observe,
-    observed=("forces",),
 )

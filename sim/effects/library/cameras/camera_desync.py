@@ -1,11 +1,11 @@
-"""One camera of the pair sees each instant later than the other."""
+"""One camera of the pair takes its images later than the other."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 
@@ -17,20 +17,16 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = cameras.points(inner, outer)
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="camera_desync",
     title="Cameras out of step",
-    family="measurement",
-    port="observation",
-    size=(
-        Parameter("delay", "s", -0.01, 0.01, 0.002, "by which the outer camera's image is later than the inner one's"),
-    ),
+    size=(Parameter("delay", "s", -0.01, 0.01, 0.002, "time by which the outer camera is later than the inner one"),),
     shape=PLACES,
+    law="inner image at t, outer image at t + delay:     H - Z' = B / (v_inner - v_outer + B / H)",
     source="triangulation of two images of different instants (Hartley and Zisserman 2004, chapter 12; Bradley et al. "
     "2009, Synchronization and rolling shutter compensation for consumer video camera arrays)",
-    signature="markers are too near or too far by their speed along the cameras' base line: an error of depth that "
-    "changes sign with the stroke and grows with the flapping frequency",
+    signature="markers appear too near or too far in proportion to their speed along the cameras' base line: an error "
+    "of depth that changes sign with the stroke and grows with the flap frequency",
     confused_with=("rolling_shutter", "clock_offset", "tracker_lag"),
     observe=_observe,
-    observed=("tracks",),
 )

@@ -1,11 +1,11 @@
-"""The cameras' frame is turned against the frame of the wing."""
+"""The cameras' frame is rotated relative to the frame of the wing."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Array, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 
 _TINY = 1e-8  # rad: below, (1 - cos a) / a^2 is 1/2 to the last digit, and would be 0 / 0
 
@@ -30,18 +30,16 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = R[..., 0] * p[..., 0:1] + R[..., 1] * p[..., 1:2] + R[..., 2] * p[..., 2:3]
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="camera_rotation",
     title="Camera frame rotated",
-    family="measurement",
-    port="observation",
     size=tuple(
         Parameter(axis, "rad", -0.2, 0.2, 0.01, f"{axis} of the rotation vector from the true to the recorded frame")
         for axis in "xyz"
     ),
-    source="rigid motion of the measured frame, p' = R p about the frame's origin (Rodrigues 1840, rotation vector)",
-    signature="errors grow with the distance from the hinge like turns of a rigid wing, alike in every condition",
+    law="p' = R p,     R = exp((x, y, z)~)",
+    source="rigid rotation of the measured frame about its origin (Rodrigues 1840, rotation vector)",
+    signature="errors grow with the distance from the hinge as if a rigid wing were rotated, alike in every condition",
     confused_with=("camera_shift", "hinge_tilt", "stroke_bias"),
     observe=_observe,
-    observed=("tracks",),
 )

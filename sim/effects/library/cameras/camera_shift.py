@@ -1,11 +1,11 @@
-"""The origin of the cameras' frame is not where it is said to be."""
+"""The origin of the cameras' frame lies elsewhere than described."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -13,18 +13,16 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = sampling.beat + shift[:, None, None, :]
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="camera_shift",
     title="Camera frame shifted",
-    family="measurement",
-    port="observation",
     size=tuple(
         Parameter(axis, "m", -0.2, 0.2, 0.02, f"shift of all recorded positions along {axis}", of="chord")
         for axis in "xyz"
     ),
-    source="rigid motion of the measured frame, p' = p + s (Luhmann et al. 2014, Close-Range Photogrammetry)",
+    law="p' = p + (x, y, z)",
+    source="rigid motion of the measured frame (Luhmann et al. 2014, Close-Range Photogrammetry)",
     signature="every marker is off by the same vector at every phase, in every condition",
     confused_with=("hinge_offset", "camera_rotation"),
     observe=_observe,
-    observed=("tracks",),
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Array, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 
@@ -27,11 +27,9 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = cameras.points(inner, outer)
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="lens_distortion",
     title="Lens distortion not removed",
-    family="measurement",
-    port="observation",
     size=(
         Parameter("k1", "1", -0.25, 0.25, -0.1, "radial distortion, third order; negative for a barrel"),
         Parameter("k2", "1", -0.1, 0.1, 0.01, "radial distortion, fifth order"),
@@ -39,11 +37,12 @@ EFFECT = Effect(
         Parameter("p2", "1", -0.02, 0.02, 0.001, "tangential distortion, of a lens off its axis along the chord"),
     ),
     shape=PLACES,
+    law="u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2)\n"
+    "v' = v (1 + k1 r^2 + k2 r^4) + 2 p2 u v + p1 (r^2 + 2 v^2)",
     source="Brown-Conrady model: Brown 1971, Close-range camera calibration; Conrady 1919. An action camera has k1 of "
     "about -0.25; a calibration at another field of view leaves part of it",
-    signature="displacements grow with the third power of the distance from the middle of the image, at rest as in "
-    "motion, alike in every condition",
+    signature="errors grow with the third power of the distance from the middle of the image, at rest as in motion, "
+    "alike in every condition",
     confused_with=("scale_error", "camera_rotation"),
     observe=_observe,
-    observed=("tracks",),
 )

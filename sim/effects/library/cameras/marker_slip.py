@@ -1,12 +1,12 @@
-"""A marker does not sit where it is said to."""
+"""A marker sits elsewhere on the wing than described."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values
 from wingfit.sim.effects.ports.markers import PLACE, nearest, tangents
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -18,20 +18,18 @@ def _observe(sampling: Sampling, values: Values) -> None:
         beat[:, marker] += np.einsum("m,nmi->ni", x * along + y * across, beat)
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="marker_slip",
     title="Marker slipped",
-    family="measurement",
-    port="observation",
     size=tuple(
-        Parameter(axis, "m", -0.3, 0.3, 0.03, f"by which the marker sits {where} of where it is said to", of="chord")
+        Parameter(axis, "m", -0.3, 0.3, 0.03, f"distance of the marker {where} of its described place", of="chord")
         for axis, where in (("x", "aft"), ("y", "outboard"))
     ),
     shape=PLACE,
-    source="material point moved on the surface, p' = p + dp/dX s, with the tangents of a moving least-squares plane "
-    "(Lancaster and Salkauskas 1981)",
+    law="p' = p + x dp/dX + y dp/dY",
+    source="material point moved on the surface, with the tangents of a moving least-squares plane (Lancaster and "
+    "Salkauskas 1981)",
     signature="one marker is off by a vector that turns with the wing, in every condition; its neighbours are not",
     confused_with=("marker_swap",),
     observe=_observe,
-    observed=("tracks",),
 )

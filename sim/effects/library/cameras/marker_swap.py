@@ -1,10 +1,10 @@
-"""The tracker takes two neighbouring markers for each other."""
+"""The tracker exchanges two neighbouring markers."""
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values
 from wingfit.sim.effects.ports.markers import PLACE, nearest
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -16,21 +16,17 @@ def _observe(sampling: Sampling, values: Values) -> None:
         beat[:, other] = (1.0 - part) * beat[:, other] + part * was
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="marker_swap",
     title="Markers swapped",
-    family="measurement",
-    port="observation",
     size=(
-        Parameter(
-            "part", "1", 0.0, 1.0, 1.0, "part of the frames, spread evenly over the beat, in which they are swapped"
-        ),
+        Parameter("part", "1", 0.0, 1.0, 1.0, "fraction of the frames in which they are swapped, evenly over the beat"),
     ),
     shape=PLACE,
+    law="p_1' = (1 - part) p_1 + part p_2,     p_2' = (1 - part) p_2 + part p_1",
     source="exchange of labels between tracks (identity switch; Bernardin and Stiefelhagen 2008, CLEAR MOT metrics); "
-    "in part, the mean over the frames, which least squares sees",
-    signature="two neighbours have each other's path: opposite displacements of equal length, alike in every condition",
+    "a fraction of the frames acts in least squares like their mean",
+    signature="two neighbours have each other's path: opposite errors of equal length, alike in every condition",
     confused_with=("marker_slip",),
     observe=_observe,
-    observed=("tracks",),
 )

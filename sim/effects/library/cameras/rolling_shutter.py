@@ -1,11 +1,11 @@
-"""The rows of an image are read one after the other, while the wing moves on; a pair of cameras reads its own each."""
+"""The rows of an image are read one after the other while the wing moves, in both cameras of a pair."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values, measure
-from wingfit.sim.effects.ports.observation import Sampling, between
+from wingfit.sim.effects.contract import Parameter, Values, measure
+from wingfit.sim.effects.ports.observation import Sampling, between, fault_of_tracks
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 _ROUNDS = 2  # in each an error falls by the marker's speed over that of the read-out, a few hundredths
@@ -39,22 +39,18 @@ def _cameras(sampling: Sampling, span: float) -> Stereo:
     return Stereo(*(np.full((len(sampling.beat), 1, 1), place) for place in places))
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="rolling_shutter",
     title="Rolling shutter",
-    family="measurement",
-    port="observation",
     size=(
-        Parameter(
-            "along_span", "s", -0.02, 0.02, 0.004, "time in which the read-out passes the span, from root to tip"
-        ),
-        Parameter("along_chord", "s", -0.01, 0.01, 0.0005, "time in which it passes the mean chord, aft"),
+        Parameter("along_span", "s", -0.02, 0.02, 0.004, "time of the read-out along the span, from root to tip"),
+        Parameter("along_chord", "s", -0.01, 0.01, 0.0005, "time of the read-out along the mean chord, aft"),
     ),
+    law="p_k(t) = p(t + d_k),     d_k = along_chord x / c + along_span h v_k / b",
     source="Meingast, Geyer and Sastry 2005, Geometric models of rolling-shutter cameras; Liang, Chang and Chen 2008. "
     "An action camera reads an image in 10 to 20 ms; a flash in the dark avoids the fault",
-    signature="a lag that grows steadily along the span (or chord), in proportion to the flapping frequency; along the "
-    "span heights are wrong as well, where two cameras read a marker in different rows",
+    signature="a lag that grows steadily along the span (or chord), in proportion to the flap frequency; along the "
+    "span heights are wrong too, where two cameras read a marker in different rows",
     confused_with=("camera_desync", "phase_lag_error", "tracker_lag"),
     observe=_observe,
-    observed=("tracks",),
 )

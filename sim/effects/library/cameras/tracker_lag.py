@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Array, Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
 
 _BISECTIONS = 60
 
@@ -55,11 +55,9 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(response(values["smoothing"], order * step))
 
 
-EFFECT = Effect(
+EFFECT = fault_of_tracks(
     name="tracker_lag",
     title="Tracker lag and smoothing",
-    family="measurement",
-    port="observation",
     size=(
         Parameter(
             "smoothing",
@@ -67,16 +65,16 @@ EFFECT = Effect(
             0.0,
             100.0,
             2.0,
-            "what the tracker takes the measurement's deviation for, over that of "
-            "the change of acceleration from frame to frame times the square of their distance in time",
+            "assumed noise of positions over that of accelerations times frame time squared",
         ),
     ),
     memory="position, velocity and acceleration of each marker, from frame to frame",
+    law="H = N / (N + (1 - alpha) d^3),     N = alpha d^2 + beta q d + gamma q (q + d / 2)\n"
+    "2 (1 - s)^3 smoothing = s (1 + s),   alpha = 1 - s^2,   beta = 2 (1 - s)^2,   gamma = beta^2 / (2 alpha)",
     source="Kalman filter of constant acceleration in steady state: Kalata 1984, The tracking index; Bar-Shalom, Li "
     "and Kirubarajan 2001, Estimation with Applications to Tracking and Navigation, sections 6.3.3 and 6.5",
     signature="higher harmonics are smaller and late in the order of the frames, which under a strobe faster than the "
-    "wing is early in the beat; the same at every flapping frequency with as many frames to the apparent beat",
+    "wing is early in the beat; the same at every flap frequency with as many frames per apparent beat",
     confused_with=("camera_desync", "rolling_shutter"),
     observe=_observe,
-    observed=("tracks",),
 )

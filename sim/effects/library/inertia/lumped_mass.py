@@ -1,10 +1,10 @@
-"""A mass that nobody weighed: a drop of glue, a marker."""
+"""A point mass that the description lacks: a drop of glue, a marker."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Effect, Parameter, Values, place
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -21,14 +21,12 @@ EFFECT = Effect(
     family="inertia",
     port="inertia",
     size=(Parameter("mass", "kg", 0.0, 0.5, 0.05, "mass of the point", of="mass"),),
-    shape=(
-        Parameter("station", "1", 0.0, 1.0, 0.8, "where it is, part of the span from root to tip", place=True),
-        Parameter("chord", "1", 0.0, 1.0, 0.8, "where it is, part of the chord from the leading edge", place=True),
-    ),
+    shape=place(0.8, 0.8),
     power="conservative",
-    source="Newton's second law for a point fixed to a body; Rayleigh, The Theory of Sound (1877), ch. VIII: a load on "
-    "a bar",
-    signature="all that lies near one place lags where the stroke turns round, in vacuum as in air, and sags at rest",
+    law="T = mass |v + omega x a|^2 / 2,     F = mass g",
+    source="Newton's second law for a point fixed to a body; Rayleigh, The Theory of Sound (1877), ch. VIII: a load "
+    "on a bar",
+    signature="everything near one place lags where the stroke reverses, in vacuum as in air, and sags at rest",
     confused_with=("added_mass", "mass_offset", "damage"),
     wing=_wing,
 )

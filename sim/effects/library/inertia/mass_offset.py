@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import VehicleScene
+from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -31,25 +31,18 @@ def _shift_mass(scene: VehicleScene, values: Values) -> None:
     scene.push(moment * x, moment * z)
 
 
-def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.after("mass", lambda: _shift_mass(scene, values))
-
-
 EFFECT = Effect(
     name="mass_offset",
     title="Centre of mass off its place along the chord",
     family="inertia",
     port="inertia",
-    size=(
-        Parameter(
-            "distance", "m", -0.3, 0.3, 0.05, "how far the mass lies nearer the trailing edge than told", of="chord"
-        ),
-    ),
+    size=(Parameter("distance", "m", -0.3, 0.3, 0.05, "distance of the mass aft of its described place", of="chord"),),
     power="conservative",
-    source="Newton's second law for a point fixed to a turning wing, F = -m d^2/dt^2 (offset vector); Goldstein, "
-    "Classical Mechanics (1980), ch. 5: inertia about another point than the centre of mass",
+    law="T = m |v + omega x (distance, 0, 0)|^2 / 2",
+    source="Newton's second law for a point fixed to a turning wing; Goldstein, Classical Mechanics (1980), ch. 5: "
+    "inertia about another point than the centre of mass",
     signature="torsion and force in phase with the accelerations of flap and pitch, in vacuum as in air",
     confused_with=("lumped_mass", "drive_harmonics", "stroke_bias"),
     wing=_wing,
-    vehicle=_vehicle,
+    vehicle=deferred("mass", _shift_mass),
 )

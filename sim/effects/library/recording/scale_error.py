@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_recordings
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -11,16 +11,15 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = sampling.beat * factor.reshape(-1, *(1,) * (sampling.beat.ndim - 1))
 
 
-EFFECT = Effect(
+EFFECT = fault_of_recordings(
     name="scale_error",
     title="Scale error",
-    family="measurement",
-    port="observation",
-    size=(Parameter("part", "1", -0.1, 0.1, 0.01, "part by which recorded lengths, or forces, are too large"),),
-    source="similarity p' = (1 + s) p: the scale of a reconstruction is that of its reference length (Luhmann et al. "
-    "2014, Close-Range Photogrammetry); F' = (1 + s) F: gain of a balance (AIAA R-091A 2020)",
-    signature="the whole wing is larger, at rest as in motion, or all forces are; the same part in every condition",
+    size=(Parameter("part", "1", -0.1, 0.1, 0.01, "relative error of lengths or forces; positive if too large"),),
+    law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
+    source="the scale of a reconstruction is that of its reference length (Luhmann et al. 2014, Close-Range "
+    "Photogrammetry); gain of a balance (AIAA R-091A 2020)",
+    signature="the whole wing is larger, at rest as in motion, or all forces are; by the same factor in every "
+    "condition",
     confused_with=("stroke_amplitude", "camera_shift", "lens_distortion"),
     observe=_observe,
-    observed=("tracks", "forces"),
 )

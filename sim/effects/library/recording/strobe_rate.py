@@ -1,9 +1,9 @@
-"""The ratio of the beat's frequency to the rate of the frames is not what it is taken for."""
+"""The ratio of flap frequency to frame rate differs from the recorded one."""
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.ports.observation import Sampling, fault_of_recordings
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
@@ -13,20 +13,24 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.times = times + values["part"][:, None] * (times - start)
 
 
-EFFECT = Effect(
+EFFECT = fault_of_recordings(
     name="strobe_rate",
     title="Strobe-rate error",
-    family="measurement",
-    port="observation",
     size=(
-        Parameter("part", "1", -2e-3, 2e-3, 1e-4, "part by which the beat is faster, in samples, than it is taken for"),
+        Parameter(
+            "part",
+            "1",
+            -2e-3,
+            2e-3,
+            1e-4,
+            "relative error of flap frequency over frame rate; positive if larger than recorded",
+        ),
     ),
-    source="aliased time: with a beat of f(1 + e) the phase at t is 2 pi f (1 + e) t, and each frame, from "
-    "another beat, adds to the error (van der Grinten, The bird is the word, Appendix A; Bendat and Piersol "
-    "2010, Random Data)",
-    signature="the phase runs away steadily from the first to the last frame: markers scatter about their path in "
-    "proportion to their speed, more the longer the recording",
+    law="t' = t + part (t - t_0)",
+    source="aliased time: each frame is from another beat and adds to the error (van der Grinten, The bird is the "
+    "word, Appendix A; Bendat and Piersol 2010, Random Data)",
+    signature="the phase drifts steadily from the first to the last frame: markers scatter about their path in "
+    "proportion to their speed, more in longer recordings",
     confused_with=("clock_offset", "tracker_lag"),
     observe=_observe,
-    observed=("tracks", "forces"),
 )

@@ -1,24 +1,21 @@
-"""Bending that grows stiffer, or softer, the further the wing bends."""
+"""Bending stiffness that grows or falls with the bend."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
 from wingfit.sim.kernels.laws import connector_port
 
-Array = npt.NDArray[np.float64]
-
 _SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangent loses 5/4 of it at most
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:
     """A potential of s, the sine of the bending, from the axial part of Q.
 
     V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2: cubic for c = 0, else
@@ -72,18 +69,17 @@ EFFECT = Effect(
     port="connector",
     size=(
         Parameter(
-            "change",
-            "1",
-            -0.5,
-            10.0,
-            3.0,
-            "part by which bending stiffness, as moment over angle, grows where bent by one radian over the span",
+            "change", "1", -0.5, 10.0, 3.0, "relative growth of bending stiffness at a bend of one radian over the span"
         ),
     ),
     power="conservative",
+    law="M = -E K s (u + c u^2 / 2) / (1 + c u)^2,     u = (s / p)^2\n"
+    "change >= 0:   E = change,   c = 0\n"
+    "change < 0:    c = (1 + change / 0.7)^(-1/2) - 1,   E = -1.4 c",
     source="Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918); Nayfeh and Mook, Nonlinear "
     "Oscillations (1979), ch. 4; softening made to level off",
-    signature="swings less than in proportion where it is driven harder (more if softening), with third harmonics",
+    signature="the swing grows less than in proportion to the drive (more than in proportion if softening), with "
+    "third harmonics",
     confused_with=("damage", "hysteresis", "rod_slip"),
     wing=_wing,
 )

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
-
-Array = npt.NDArray[np.float64]
 
 _POINTS = 64  # along a connector: exact to 1e-3 for the narrowest damage on four strips
 
@@ -38,20 +35,16 @@ EFFECT = Effect(
     title="Local loss of stiffness",
     family="structure",
     port="connector",
-    size=(
-        Parameter(
-            "loss", "1", -2.0, 0.9, 0.5, "part of the stiffness, and of its damping, lost there; gained if negative"
-        ),
-    ),
+    size=(Parameter("loss", "1", -2.0, 0.9, 0.5, "fraction of stiffness and damping lost; negative for a gain"),),
     shape=(
-        Parameter("station", "1", 0.0, 1.0, 0.5, "where it is, part of the span from root to tip", place=True),
-        Parameter(
-            "width", "1", 0.02, 0.3, 0.06, "how far it reaches (standard deviation), part of the span", place=True
-        ),
+        Parameter("station", "1", 0.0, 1.0, 0.5, "place along the span, fraction of it from root to tip", place=True),
+        Parameter("width", "1", 0.02, 0.3, 0.06, "extent (standard deviation), fraction of the span", place=True),
     ),
+    law="k(s) = k_0 (1 - loss exp(-((s - station) / width)^2 / 2))",
     source="Christides and Barr, International Journal of Mechanical Sciences 26, 639 (1984): a crack as a local loss "
     "of bending stiffness; Sinha, Friswell and Edwards, Journal of Sound and Vibration 251, 13 (2002)",
-    signature="a kink: all that lies outboard of one station swings further than told, all inboard as told",
+    signature="a kink: everything outboard of one station swings further than the model predicts, everything inboard "
+    "as predicted",
     confused_with=("cubic_stiffness", "lumped_mass"),
     wing=_wing,
 )

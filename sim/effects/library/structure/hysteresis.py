@@ -1,4 +1,4 @@
-"""Bending and torsion that yield and stay behind: hysteresis after Bouc and Wen."""
+"""Hysteresis of bending and torsion after Bouc and Wen."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from wingfit.sim.kernels.lanes.lanewise import power
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, magnitude, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-_METRES = [0.1, 0.1]  # one radian is felt a chord away
+_METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 _TINY = 1e-30
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:
     """z' = r - beta |r| |z|^(n - 1) z - gamma r |z|^n, z in parts of its largest and beta + gamma = 1; moment -k z."""
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
@@ -54,19 +54,20 @@ EFFECT = Effect(
     title="Hysteresis",
     family="structure",
     port="connector",
-    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that yields, as a part of the stiffness that stays"),),
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that yields, as a fraction of the elastic stiffness"),),
     shape=(
-        Parameter(
-            "yield_angle", "rad", 0.01, 1.0, 0.1, "bending or twist of the whole span at which it yields", scale="log"
-        ),
-        Parameter("gamma", "1", -0.5, 0.5, 0.5, "shape of the loop: gamma of beta + gamma = 1"),
-        Parameter("n", "1", 1.0, 4.0, 1.0, "how sharply it yields"),
+        Parameter("yield_angle", "rad", 0.01, 1.0, 0.1, "bend or twist over the span at which it yields", scale="log"),
+        Parameter("gamma", "1", -0.5, 0.5, 0.5, "shape of the loop: gamma in beta + gamma = 1"),
+        Parameter("n", "1", 1.0, 4.0, 1.0, "exponent: the larger, the sharper the onset of yielding"),
     ),
     power="dissipative",
-    memory="what has not yielded yet of bending and of twist, per connector",
+    memory="the elastic part of bending and of twist, per connector",
+    law="z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n,     q = z / z_y,   beta = 1 - gamma\n"
+    "M = -k K z,     z_y = p yield_angle",
     source="Bouc (1967), Forced vibration of mechanical systems with hysteresis; Wen, Journal of the Engineering "
     "Mechanics Division ASCE 102, 249 (1976); Ikhouane and Rodellar, Systems with Hysteresis (2007)",
-    signature="loses the same energy in every beat however fast it flaps; stiffer in small swings than in large",
+    signature="the energy lost in a beat does not depend on the flap frequency; stiffer in small swings than in large "
+    "ones",
     confused_with=("viscoelastic", "rod_slip"),
     wing=_wing,
 )

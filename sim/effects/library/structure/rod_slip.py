@@ -1,27 +1,24 @@
-"""Carbon rods that slide in their straw: they hold by dry friction, and not at all within their play."""
+"""Carbon rods that slip in their straw: dry friction beyond a clearance in which they are loose."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-Array = npt.NDArray[np.float64]
-
-_METRES = [0.1]  # a bending of one radian is felt a chord away
+_METRES = [0.1]  # m/rad: one radian of bending moves a point one chord away
 _FOAM_ROW = 4  # of stiffness: stretching along the span, which the rods leave to the foam
 _TINY = 1e-30
 _SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic motion depends on how it began
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:
     """Moment -k h, h being what of w is beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
 
     Dahl's friction: pulled on, rods slip the more the nearer h is to its largest; pulled back, they hold as springs.
@@ -31,7 +28,7 @@ def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told th
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
     stored, lost = load0(port.stored), load0(port.lost)
     for c in range(port.places):
-        if port.parameters[4, c, 0] == 0.0:  # no rods here, whoever it is
+        if port.parameters[4, c, 0] == 0.0:  # no rods here, in any individual
             store1(rate, c, 0.0)
             store1(decay, c, 0.0)
             store1(drive, c, 0.0)
@@ -84,20 +81,27 @@ EFFECT = Effect(
     title="Rods that slip in their straw",
     family="structure",
     port="connector",
-    size=(
-        Parameter("friction", "rad", 0.0, 0.5, 0.05, "bending of the whole span that friction holds before rods slip"),
-    ),
+    size=(Parameter("friction", "rad", 0.0, 0.5, 0.05, "bend over the whole span at which the rods slip"),),
     shape=(
-        Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bending of the whole span, to either side, within their play"),
+        Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bend over the whole span, to either side, with loose rods"),
         Parameter(
-            "stick", "1", 0.02, 1.0, 0.3, "stiffness of rods that hold, as a part of what rods add anyway", scale="log"
+            "stick",
+            "1",
+            0.02,
+            1.0,
+            0.3,
+            "stiffness of sticking rods over all bending stiffness of the rods",
+            scale="log",
         ),
     ),
     power="dissipative",
     memory="bending carried by friction, of each connector with rods",
+    law="w' = r - (r |h| + |r| h) / (2 h_max) - 0.1 |r| w / (w_0 + h_max)\n"
+    "h = max(w - w_0, 0) + min(w + w_0, 0),     M = -k h\n"
+    "h_max = p friction,   w_0 = p clearance,   k = stick K_rods",
     source="Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158 (1968): friction; Visintin, Differential "
     "Models of Hysteresis (1994): play",
-    signature="stiffer in small swings than in large; the bending lags behind the load where the stroke turns round",
+    signature="stiffer in small swings than in large ones; the bending lags behind the load where the stroke reverses",
     confused_with=("hysteresis", "cubic_stiffness"),
     wing=_wing,
 )

@@ -10,10 +10,10 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store, store0, store1
 from wingfit.sim.kernels.laws import connector_port
 
-_METRES = [0.1, 0.1]  # a strain of one radian is felt a chord away
+_METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 
 
-def _law(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _law(frame: Any, moment: int) -> None:
     """A Maxwell element about x and y, beside the spring and the damper: z' = r - z / tau, wrench -k z."""
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
@@ -45,13 +45,15 @@ EFFECT = Effect(
     title="Viscoelastic relaxation",
     family="structure",
     port="connector",
-    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that relaxes, as a part of the stiffness that stays"),),
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that relaxes, as a fraction of the elastic stiffness"),),
     shape=(Parameter("tau", "s", 0.002, 0.5, 0.05, "relaxation time", scale="log"),),
     power="dissipative",
     memory="strain of the second spring in bending and in torsion, per connector",
-    source="Zener, Elasticity and Anelasticity of Metals (1948): standard linear solid; Ferry, Viscoelastic Properties "
-    "of Polymers (1980), ch. 1",
-    signature="bends less and later when flapped faster: stiffness and loss depend on the frequency, not on the air",
+    law="z' = r - z / tau,     M = -k K z",
+    source="Zener, Elasticity and Anelasticity of Metals (1948): standard linear solid; Ferry, Viscoelastic "
+    "Properties of Polymers (1980), ch. 1",
+    signature="bends less and later at higher flap frequencies: stiffness and loss depend on the frequency, not on "
+    "the air",
     confused_with=("hysteresis",),
     wing=_wing,
 )

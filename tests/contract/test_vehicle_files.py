@@ -1,4 +1,4 @@
-"""A vehicle's dataset -> disk -> dataset is exact, as folder, zip and NetCDF."""
+"""Every file format stores a dataset of forces exactly: folder, zip and NetCDF."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.contract.test_dataset_files import NAMES, angles, names, prose, right_angles, titles
 from tests.records.compare import assert_same
-from tests.records.files.test_round_trip import NAMES, angles, names, prose, right_angles, titles
 from tests.records.vehicles import FORCES, delfly_dataset, good_vehicle
 from wingfit.records import (
     ChordStation,

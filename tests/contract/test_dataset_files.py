@@ -1,4 +1,4 @@
-"""Dataset -> disk -> dataset is exact, as folder, zip and NetCDF."""
+"""Every file format stores a dataset of tracks exactly: folder, zip and NetCDF."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""What every effect must meet, on every rig that it applies to."""
+"""How every effect must behave in a simulation, on every rig that it applies to."""
 
 from __future__ import annotations
 
-import math
-import re
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -11,7 +9,6 @@ import numpy as np
 import pytest
 
 from tests.sim.effects.rigs import AnyModel, Array, bare, recordings, rig_of
-from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.registry import EFFECTS, chosen
 from wingfit.sim.model import Observation
 from wingfit.sim.solver.numerics import Numerics
@@ -22,7 +19,6 @@ CASES = [(name, kind) for name, effect in EFFECTS.items() for kind in KINDS if e
 INVISIBLE = {
     ("clock_offset", "wing"): "tracks are placed on the beat by what they show",
 }
-SYMBOLS = {"m", "kg", "s", "Hz", "rad", "N", "Pa", "W", "J", "K"}  # of units: SI and radians
 FEW = 3  # individuals of a trial: off, off elsewhere, typical
 TOGETHER = [
     ("wing", ("compliant_drive", "stroke_amplitude")),
@@ -156,52 +152,6 @@ def test_a_wing_that_fails_is_told_and_not_warned_of(name: str) -> None:
     found = tried.model.observe(wild, recordings("wing")["air"])
     assert found.reasons[0]
     assert np.isnan(found.channels).all()
-
-
-@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
-def test_is_declared_well(effect: Effect) -> None:
-    names = [p.name for p in effect.parameters]
-    assert effect.size
-    assert len(set(names)) == len(names)
-    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) for name in (effect.name, *names))
-    assert any(p.typical for p in effect.size)
-    for p in effect.parameters:
-        assert p.unit
-        assert set(re.findall("[A-Za-z]+", p.unit)) <= SYMBOLS, p
-        assert -math.inf < p.lower <= p.typical <= p.upper < math.inf, p
-        assert p.description
-    for p in effect.size:
-        assert p.lower <= 0.0 <= p.upper, p
-    assert effect.title
-    assert effect.signature
-    assert (effect.family == "measurement") == (effect.port == "observation")
-    assert bool(effect.observe) == bool(effect.observed) == (effect.port == "observation")
-    assert effect.observe or effect.wing or effect.vehicle
-
-
-@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
-def test_names_an_author_and_a_year(effect: Effect) -> None:
-    assert re.search(r"[A-Z]\w+.*\b(1[6-9]|20)\d\d\b", effect.source), effect.source
-
-
-@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
-def test_names_what_it_is_confused_with(effect: Effect) -> None:
-    assert effect.confused_with
-    assert effect.name not in effect.confused_with
-    for other in effect.confused_with:
-        assert other in EFFECTS, f"{effect.name} is confused with {other!r}, which is not registered"
-
-
-@pytest.mark.parametrize(("name", "kind"), CASES)
-def test_genes_are_off_and_within_bounds(name: str, kind: str) -> None:
-    effect, rig = EFFECTS[name], rig_of(bare(kind))
-    genes = effect.genes(rig)
-    typical = effect.typical(rig)
-    assert [g.name for g in genes] == [f"{name}.{p.name}" for p in effect.parameters] == list(typical)
-    for gene in genes:
-        gene.check(typical[gene.name])
-    values = effect.values(genes, np.array([[g.nominal for g in genes], list(typical.values())]))
-    assert effect.off(values).tolist() == [True, False]
 
 
 @pytest.mark.parametrize(("kind", "names"), TOGETHER)

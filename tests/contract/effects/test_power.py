@@ -8,10 +8,12 @@ import pytest
 
 from tests.sim.effects.bench import VACUUM, Bench, beat_of, ledger, scene_of, told
 from tests.sim.effects.moved import Motion, Moved
+from tests.sim.kernels.test_step_matrix import bent as bent_wing
+from tests.sim.kernels.test_step_matrix import rates
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES
-from wingfit.sim.kernels.integrate import forces
+from wingfit.sim.kernels.integrate import forces, point_forces
 from wingfit.sim.virtual_rigs.campaign import robird_wing
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.structure import build
@@ -19,14 +21,15 @@ from wingfit.sim.wing.structure import build
 PROMISES = [name for name, effect in EFFECTS.items() if effect.wing is not None and effect.power != "any"]
 
 
-def laws_of(name: str) -> tuple[int, int]:
-    """How many laws of the connectors and of the air it has."""
+def laws_of(name: str) -> tuple[int, int, int]:
+    """How many laws of connectors, of the air and of points it has."""
     laws = scene_of(name, build(robird_wing(), Division.parse("4"))).frozen().laws
-    return len(laws.connector), len(laws.strip)
+    return len(laws.connector), len(laws.strip), len(laws.point)
 
 
 OF_CONNECTORS = [name for name in PROMISES if laws_of(name)[0]]
 OF_AIR = [name for name in PROMISES if laws_of(name)[1]]
+OF_POINTS = [name for name in PROMISES if laws_of(name)[2]]
 DISSIPATIVE = [name for name in PROMISES if EFFECTS[name].power == "dissipative"]
 
 
@@ -74,5 +77,24 @@ def test_a_law_of_still_air_keeps_its_promise(name: str) -> None:
         assert np.all(moved.work.air_power < 0.0)
 
 
+@pytest.mark.parametrize("name", OF_POINTS)
+def test_a_law_of_points_keeps_its_promise(name: str) -> None:
+    """On a bent wing in full motion the power of its wrenches is what it loses and what it stores per time."""
+    wing, act = robird_wing(), EFFECTS[name].wing
+    assert act is not None
+    values = {key: np.full(LANES, value) for key, value in told(name, wing, {}).items()}
+    case = bent_wing("3,2", lambda scene, _: act(scene, values))
+    (_, _, lanes, work, state), nothing, stored = case, np.zeros_like(case.state.V), []
+    for part in (-1e-6, 1e-6, 0.0):
+        rates(case, part * state.V, nothing, 0.0 * state.z)
+        for array in (work.wrench, work.lost, work.stored):
+            array[:] = 0.0
+        point_forces(lanes, work)
+        stored.append(work.stored.copy())
+    given = -(work.wrench * work.V).sum(axis=(0, 1))
+    np.testing.assert_allclose(given, work.lost + (stored[1] - stored[0]) / 2e-6, rtol=1e-6)
+    assert np.all(work.lost > 0.0) if EFFECTS[name].power == "dissipative" else not work.lost.any()
+
+
 def test_what_takes_energy_does_so_by_a_law_of_its_own() -> None:
-    assert set(DISSIPATIVE) <= {*OF_CONNECTORS, *OF_AIR}
+    assert set(DISSIPATIVE) <= {*OF_CONNECTORS, *OF_AIR, *OF_POINTS}

@@ -1,4 +1,4 @@
-"""One suite for all evaluators: equal bits, and correct handling of failures."""
+"""Every evaluator gives identical numbers, and reports failures of models and workers in the same way."""
 
 from __future__ import annotations
 

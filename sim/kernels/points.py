@@ -1,0 +1,130 @@
+"""Wrenches that laws of effects apply at points of bodies, lane by lane, and their exact part of the step's matrix.
+
+A point lies at the arm b of body i, at x = p + R b. A law gives, in the axes of the world, the wrench (m, f) there,
+and K and D: minus its derivatives by the motion (rotation, displacement) and by the twist (angular velocity, velocity)
+of the point. With E = [[I, b~], [0, I]], and all of these in the axes of the body, the wrench at the centre of mass is
+E (m, f) and
+
+    -dW/dV = E D E^T,    -dW/dxi = E (K + [[-m~, 0], [-f~, 0]] - D [[omega~, 0], [u~, 0]]) E^T,
+
+u being the velocity of the point: the wrench and the twist keep their axes in the world while the body turns. The
+matrix S of a step, l and A are those of :mod:`wingfit.sim.kernels.tangents`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.sim.kernels.connectors import add_wrench
+from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.lanes.matrices import (
+    Nine,
+    Six,
+    add_to_block,
+    cross,
+    load_block,
+    load_matrix,
+    load_vector,
+    plus,
+    product,
+    scaled,
+    set_block,
+    skew,
+    skew_times,
+    times,
+    transposed,
+)
+from wingfit.sim.kernels.lanes.vector import load, store
+from wingfit.sim.kernels.tangents import moved
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+
+@kernel
+def follow_points(
+    bodies: Index, arms: Array, R: Array, p: Array, V: Array, place: Array, turn: Array, twist: Array
+) -> None:
+    """Position ``place`` [P, 3, W], rotation ``turn`` [P, 9, W] and ``twist`` [P, 6, W] of all points in the world."""
+    for k in range(len(bodies)):
+        i = bodies[k]
+        A, b, omega, v = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0), load_vector(V, i, 3)
+        at, sweep = times(A, b), cross(omega, b)
+        rate, velocity = times(A, omega), times(A, (v[0] + sweep[0], v[1] + sweep[1], v[2] + sweep[2]))
+        for j in range(9):
+            store(turn, k, j, A[j])
+        for j in range(3):
+            store(place, k, j, load(p, i, j) + at[j])
+            store(twist, k, j, rate[j])
+            store(twist, k, 3 + j, velocity[j])
+
+
+@kernel
+def add_point_wrenches(bodies: Index, arms: Array, R: Array, given: Array, wrench: Array) -> None:
+    """Add the wrenches ``given`` [P, 6, W] at the points, in the world, to those of the bodies."""
+    for k in range(len(bodies)):
+        back = transposed(load_matrix(R, bodies[k]))
+        m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
+        lever = cross(load_vector(arms, k, 0), f)
+        add_wrench(wrench, bodies[k], (m[0] + lever[0], m[1] + lever[1], m[2] + lever[2]), f)
+
+
+@inlined
+def _in_body(A: Nine, K: Six) -> Six:
+    """``K`` of the world in the axes of the body."""
+    back = transposed(A)
+    return (
+        product(back, product(K[0], A)),
+        product(back, product(K[1], A)),
+        product(back, product(K[2], A)),
+        product(back, product(K[3], A)),
+    )
+
+
+@kernel
+def add_point_blocks(
+    bodies: Index,
+    arms: Array,
+    R: Array,
+    V: Array,
+    given: Array,
+    stiffness: Array,
+    damping: Array,
+    length: float,
+    drag: Array,
+    blocks: Array,
+) -> None:
+    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, and keep -dW/dV in ``drag`` [P, 36, W].
+
+    Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -
+    omega~ b~) - (m~, f~)).
+    """
+    for k in range(len(bodies)):
+        i = bodies[k]
+        A, b, omega = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0)
+        K, D = _in_body(A, load_block(stiffness, k)), _in_body(A, load_block(damping, k))
+        back = transposed(A)
+        m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
+        set_block(drag, k, moved(b, D, b))
+        spin = scaled(-0.5, skew(omega))
+        slide = plus(scaled(-1.0, skew_times(b, spin)), scaled(-1.0, skew_times(omega, skew(b))))
+        X = plus(plus(product(D[0], spin), product(D[1], slide)), scaled(-1.0, skew(m)))
+        Y = plus(plus(product(D[2], spin), product(D[3], slide)), scaled(-1.0, skew(f)))
+        Z = (
+            plus(D[0], scaled(length, plus(K[0], X))),
+            plus(D[1], scaled(length, K[1])),
+            plus(D[2], scaled(length, plus(K[2], Y))),
+            plus(D[3], scaled(length, K[3])),
+        )
+        add_to_block(blocks, i, moved(b, Z, b))
+
+
+@kernel
+def add_point_terms(bodies: Index, drag: Array, X: Array, wrench: Array) -> None:
+    """Add -dW/dV X to the wrenches, as :func:`wingfit.sim.kernels.tangents.add_own_terms` does."""
+    for k in range(len(bodies)):
+        i = bodies[k]
+        M, x, y = load_block(drag, k), load_vector(X, i, 0), load_vector(X, i, 3)
+        a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
+        add_wrench(wrench, i, (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2]))
