@@ -50,7 +50,7 @@ def test_a_stream_tells_everything_and_ends(api: Api) -> None:
 
 
 def test_a_crowd_of_streams_is_told_to_come_later(api: Api, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streams, "MOST_STREAMS", 1)
+    monkeypatch.setattr(streams, "MAX_STREAMS", 1)
     run = api.submit(api.upload()["id"])["id"]
     open_stream = events(api, run)
     assert next(open_stream)[1] == "state"

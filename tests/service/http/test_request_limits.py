@@ -128,6 +128,22 @@ def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(
         assert [server.client.get("/v1/health", headers=long).status_code for _ in range(4)] == [200] * 4
 
 
+@pytest.mark.parametrize("upgrade", ["", "Connection: Upgrade\r\nUpgrade: x\r\n"])
+def test_a_body_is_never_taken_for_a_request(client: httpx.Client, upgrade: str) -> None:
+    """Also where the client asks for an upgrade, which the server does not support."""
+    host = f"Host: 127.0.0.1:{client.base_url.port}\r\n"
+    hidden = f"GET /v1/runs HTTP/1.1\r\n{host}\r\n"
+    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=10.0) as plain:
+        plain.sendall(
+            f"POST /v1/runs HTTP/1.1\r\n{host}{upgrade}Content-Length: {len(hidden)}\r\n\r\n{hidden}".encode()
+        )
+        plain.shutdown(socket.SHUT_WR)
+        answers = b""
+        while more := plain.recv(65536):
+            answers += more
+    assert (answers.count(b"HTTP/1.1 "), answers.startswith(b"HTTP/1.1 422 ")) == (1, True)
+
+
 @pytest.mark.parametrize("origin", ["http://[", "http://[::1", "null", "http://evil.example", "//", ""])
 def test_an_origin_that_is_none_is_a_foreign_one(client: httpx.Client, origin: str) -> None:
     answer = client.post("/v1/runs", json={}, headers={"Origin": origin})

@@ -24,8 +24,8 @@ from wingfit.calibration.result import Comparison
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset
 from wingfit.service.container import Service
-from wingfit.service.http import header_limits, pieces
-from wingfit.service.http.concurrency_limit import AT_ONCE, BACKUPS_AT_ONCE, BACKUPS_WAITING
+from wingfit.service.http import header_limits, request_limits
+from wingfit.service.http.concurrency_limit import BACKUPS, MAX_WAITING_BACKUPS, SIMULATIONS
 from wingfit.sim.model import Solution
 
 MIB = 2**20
@@ -81,8 +81,8 @@ def test_backups_that_nobody_takes_are_few_and_go_with_their_clients(tmp_path: P
         readers = [crowd.enter_context(reader(server.port, "/v1/backup")) for _ in range(8)]
         assert status(readers[0]) == 200
         refused = [one for one in readers[1:] if refuses_at_once(one)]
-        assert len(refused) == len(readers) - BACKUPS_AT_ONCE - BACKUPS_WAITING
-        assert len(copies_held(server.process.pid)) == BACKUPS_AT_ONCE
+        assert len(refused) == len(readers) - BACKUPS - MAX_WAITING_BACKUPS
+        assert len(copies_held(server.process.pid)) == BACKUPS
         quick(server.client, "/v1/health")
         crowd.close()
         eventually(lambda: not copies_held(server.process.pid), 10.0)
@@ -97,7 +97,7 @@ def refuses_at_once(one: socket.socket) -> bool:
         return False
     assert head.startswith(b"HTTP/1.1 503 ")
     assert b"\r\nretry-after: 5\r\n" in head.lower()
-    assert b"backups wait already" in head
+    assert b"backups are waiting" in head
     return True
 
 
@@ -147,7 +147,7 @@ def test_slow_readers_of_simulations_do_not_keep_others_from_simulating(
         run = api.submit(api.upload()["id"])["id"]
         api.finish(run)
         path = f"/v1/runs/{run}/comparison"
-        for one in [crowd.enter_context(reader(port_of(api.client), path)) for _ in range(AT_ONCE)]:
+        for one in [crowd.enter_context(reader(port_of(api.client), path)) for _ in range(SIMULATIONS)]:
             assert status(one) == 200
         assert len(api.client.get(path, timeout=10).content) > 4 * MIB
 
@@ -218,7 +218,7 @@ def test_a_slow_client_that_reads_fast_enough_gets_all(large: tuple[Service, Api
 
 
 def test_a_large_body_is_sent_in_pieces_each_after_the_one_before() -> None:
-    body, sent = os.urandom(2 * pieces.PIECE + 5), list[Message]()
+    body, sent = os.urandom(2 * request_limits.CHUNK + 5), list[Message]()
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
         await send({"type": "http.response.start", "status": 200, "headers": []})
@@ -228,10 +228,11 @@ def test_a_large_body_is_sent_in_pieces_each_after_the_one_before() -> None:
     async def send(message: Message) -> None:
         sent.append(message)
 
-    asyncio.run(pieces.Pieces(app)({"type": "http"}, None, send))  # type: ignore[arg-type]
+    scope: Scope = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"localhost")]}
+    asyncio.run(request_limits.RequestLimits(app, ("localhost",))(scope, None, send))  # type: ignore[arg-type]
     bodies = sent[1:]
     assert b"".join(bytes(message["body"]) for message in bodies) == 2 * body
-    assert max(len(message["body"]) for message in bodies) == pieces.PIECE
+    assert max(len(message["body"]) for message in bodies) == request_limits.CHUNK
     assert [message.get("more_body", False) for message in bodies] == [True] * 5 + [False]
 
 
