@@ -239,11 +239,11 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
     rows = dict(re.findall(r"^\| ([^|]+?) \| ([\d,]+)[^|]*\|", PAGE.partition("## Limits")[2], re.MULTILINE))
     run, diagnosis = spec_schemas.RunIn, diagnosis_schemas.DiagnosisIn
     in_force = {
-        "head of a request": header_limits.HEAD_LIMIT // 2**10,
+        "request line and headers": header_limits.HEAD_LIMIT // 2**10,
         "body of an upload": request_limits.UPLOAD_LIMIT // 2**20,
         "any other body": request_limits.BODY_LIMIT // 2**20,
-        "an archive unpacked": limits.MAX_EXPANDED_BYTES // 2**20,
-        "unpacked over packed": limits.MAX_COMPRESSION_RATIO,
+        "unpacked archive": limits.MAX_EXPANDED_BYTES // 2**20,
+        "unpacked over packed size": limits.MAX_COMPRESSION_RATIO,
         "entries of an archive": limits.MAX_ENTRIES,
         "`dataset.yaml`": limits.MAX_DESCRIPTION_BYTES // 2**20,
         "levels of `dataset.yaml`": limits.MAX_DEPTH,
@@ -256,10 +256,10 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "memory to read a NetCDF upload": confined.limits_of_upload(0).memory_mib,
         "processor time to read a small NetCDF upload": confined.limits_of_upload(0).processor_s,
         "time to read a NetCDF upload": confined.limits_of_upload(request_limits.UPLOAD_LIMIT).wall_s,
-        "bodies of a division": division.MAX_BODIES,
-        "genes named by a request": listed(run, "genes"),
-        "recordings named by a request": listed(run, "recordings"),
-        "effects named by a request": listed(run, "effects"),
+        "bodies of a discretisation": division.MAX_BODIES,
+        "genes in a request": listed(run, "genes"),
+        "recordings in a request": listed(run, "recordings"),
+        "effects in a request": listed(run, "effects"),
         "suspects of a diagnosis": listed(diagnosis, "suspects"),
         "effects that a diagnosis refits": highest(diagnosis, "refits"),
         "population": highest(run, "population"),
@@ -267,22 +267,22 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "items on a page": responses.LARGEST_PAGE,
         "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
         "coordinates in an answer": schemas.MOST_COORDINATES,
-        "simulations at once": concurrency_limit.SIMULATIONS,
-        "uploads read at once": concurrency_limit.UPLOADS,
-        "exports as NetCDF at once": concurrency_limit.EXPORTS,
-        "archives, exports, findings, reports, histories sent at once": concurrency_limit.DOWNLOADS,
-        "answers that were simulated sent at once": concurrency_limit.ANSWERS,
-        "requests that wait for each of these": concurrency_limit.MAX_WAITING,
-        "backups at once": concurrency_limit.BACKUPS,
-        "requests that wait for a backup": concurrency_limit.MAX_WAITING_BACKUPS,
-        "slowest client that is waited for": header_limits.SLOWEST_BYTES_PER_SECOND // 2**10,
+        "concurrent simulations": concurrency_limit.SIMULATIONS,
+        "concurrent uploads": concurrency_limit.UPLOADS,
+        "concurrent NetCDF exports": concurrency_limit.EXPORTS,
+        "concurrent downloads of archives, exports, findings, reports and histories": concurrency_limit.DOWNLOADS,
+        "simulated answers sent concurrently": concurrency_limit.ANSWERS,
+        "requests waiting for each of these": concurrency_limit.MAX_WAITING,
+        "concurrent backups": concurrency_limit.BACKUPS,
+        "requests waiting for a backup": concurrency_limit.MAX_WAITING_BACKUPS,
+        "slowest accepted client": header_limits.SLOWEST_BYTES_PER_SECOND // 2**10,
         "event streams": events.MAX_STREAMS,
-        "jobs of an owner that have not ended": settings.Settings.max_active,
-        "jobs computed at once": settings.Settings.max_runs,
+        "unfinished jobs of an owner": settings.Settings.max_active,
+        "concurrently computed jobs": settings.Settings.max_runs,
         "MB of archives of an owner": settings.Settings.max_stored_mb,
     }
     assert {name: int(value.replace(",", "")) for name, value in rows.items()} == in_force
-    assert f"KiB/s, over {header_limits.SLOW_SECONDS:g} s" in PAGE
+    assert f"KiB/s over {header_limits.SLOW_SECONDS:g} s" in PAGE
     assert DiagnosisSpec().refits <= in_force["effects that a diagnosis refits"]
 
 
