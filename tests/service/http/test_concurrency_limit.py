@@ -72,7 +72,7 @@ class HeldReader(toy.ToyEngine):
         return super().load(data, filename)
 
 
-def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
+def test_few_uploads_are_read_concurrently(tmp_path: Path) -> None:
     engine, crowd = HeldReader(), UPLOADS + 4
     with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
 
@@ -90,7 +90,7 @@ def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
             assert {one.result() for one in asked} == {201}
 
 
-def test_a_crowd_is_told_to_come_later() -> None:
+def test_too_many_waiting_requests_get_a_503() -> None:
     async def scene() -> None:
         limit, release = ConcurrencyLimit("simulations", 1, max_waiting=2), asyncio.Semaphore(0)
 

@@ -129,7 +129,7 @@ def with_key(client: httpx.Client, secret: str) -> httpx.Client:
     return httpx.Client(base_url=client.base_url, headers={"Authorization": f"Bearer {secret}"}, timeout=20.0)
 
 
-def test_what_was_written_is_read_at_once(used: Used) -> None:
+def test_a_write_is_visible_in_the_next_read(used: Used) -> None:
     paths = [f"/v1/runs/{used.runs[1]}", "/v1/runs"]
     before = [used.api.get(path) for path in paths]
     for name in ("another", before[0]["name"]):
@@ -140,7 +140,7 @@ def test_what_was_written_is_read_at_once(used: Used) -> None:
     assert [used.api.get(path) for path in paths] == before
 
 
-def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
+def test_an_unchanged_run_is_a_304(used: Used) -> None:
     path = f"/v1/runs/{used.runs[0]}"
     tag = used.api.client.get(path).headers["ETag"]
     again = used.api.client.get(path, headers={"If-None-Match": tag})
@@ -148,7 +148,7 @@ def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
     assert used.api.client.get(path, headers={"If-None-Match": '"other"'}).status_code == 200
 
 
-def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Path) -> None:
+def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) -> None:
     database, changes = Database(tmp_path), Changes()
     events, looks = Events(database, changes, KeyRing()), []
     states = ["QUEUED", "RUNNING", "SUCCEEDED"]
@@ -178,7 +178,7 @@ def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Pa
     database.close()
 
 
-def test_a_look_that_fails_is_done_anew(tmp_path: Path) -> None:
+def test_a_failed_read_is_repeated(tmp_path: Path) -> None:
     database = Database(tmp_path)
     events, looks = Events(database, Changes(), KeyRing()), []
 
@@ -203,7 +203,7 @@ def job(state: str) -> RunOut:
 
 
 @pytest.mark.parametrize("filters", [some for n in range(5) for some in combinations(FILTERS, n)])
-def test_pages_are_found_through_an_index_and_need_no_sorting(used: Used, filters: tuple[str, ...]) -> None:
+def test_pages_use_an_index_and_need_no_sorting(used: Used, filters: tuple[str, ...]) -> None:
     where = tuple("number < :before" if name == "before" else f"{name} = :{name}" for name in filters)
     values = {"dataset_id": used.one, "state": "FAILED", "owner": None, "before": 9, "rows": 51}
     with used.service.database.look() as look:

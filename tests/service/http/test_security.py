@@ -1,4 +1,4 @@
-"""What the service defends against; docs/security.md says which test shows what, and is kept true here."""
+"""Defences of the service; docs/security.md names the test of each, and is checked here."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Schema = dict[str, Any]
 # -- answers -----------------------------------------------------------------------------------------------
 
 
-def test_a_mistake_is_answered_without_a_word_about_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_answer_to_an_internal_error_does_not_describe_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     app = create_app(Settings(data=tmp_path), engine=toy.FaultyEngine(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client:
         body = {"dataset_id": Api(client).upload()["id"], "recording": "slow"}
@@ -66,7 +66,7 @@ def test_no_other_origin_may_read_an_answer(client: httpx.Client) -> None:
         assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
 
 
-def test_no_page_needs_a_script_in_its_text(api: Api) -> None:
+def test_no_page_has_an_inline_script(api: Api) -> None:
     diagnosis = api.diagnose(api.upload()["id"])["id"]
     api.diagnosed(diagnosis)
     for path in ("/", "/docs", f"/v1/diagnoses/{diagnosis}/report"):
@@ -123,7 +123,7 @@ def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
     }
 
 
-def test_the_server_has_nothing_to_fetch_addresses_with() -> None:
+def test_the_server_loads_no_http_client() -> None:
     clients = (
         "httpx",
         "requests",
@@ -145,7 +145,7 @@ def test_the_server_has_nothing_to_fetch_addresses_with() -> None:
     assert called == set()
 
 
-def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
+def test_a_submitted_address_is_not_opened(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as trap:
         trap.settimeout(0.5)
         url = f"http://127.0.0.1:{trap.getsockname()[1]}/x"
@@ -163,7 +163,7 @@ def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
             trap.accept()
 
 
-def test_an_upload_writes_no_file_of_a_name_of_its_own(tmp_path: Path) -> None:
+def test_an_upload_does_not_name_files(tmp_path: Path) -> None:
     with serving(create_app(Settings(data=tmp_path / "data"), make_evaluator=toy.NoEvaluator)) as client:
         for filename in ("../../evil.zip", "/etc/evil.zip", "evil.zip", "..\\evil.zip"):
             data = uploads._with(uploads._files(), "evil/evil.csv")
@@ -197,7 +197,7 @@ def unbounded(schema: Schema, known: Schema, where: str) -> Iterator[str]:
             yield from unbounded(one, known, f"{where}.{name}")
 
 
-def test_every_body_and_query_is_bounded_in_every_part(client: httpx.Client) -> None:
+def test_every_field_of_bodies_and_queries_has_a_limit(client: httpx.Client) -> None:
     specification = client.get("/openapi.json").json()
     known = specification["components"]["schemas"]
     found, bodies = list[str](), 0
@@ -213,7 +213,7 @@ def test_every_body_and_query_is_bounded_in_every_part(client: httpx.Client) -> 
     assert bodies >= 7
 
 
-def test_every_list_of_a_dataset_is_bounded() -> None:
+def test_every_list_of_a_dataset_has_a_limit() -> None:
     schema = dataset_schema()
     lists = [one for one in _all(schema) if one.get("type") == "array"]
     assert len(lists) > 8
@@ -235,7 +235,7 @@ def highest(model: Any, name: str) -> int:
     return int(next(one.le for one in model.model_fields[name].metadata if hasattr(one, "le")))
 
 
-def test_the_limits_that_are_documented_are_those_in_force() -> None:
+def test_the_documented_limits_are_those_of_the_code() -> None:
     rows = dict(re.findall(r"^\| ([^|]+?) \| ([\d,]+)[^|]*\|", PAGE.partition("## Limits")[2], re.MULTILINE))
     run, diagnosis = spec_schemas.RunIn, diagnosis_schemas.DiagnosisIn
     in_force = {
@@ -299,7 +299,7 @@ def test_every_test_that_the_page_names_exists() -> None:
         )
 
 
-def test_the_page_answers_all_ten_and_shows_each_by_a_test() -> None:
+def test_the_page_answers_all_ten_items_and_names_tests() -> None:
     rows = re.findall(r"^\| API(\d+) [^|]*\|([^|]*)\|([^|]*)\|$", PAGE, re.MULTILINE)
     assert [int(number) for number, _, _ in rows] == list(range(1, 11))
     for number, answer, shown in rows:

@@ -1,4 +1,4 @@
-"""Clients that read slowly, or not at all, or go away: they hold little, not for long, and hurt nobody else."""
+"""Clients that read slowly, never, or disconnect hold little memory for a short time and delay nobody else."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def copies_held(pid: int) -> list[str]:
     return [name for name in held if "copy-" in name]
 
 
-def test_backups_that_nobody_takes_are_few_and_go_with_their_clients(tmp_path: Path) -> None:
+def test_untaken_backups_are_few_and_end_with_their_clients(tmp_path: Path) -> None:
     with toy_server(tmp_path) as server, ExitStack() as crowd:
         server.api.upload(pad="x" * 30 * MIB)
         readers = [crowd.enter_context(reader(server.port, "/v1/backup")) for _ in range(8)]
@@ -181,7 +181,7 @@ def hung_up(api: Api) -> float:
     return float(text.partition("\nwingfit_slow_clients_total ")[2].split()[0])
 
 
-def test_a_client_that_reads_too_slowly_is_hung_up_on(large: tuple[Service, Api, str]) -> None:
+def test_the_connection_of_a_slow_client_is_closed(large: tuple[Service, Api, str]) -> None:
     service, api, path = large
     with reader(port_of(api.client), path, 2**18) as one:
         with pytest.raises(ConnectionError):
@@ -197,7 +197,7 @@ def ask_again_and_again(one: socket.socket, path: str, seconds: float) -> None:
         time.sleep(0.0005)
 
 
-def test_a_client_that_asks_and_never_reads_is_hung_up_on(
+def test_the_connection_of_a_client_that_never_reads_is_closed(
     large: tuple[Service, Api, str], caplog: pytest.LogCaptureFixture
 ) -> None:
     _, api, path = large
@@ -217,7 +217,7 @@ def test_a_slow_client_that_reads_fast_enough_gets_all(large: tuple[Service, Api
     assert hung_up(api) == 0
 
 
-def test_a_large_body_is_sent_in_pieces_each_after_the_one_before() -> None:
+def test_a_large_body_is_sent_in_chunks() -> None:
     body, sent = os.urandom(2 * request_limits.CHUNK + 5), list[Message]()
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
