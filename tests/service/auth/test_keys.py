@@ -93,7 +93,7 @@ def test_a_key_permits_only_its_scopes(as_: As) -> None:
     assert reader.get(f"/v1/datasets/{dataset}").status_code == 200
     refused = reader.post("/v1/runs", json={"dataset_id": dataset})
     assert (refused.status_code, refused.json()["type"]) == (403, "urn:wingfit:problem:scope")
-    assert "read, not write" in refused.json()["detail"]
+    assert "has the scope read; this call needs write" in refused.json()["detail"]
     assert reader.delete(f"/v1/datasets/{dataset}").status_code == 403
     assert writer.get("/v1/keys").status_code == 403
     assert writer.post("/v1/keys", json={"name": "x", "scopes": ["admin"]}).status_code == 403
@@ -189,7 +189,7 @@ def test_the_last_key_that_manages_keys_stays(as_: As) -> None:
     admin = as_("admin").client
     first = next(key for key in admin.get("/v1/keys").json()["items"] if "admin" in key["scopes"])
     refused = admin.delete(f"/v1/keys/{first['id']}")
-    assert (refused.status_code, "make another one" in refused.json()["detail"]) == (409, True)
+    assert (refused.status_code, "make another key" in refused.json()["detail"]) == (409, True)
     assert admin.post("/v1/keys", json={"name": "second", "scopes": ["admin"]}).status_code == 201
     assert admin.delete(f"/v1/keys/{first['id']}").status_code == 200
     assert admin.get("/v1/keys").status_code == 401

@@ -51,7 +51,7 @@ def test_a_hanging_job_is_given_up_and_continues_later(tmp_path: Path) -> None:
     with stuck(tmp_path / "data", "job") as server:
         run = with_a_run(server)
         assert stopped(server, 5) == 0
-        assert f"run {run} is left as stored (after step 2) and goes on at the next start" in server.log
+        assert f"run {run} stays as stored (after step 2) and continues at the next start" in server.log
         assert re.search(rf"thread '{run}' at \S+stuck_server.py:\d+ \(hang_here\)", server.log)
     with toy(tmp_path) as again:
         assert again.api.finish(run)["state"] == "SUCCEEDED"
