@@ -1,4 +1,15 @@
-"""The web application: routes, guards, pages."""
+"""The web application: routes, middleware and the web page.
+
+Middleware, from the outside to the inside; :func:`create_app` adds them in the reverse order:
+
+1. :class:`MetricsAndLog` counts and logs every request, also refused ones, and gives it an id.
+2. :class:`ErrorBoundary` answers errors that nothing else answers, also errors of the middleware inside it.
+3. :class:`RequestLimits` checks host, origin and size, adds the security headers and sends large bodies in chunks.
+4. :class:`Authentication` requires an API key, where keys are required, and sets the caller.
+
+Inside them FastAPI validates a request and calls its route. Outside them :class:`header_limits.Protocol` parses HTTP
+and limits headers and slow clients.
+"""
 
 from __future__ import annotations
 
@@ -16,18 +27,15 @@ from starlette.responses import FileResponse, Response
 from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
-from wingfit.service.auth.authentication import Gate
+from wingfit.service.auth.authentication import Authentication
 from wingfit.service.container import MakeEvaluator, Service
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.http import problems, threads
 from wingfit.service.http import responses as http
-from wingfit.service.http.error_boundary import Unforeseen
-from wingfit.service.http.openapi_additions import describe
-from wingfit.service.http.pieces import Pieces
-from wingfit.service.http.quick import Quick
-from wingfit.service.http.request_limits import Guard
-from wingfit.service.http.shortcut import SHORTCUT, Shortcut
-from wingfit.service.operations.metrics_and_log import METRICS, Metrics, Observer
+from wingfit.service.http.error_boundary import ErrorBoundary
+from wingfit.service.http.openapi_additions import extend_openapi
+from wingfit.service.http.request_limits import RequestLimits
+from wingfit.service.operations.metrics_and_log import METRICS, Metrics, MetricsAndLog
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
 from wingfit.service.runs.engine import Engine
@@ -37,11 +45,12 @@ from wingfit.service.version import wingfit_version
 
 LOG = logging.getLogger("wingfit")
 WEB = Path(__file__).parent / "web"
+# Routes are tried in this order, so the routers with the most requests come first.
 ROUTERS = (
-    system.router,
-    datasets.router,
     runs.router,
     outcomes.router,
+    system.router,
+    datasets.router,
     forces.router,
     diagnoses.router,
     exports.router,
@@ -51,8 +60,8 @@ ROUTERS = (
 )
 METHODS = ["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE"]
 DESCRIPTION = (
-    "Calibrates flapping-wing simulations on recordings of tracked markers or of forces. Upload a dataset, submit a "
-    "run, watch its events, fetch its result; submit a diagnosis to find the physics that the model left out. Errors "
+    "Calibrates flapping-wing simulations against recordings of tracked markers or of forces. Upload a dataset, submit "
+    "a run, watch its events, fetch its result; submit a diagnosis to find the missing physics of the model. Errors "
     "are problem details (RFC 9457)."
 )
 
@@ -66,16 +75,16 @@ def create_app(
     diagnoser: Diagnoser | None = None,
     limits: StopLimits | None = None,
 ) -> FastAPI:
-    """Build the application; it opens the data folder when it starts, unless ``database`` is open already."""
+    """Build the application. At its start it opens the data folder, unless an open ``database`` is given."""
 
     @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Shortcut | Metrics]]:
+    async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Metrics]]:
         opened = Database(settings.data) if database is None else database
         service = Service(settings, opened, engine, make_evaluator, diagnoser)
         app.state.service = service
         await run_in_threadpool(service.start)
-        yield {SHORTCUT: service.shortcut, METRICS: service.metrics}  # for the protocol
-        # Not in a thread of the pool: requests that hang may hold them all.
+        yield {METRICS: service.metrics}  # for header_limits.Protocol
+        # In a thread of its own, because hanging requests may hold all threads of the pool.
         app.state.stopped = await asyncio.wrap_future(threads.call("stop", lambda: service.stop(limits)))
 
     app = FastAPI(
@@ -91,42 +100,42 @@ def create_app(
     for router in ROUTERS:
         app.include_router(router)
     app.add_api_route("/v1/{rest:path}", _nothing_here, methods=METHODS, include_in_schema=False)
-    describe(app)
+    extend_openapi(app)
     _mount_pages(app)
-    app.add_middleware(Quick)
-    app.add_middleware(Pieces)
     if settings.keys:
-        app.add_middleware(Gate)
-    app.add_middleware(Guard, allowed_hosts=settings.allowed_hosts)
-    app.add_middleware(Unforeseen)
-    app.add_middleware(Observer)
+        app.add_middleware(Authentication)
+    app.add_middleware(RequestLimits, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(ErrorBoundary)
+    app.add_middleware(MetricsAndLog)
     return app
 
 
 async def _nothing_here(request: Request) -> Response:
-    """Tell an unknown path from a method that the path does not have; the pages at / would hide both."""
-    scope = dict(request.scope)
-    found = set()
-    for method in METHODS:
-        scope["method"] = method
-        if any(route.matches(scope)[0] is Match.FULL for router in ROUTERS for route in router.routes):
-            found.add(method)
-    if "GET" in found and not request.url.path.endswith("/events"):
-        found.add("HEAD")
-    if not found:
-        raise HTTPException(404, f"there is nothing at {request.url.path[:200]}; /docs lists the calls")
-    allow = ", ".join(sorted(found))
-    raise HTTPException(405, f"{request.method} is not possible here; possible: {allow}", {"Allow": allow})
+    """Answer 404 for an unknown path and 405 for a method that the path does not have."""
+    # The static files mounted at / would answer 404 for both.
+    allowed = {
+        method
+        for method in METHODS
+        for router in ROUTERS
+        for route in router.routes
+        if route.matches({**request.scope, "method": method})[0] is Match.FULL
+    }
+    if "GET" in allowed and not request.url.path.endswith("/events"):
+        allowed.add("HEAD")
+    if not allowed:
+        raise HTTPException(404, f"there is nothing at {request.url.path[:200]}; /docs lists the API")
+    allow = ", ".join(sorted(allowed))
+    raise HTTPException(405, f"{request.method} is not allowed here; allowed: {allow}", {"Allow": allow})
 
 
 def _mount_pages(app: FastAPI) -> None:
     @app.get("/assets/plotly.min.js", include_in_schema=False)
     def plotly() -> FileResponse:
-        # The package's own file: the page needs no other origin.
+        # The file of the plotly package, so that the page needs no other origin.
         path = files("plotly") / "package_data" / "plotly.min.js"
         return FileResponse(str(path), media_type="text/javascript", headers={"Cache-Control": "max-age=86400"})
 
     if WEB.is_dir():
         app.mount("/", StaticFiles(directory=WEB, html=True), name="pages")
     else:
-        LOG.warning("the pages are missing: %s is no folder", WEB)
+        LOG.warning("the web page is not served: %s is not a folder", WEB)

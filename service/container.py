@@ -1,4 +1,4 @@
-"""The parts of a running service, put together and taken apart in order."""
+"""The parts of a running service: constructed, started and stopped in order, and the dependencies that inject them."""
 
 from __future__ import annotations
 
@@ -6,34 +6,25 @@ import logging
 import shutil
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AsyncExitStack
 from typing import Annotated, Any, cast
 
 from fastapi import Depends, Request
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from wingfit.service.auth.access import KeyRing
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.diagnoses.diagnoser import Diagnoser, ModelDiagnoser
 from wingfit.service.diagnoses.diagnosing import Diagnosing
-from wingfit.service.http import threads
-from wingfit.service.http.concurrency_limit import (
-    ANSWERS_AT_ONCE,
-    BACKUPS_AT_ONCE,
-    BACKUPS_WAITING,
-    DOWNLOADS_AT_ONCE,
-    EXPORTS_AT_ONCE,
-    UPLOADS_AT_ONCE,
-    Place,
-    Turns,
-)
+from wingfit.service.http import concurrency_limit, threads
+from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.events import Events
-from wingfit.service.http.json_reads import Reading
-from wingfit.service.http.shortcut import Shortcut
 from wingfit.service.jobs.evaluator_startup import Pool
 from wingfit.service.jobs.job_kind import Work
 from wingfit.service.jobs.runner import Known, Runner
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
-from wingfit.service.operations.metrics_and_log import Gauges, Metrics
+from wingfit.service.operations.metrics_and_log import Metrics
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.runs.calibrating import Calibrating
 from wingfit.service.runs.engine import Engine, ModelEngine
@@ -46,13 +37,13 @@ from wingfit.workers.jobs import State
 from wingfit.workers.watch import Standing
 
 LOG = logging.getLogger("wingfit")
-LOOK_SECONDS = 1.0
+READ_SECONDS = 1.0  # that a caller waits for the database, or for the metrics
 
 MakeEvaluator = Callable[[], RunningEvaluator]
 
 
 class Service:
-    """What request handlers work with."""
+    """What request handlers need: settings, database, jobs, limits and metrics."""
 
     def __init__(
         self,
@@ -66,17 +57,17 @@ class Service:
         self.engine: Engine = engine or ModelEngine()
         self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
         self.keys = KeyRing()
-        # Requests that are being answered: method, path, and when they came.
-        self.under_way: dict[int, tuple[str, str, float]] = {}
+        # Requests being answered: method, path and start, by the id of their ASGI scope.
+        self.open_requests: dict[int, tuple[str, str, float]] = {}
         self.metrics = Metrics(self.gauges)
         self.changes = Changes()
-        self.reading = Reading(database)
-        self.shortcut = Shortcut(self.reading, self.keys, self.metrics)
         self.events = Events(database, self.changes, self.keys)
-        self.turns, self.uploads = Turns(), Turns("uploads", UPLOADS_AT_ONCE)
-        self.exports = Turns("exports", EXPORTS_AT_ONCE)
-        self.downloads, self.answers = Turns("downloads", DOWNLOADS_AT_ONCE), Turns("answers", ANSWERS_AT_ONCE)
-        self.backups = Turns("backups", BACKUPS_AT_ONCE, BACKUPS_WAITING)
+        self.simulations = ConcurrencyLimit("simulations", concurrency_limit.SIMULATIONS)
+        self.uploads = ConcurrencyLimit("uploads", concurrency_limit.UPLOADS)
+        self.exports = ConcurrencyLimit("exports", concurrency_limit.EXPORTS)
+        self.downloads = ConcurrencyLimit("downloads", concurrency_limit.DOWNLOADS)
+        self.answers = ConcurrencyLimit("answers", concurrency_limit.ANSWERS)
+        self.backups = ConcurrencyLimit("backups", concurrency_limit.BACKUPS, concurrency_limit.MAX_WAITING_BACKUPS)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
@@ -87,10 +78,10 @@ class Service:
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
         self.health = Health(settings, database, self._pool, kinds)
-        self._metrics_text = threads.Shared("metrics", self.metrics.text)
+        self._metrics_text = threads.SharedCall("metrics", self.metrics.text)
 
     def start(self) -> None:
-        """Take up what was left and start the evaluator."""
+        """Load the keys, recover the jobs of an earlier process, and start the evaluator."""
         self.load_keys()
         forget_snapshots(self.settings.data)
         self.runner.recover()
@@ -98,48 +89,48 @@ class Service:
         self._pool.start()
 
     def enqueue(self, work: Work, job_id: str) -> None:
-        """Compute a job that was stored, when its turn comes."""
+        """Queue a stored job."""
         with self.database.read() as session:
             owner = work.row(session, job_id).owner
         self.runner.enqueue(work, job_id, owner)
 
     def load_keys(self) -> None:
-        """Take the keys that are good now; streams that were opened with another one end."""
+        """Read the valid keys from the database; event streams that were opened with a revoked key end."""
         with self.database.read() as session:
             self.keys.load(session)
         self.changes.wake_all()
 
     def begin_stop(self) -> None:
-        """Let go of whoever watches, start nothing more. Safe in a signal handler."""
+        """End the event streams and start no more jobs. Safe in a signal handler."""
         self.runner.begin_stop()
         self._housekeeping.stop()
         self.changes.close()
 
     def stop(self, limits: StopLimits | None = None) -> bool:
-        """Stop within ``limits``, leaving jobs as stored; whether all threads ended. The log says what did not."""
+        """Stop within ``limits``; jobs stay as they are stored. Whether all threads ended; the log names those left."""
         limits = limits or StopLimits()
         self.begin_stop()
-        # A job that waits for the database may hold the lock by which the runner knows its threads.
+        # In a thread, because a job that waits for the database may hold the lock of the runner.
         ended = threads.done_within(limits.jobs, "stop-jobs", lambda: self.runner.stop(limits.jobs))
-        for line in () if ended else self._jobs_under_way():
+        for line in () if ended else self._running_jobs():
             LOG.warning("given up after %g s: %s", limits.jobs, line)
         if not (closed := self._pool.close(limits.evaluator)):
             LOG.warning(
-                "given up: the evaluator does not stop within %g s; its workers end by themselves", limits.evaluator
+                "given up: the evaluator has not stopped within %g s; its workers end by themselves", limits.evaluator
             )
         if not (stored := self.database.close(limits.database)):
-            LOG.warning("given up: a write to the database does not end within %g s; it is undone", limits.database)
+            LOG.warning("given up: a database write has not ended within %g s; it is rolled back", limits.database)
         return ended and closed and stored
 
     def unfinished(self) -> Iterator[str]:
-        """What is under way, in words: requests, jobs."""
-        for method, path, began in list(self.under_way.values()):
+        """One line for each request that is being answered and each job that is being computed."""
+        for method, path, began in list(self.open_requests.values()):
             yield f"{method} {path}, since {time.monotonic() - began:.1f} s"
-        yield from self._jobs_under_way()
+        yield from self._running_jobs()
 
-    def _jobs_under_way(self) -> Iterator[str]:
+    def _running_jobs(self) -> Iterator[str]:
         for job in self.runner.under_way():
-            yield f"{job} is left as stored ({self._last_step(job)}) and goes on at the next start"
+            yield f"{job} stays as stored ({self._last_step(job)}) and continues at the next start"
 
     def _last_step(self, job: Known) -> str:
         def stored() -> str:
@@ -147,47 +138,47 @@ class Service:
                 return f"after step {job.work.row(session, job.id).generations}"
 
         try:
-            return threads.call("stop-look", stored).result(LOOK_SECONDS)
-        except Exception as error:  # the words are for the log, and the stop goes on
+            return threads.call("stop-look", stored).result(READ_SECONDS)
+        except Exception as error:  # only the log needs it, and the stop goes on
             return f"its last step is unknown: {type(error).__name__}"
 
     async def metrics_text(self) -> bytes:
-        """Counters and gauges in the text format of Prometheus; TimeoutError where they take too long."""
+        """All metrics in the text format of Prometheus; TimeoutError after ``READ_SECONDS``."""
         await self.health.look()
-        return await self._metrics_text.result(LOOK_SECONDS)
+        return await self._metrics_text.result(READ_SECONDS)
 
-    def gauges(self) -> Gauges:
-        """Standing of the service as numbers, of all owners, whoever asks; jobs as of the last look at them."""
-        jobs: dict[tuple[tuple[str, str], ...], float] = {
-            (("kind", kind), ("state", state.value)): float(counts.get(state, 0))
-            for kind, counts in (self.health.jobs or {}).items()
-            for state in State
-        }
-        size = sum(path.stat().st_size for path in self.settings.data.glob(f"{FILE_NAME}*"))
+    def gauges(self) -> Iterator[Metric]:
+        """The state of the service as metrics, over all owners; jobs as of the last count."""
         workers, pace = self._pool.standing or Standing(0), self.runner.pace()
-        lost: dict[tuple[tuple[str, str], ...], float] = {
-            (("reason", "died"),): float(workers.died),
-            (("reason", "hung"),): float(workers.hung),
-        }
-        return {
-            "wingfit_jobs": ("Calibrations and diagnoses by state.", jobs),
-            "wingfit_database_up": ("Whether the database answers.", {(): float(self.health.jobs is not None)}),
-            "wingfit_evaluator_up": ("Whether jobs are computed.", {(): float(self._pool.status == "ok")}),
-            "wingfit_workers": ("Workers of the evaluator that live.", {(): float(workers.workers)}),
-            "wingfit_worker_deaths_total": ("Workers that died, or hung and were killed.", lost),
-            "wingfit_worker_restarts_total": ("Workers started in place of others.", {(): float(workers.restarts)}),
-            "wingfit_job_stalled_seconds": (
-                "Time since the last progress of the running job that has waited longest for one.",
-                {(): pace.stalled_s},
+        jobs = GaugeMetricFamily("wingfit_jobs", "Calibrations and diagnoses by state.", labels=["kind", "state"])
+        for kind, counts in (self.health.jobs or {}).items():
+            for state in State:
+                jobs.add_metric([kind, state.value], counts.get(state, 0))
+        yield jobs
+        lost = CounterMetricFamily(
+            "wingfit_worker_deaths", "Workers that died, or hung and were killed.", labels=["reason"]
+        )
+        lost.add_metric(["died"], workers.died)
+        lost.add_metric(["hung"], workers.hung)
+        yield lost
+        yield CounterMetricFamily("wingfit_worker_restarts", "Workers started to replace others.", workers.restarts)
+        free = shutil.disk_usage(self.settings.data).free
+        size = sum(path.stat().st_size for path in self.settings.data.glob(f"{FILE_NAME}*"))
+        for name, description, value in (
+            ("database_up", "1 if the database answers.", self.health.jobs is not None),
+            ("evaluator_up", "1 if jobs are computed.", self._pool.status == "ok"),
+            ("workers", "Living workers of the evaluator.", workers.workers),
+            ("job_stalled_seconds", "Longest time since the last progress of a running job.", pace.stalled_s),
+            ("queue_age_seconds", "Time that the oldest waiting job has waited.", pace.waited_s),
+            (
+                "disk_free_bytes",
+                "Free space on the disk of the data folder.",
+                free,
             ),
-            "wingfit_queue_age_seconds": ("Time that the oldest waiting job has waited.", {(): pace.waited_s}),
-            "wingfit_disk_free_bytes": (
-                "Free space where the data folder is.",
-                {(): float(shutil.disk_usage(self.settings.data).free)},
-            ),
-            "wingfit_watchers": ("Open event streams.", {(): float(self.changes.watchers)}),
-            "wingfit_database_bytes": ("Size of the database and its log.", {(): float(size)}),
-        }
+            ("watchers", "Open event streams.", self.changes.watchers),
+            ("database_bytes", "Size of the database and its log.", size),
+        ):
+            yield GaugeMetricFamily(f"wingfit_{name}", description, value)
 
 
 def _maker(settings: Settings) -> MakeEvaluator:
@@ -206,33 +197,31 @@ async def _service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(_service)]
 
 
-async def _place() -> AsyncIterator[Place]:
-    place = Place()
-    try:
-        yield place
-    finally:
-        place.give_back()
+async def _held_slots() -> AsyncIterator[AsyncExitStack]:
+    async with AsyncExitStack() as held:
+        yield held
 
 
-# Held until the answer is sent, or the client is gone.
-PlaceDep = Annotated[Place, Depends(_place)]
+# The slots that a request holds until its answer is sent, or the client is gone.
+HeldSlots = Annotated[AsyncExitStack, Depends(_held_slots)]
 
 
-def _in_turn(turns_of: Callable[[Service], Turns]) -> Any:
-    async def taken(service: ServiceDep, place: PlaceDep) -> None:
-        await place.take(turns_of(service))
+def _slot(limit_of: Callable[[Service], ConcurrencyLimit]) -> Any:
+    async def hold(service: ServiceDep, held: HeldSlots) -> None:
+        await held.enter_async_context(limit_of(service).slot())
 
-    return Depends(taken)
+    return Depends(hold)
 
 
-async def _simulating(service: ServiceDep, place: PlaceDep) -> AsyncIterator[None]:
-    async with service.turns.turn():
+async def _simulate(service: ServiceDep, held: HeldSlots) -> AsyncIterator[None]:
+    async with service.simulations.slot():
         yield
-        # Before the turn is given back, so that few answers are in memory; who reads slowly then holds no such turn.
-        await place.take(service.answers)
+        # Before the simulation slot is released, so that few answers are in memory at a time; a client that reads
+        # slowly then holds no simulation slot.
+        await held.enter_async_context(service.answers.slot())
 
 
-# Of a route that simulates, whose answer may be large, or that reads an upload: it begins when its turn comes.
-IN_TURN = Depends(_simulating, scope="function")
-IN_TURN_OF_DOWNLOADS = _in_turn(lambda service: service.downloads)
-IN_TURN_OF_UPLOADS = _in_turn(lambda service: service.uploads)
+# Dependencies of routes that wait for a slot before they begin.
+SIMULATION_SLOT = Depends(_simulate, scope="function")
+DOWNLOAD_SLOT = _slot(lambda service: service.downloads)
+UPLOAD_SLOT = _slot(lambda service: service.uploads)

@@ -1,4 +1,4 @@
-"""Names of environment variables that begin with ``WINGFIT_``: which of them nothing reads."""
+"""Finds environment variables that begin with ``WINGFIT_`` and that nothing reads."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from wingfit.records.errors import nearest
 
 PREFIX = "WINGFIT_"
-# Variables that other parts of wingfit read, and that may be in a server's environment too.
+# Variables that other parts of wingfit read, and that may also be set for a server.
 OF_CLIENTS = ("URL", "API_KEY")
 OF_COMPOSE = ("CPUS_PER_WORKER", "WORKER_MEMORY", "API_MEMORY", "HEAD_MEMORY", "PIDS", "IMAGE")
 OF_SLURM = ("VENV", "STATE", "SCRATCH", "BACKUP_SECONDS", "RAY_PORT", "RAY_OPTIONS", "HEAD_CPUS")
@@ -22,12 +22,12 @@ OF_KUBERNETES = re.compile(
 
 
 def given(environment: Mapping[str, str]) -> dict[str, str]:
-    """The variables that begin with ``WINGFIT_``, stripped; an empty one counts as unset."""
+    """The variables that begin with ``WINGFIT_``, stripped of spaces; an empty one counts as unset."""
     return {key: value.strip() for key, value in environment.items() if key.startswith(PREFIX) and value.strip()}
 
 
 def unknown(read: Mapping[str, str], settings: Iterable[str]) -> list[str]:
-    """The names in ``read`` that nothing reads, each with the nearest known one; ``settings`` are those of a server."""
+    """The names in ``read`` that nothing reads, each with the nearest known name; the server reads ``settings``."""
     known = {*settings, *OF_OTHERS}
     return [
         f"{name} ({nearest(name, sorted(known))})"

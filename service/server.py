@@ -1,4 +1,4 @@
-"""Runs the service: claims the data folder and the port with clear refusals, then hands over to uvicorn."""
+"""Runs the service: takes the data folder and the port, or says why it cannot, then starts uvicorn."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from wingfit.service.settings import Settings, SettingsError, is_loopback
 from wingfit.service.storage.database import Database, DataFolderError
 
 LOG = logging.getLogger("wingfit")
-# For which a thread that computes may keep others from running Python. Reading gives its turn away at every row, so
-# that with the usual 5 ms a page of some rows could wait for longer than it takes.
+# Time slice of a Python thread. A database read releases the interpreter at every row, so with the default of 5 ms a
+# page of several rows would wait for computing threads most of the time.
 SWITCH_SECONDS = 0.0005
 PORT_TAKEN = (errno.EADDRINUSE, errno.EACCES)
 
 
 class ServeError(RuntimeError):
-    """The service cannot start; the message says why and what to do."""
+    """The service cannot start; the message says why, and what to do."""
 
 
 class _Server(uvicorn.Server):
-    """Begins the stop at a signal, because open event streams would hold up uvicorn's own, and ends it in time."""
+    """Stops the service at a signal, because uvicorn would wait for open event streams, and in bounded time."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI, limits: StopLimits) -> None:
         super().__init__(config)
@@ -48,12 +48,12 @@ class _Server(uvicorn.Server):
         self._watchdog = Watchdog(limits.kill)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start, and stop in time even if the start hangs."""
+        """Start; a signal stops the server even if the start hangs."""
         self._watchdog.listen()
         await super().startup(sockets)
 
     async def on_tick(self, counter: int) -> bool:
-        """Take the signals back from Ray, whose handler aborts the process three seconds after a SIGTERM."""
+        """Install the signal handlers again: Ray's handler aborts the process three seconds after a SIGTERM."""
         for number in shutdown.SIGNALS:
             signal.signal(number, self.handle_exit)
         self._watchdog.listen()
@@ -61,11 +61,11 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:  # noqa: ARG002  uvicorn's signature
         self._deadline.begin()
-        # Not uvicorn's own, which ends the process by raising the signal again: a clean stop is no death by signal.
+        # Without uvicorn's handler, which raises the signal again: the exit status of a clean stop is 0.
         first, self.should_exit = not self.should_exit, True
         self.force_exit |= not first and sig == signal.SIGINT
         service = getattr(self._app.state, "service", None)
-        if service is not None and first:  # a second signal may interrupt the handler of the first
+        if service is not None and first:  # a second signal may interrupt this handler
             service.begin_stop()
 
 
@@ -82,7 +82,7 @@ def serve(
     diagnoser: Diagnoser | None = None,
     limits: StopLimits | None = None,
 ) -> None:
-    """Serve until SIGTERM or Ctrl-C. ServeError when the folder or the port cannot be had."""
+    """Serve until SIGTERM or Ctrl-C; ServeError if the data folder or the port is not available."""
     limits = limits or StopLimits()
     set_up_log(settings.log)
     sys.setswitchinterval(SWITCH_SECONDS)
@@ -94,9 +94,9 @@ def serve(
         raise ServeError(str(error)) from None
     settings = replace(settings, port=listening.getsockname()[1])
     if settings.keys:
-        _need_a_key(settings, database, listening)
+        _require_admin_key(settings, database, listening)
     elif not is_loopback(settings.host):
-        LOG.warning("listening on %s without keys: whoever reaches it can read and delete everything", settings.host)
+        LOG.warning("listening on %s without keys: anyone who can connect can read and delete all data", settings.host)
     app = create_app(
         settings,
         database=database,
@@ -114,7 +114,7 @@ def serve(
         timeout_graceful_shutdown=limits.requests,
         server_header=False,
     )
-    # What is loaded by now stays: to look through it for garbage would hold up every answer for a tenth of a second.
+    # Exclude what is loaded by now from garbage collection, which would delay every answer by a tenth of a second.
     gc.freeze()
     LOG.info("wingfit is at %s (data in %s)", settings.url, settings.data.resolve())
     try:
@@ -122,26 +122,26 @@ def serve(
     finally:
         stopped = getattr(app.state, "stopped", True) and database.close(limits.database)
     if not stopped or shutdown.held_up():
-        # A thread goes on; do not wait for it. What it computes is computed again after the next start.
+        # A thread still runs. Do not wait for it: the next start repeats its computation.
         shutdown.log_threads()
         shutdown.leave()
 
 
-def _need_a_key(settings: Settings, database: Database, listening: socket.socket) -> None:
-    """ServeError while there is no key that can manage keys: nobody could get in."""
+def _require_admin_key(settings: Settings, database: Database, listening: socket.socket) -> None:
+    """ServeError if no valid key can manage keys, because nobody could use the server."""
     with database.read() as session:
         known = any(row.revoked_at is None and "admin" in row.scopes for row in keys.every(session))
     if not known:
         database.close()
         listening.close()
         raise ServeError(
-            f"a server on {settings.host} asks for API keys, and there is none that can manage keys yet; make one: "
+            f"a server on {settings.host} requires API keys, and there is no key with the scope admin; make one: "
             f"wingfit keys create NAME --scope admin --data {settings.data}"
         )
 
 
 def main() -> None:
-    """Serve with the settings of the environment."""
+    """Serve with the settings in the environment."""
     try:
         serve(Settings.from_env())
     except (ServeError, SettingsError) as error:
@@ -151,7 +151,7 @@ def main() -> None:
 def _listen(settings: Settings) -> socket.socket:
     family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
     try:
-        # Naming the protocol lets asyncio switch off Nagle's algorithm, which would delay every answer by 40 ms.
+        # With the protocol given, asyncio disables Nagle's algorithm, which would delay every answer by 40 ms.
         listening = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     except OSError as error:  # a system without IPv6
         raise _cannot_listen(settings, error) from None
@@ -159,7 +159,7 @@ def _listen(settings: Settings) -> socket.socket:
     try:
         listening.bind((settings.host, settings.port))
         listening.listen(128)
-    except (OSError, TypeError, UnicodeError) as error:  # the latter: a name that no host can have
+    except (OSError, TypeError, UnicodeError) as error:  # TypeError, UnicodeError: an invalid host name
         listening.close()
         raise _cannot_listen(settings, error) from None
     return listening

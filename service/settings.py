@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from wingfit.service import environment
 from wingfit.service.limits import MOST_WORKERS
@@ -16,15 +16,28 @@ from wingfit.service.limits import MOST_WORKERS
 LogFormat = Literal["text", "json"]
 EvaluatorKind = Literal["in_process", "processes", "ray"]
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
-YES = ("1", "true", "yes", "y", "on")
-# In ASCII: int() also takes the digits of other scripts, underscores, and texts of any length.
+YES, NO = ("1", "true", "yes", "y", "on"), ("0", "false", "no", "n", "off")
+# ASCII digits only: int() would also accept the digits of other scripts, underscores, and texts of any length.
 WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,18}")
 HOST_NAME = re.compile(r"[a-z0-9_]([a-z0-9_.-]*[a-z0-9_])?\.?")
-NO = ("0", "false", "no", "n", "off")
+DEFAULT_FOLDER = "wingfit-data"
+# The smallest and the largest value of each whole number, the choices of each name, and the yes-or-no settings.
+RANGES = {
+    "port": (0, 65535),
+    "workers": (1, MOST_WORKERS),
+    "max_runs": (1, 64),
+    "max_runs_per_owner": (1, 64),
+    "max_starts": (1, 1_000_000),
+    "max_active": (1, 100_000),
+    "max_stored_mb": (1, 10**9),
+    "keep_days": (1, 36_500),
+}
+CHOICES = {"evaluator": get_args(EvaluatorKind), "log": get_args(LogFormat)}
+FLAGS = ("require_keys", "allow_remote")
 
 
 class SettingsError(ValueError):
-    """A setting that the service cannot run with."""
+    """A setting with which the service cannot run."""
 
 
 @dataclass(frozen=True)
@@ -33,20 +46,20 @@ class Settings:
 
     Attributes:
         data: folder of the database and its lock (``WINGFIT_DATA``).
-        host: address to listen on (``WINGFIT_HOST``); one that is not loopback needs ``allow_remote``.
+        host: address to listen on (``WINGFIT_HOST``).
         port: TCP port (``WINGFIT_PORT``); 0 takes a free one.
         evaluator: what evaluates individuals (``WINGFIT_EVALUATOR``): in_process, processes or ray.
-        workers: number of worker processes (``WINGFIT_WORKERS``); None lets the evaluator choose.
-        ray_address: address of a standing Ray cluster (``WINGFIT_RAY_ADDRESS``); None starts one of our own.
+        workers: number of worker processes (``WINGFIT_WORKERS``); None: the evaluator decides.
+        ray_address: address of a running Ray cluster (``WINGFIT_RAY_ADDRESS``); None: the server starts its own.
         max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
-        max_runs_per_owner: of them of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: all.
-        max_starts: starts without progress after which a job is given up, where each ended with the server
-            (``WINGFIT_MAX_STARTS``).
+        max_runs_per_owner: the same of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: ``max_runs``.
+        max_starts: number of starts of a job, each ended by an end of the server without progress of the job, after
+            which the job fails (``WINGFIT_MAX_STARTS``).
         max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
         max_stored_mb: MB of archives of one owner (``WINGFIT_MAX_STORED_MB``).
         keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
-        log: text, or json, one object a line and requests as well (``WINGFIT_LOG``).
-        require_keys: ask for an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
+        log: text, or json, which has one object per line and every request (``WINGFIT_LOG``).
+        require_keys: require an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
         allow_remote: listen on other addresses than loopback without keys (``WINGFIT_ALLOW_REMOTE=1``).
         allowed_hosts: host names that requests may carry (loopback names and ``WINGFIT_ALLOWED_HOSTS``).
     """
@@ -69,68 +82,50 @@ class Settings:
     allowed_hosts: tuple[str, ...] = LOOPBACK_NAMES
 
     def __post_init__(self) -> None:
-        _in_range("WINGFIT_PORT", self.port, 0, 65535)
-        _in_range("WINGFIT_MAX_RUNS", self.max_runs, 1, 64)
-        _in_range("WINGFIT_MAX_STARTS", self.max_starts, 1, 1_000_000)
-        _in_range("WINGFIT_MAX_ACTIVE", self.max_active, 1, 100_000)
-        _in_range("WINGFIT_MAX_STORED_MB", self.max_stored_mb, 1, 10**9)
-        if self.max_runs_per_owner is not None:
-            _in_range("WINGFIT_MAX_RUNS_PER_OWNER", self.max_runs_per_owner, 1, 64)
-        if self.keep_days is not None:
-            _in_range("WINGFIT_KEEP_DAYS", self.keep_days, 1, 36_500)
-        if self.workers is not None:
-            _in_range("WINGFIT_WORKERS", self.workers, 1, MOST_WORKERS)
-        if self.evaluator not in get_args(EvaluatorKind):
-            raise SettingsError(
-                f"WINGFIT_EVALUATOR is {self.evaluator!r}; it must be one of {', '.join(get_args(EvaluatorKind))}"
-            )
+        for field, (lower, upper) in RANGES.items():
+            value = getattr(self, field)
+            if value is not None and not lower <= value <= upper:
+                raise SettingsError(f"{_variable(field)} is {value}; it must lie in [{lower}, {upper}]")
+        for field, choices in CHOICES.items():
+            if (value := getattr(self, field)) not in choices:
+                raise SettingsError(f"{_variable(field)} is {value!r}; it must be one of {', '.join(choices)}")
         if self.ray_address is not None and self.evaluator != "ray":
             raise SettingsError(
                 f"WINGFIT_RAY_ADDRESS is {self.ray_address!r}, but WINGFIT_EVALUATOR is {self.evaluator!r}: "
                 "set that to ray, or unset the address"
             )
-        if self.log not in get_args(LogFormat):
-            raise SettingsError(f"WINGFIT_LOG is {self.log!r}; it must be one of {', '.join(get_args(LogFormat))}")
         if self.allow_remote and self.require_keys:
             raise SettingsError(
-                "WINGFIT_ALLOW_REMOTE=1 is for a server without keys, WINGFIT_REQUIRE_KEYS=1 for one with: unset one"
+                "WINGFIT_ALLOW_REMOTE=1 is for a server without keys, WINGFIT_REQUIRE_KEYS=1 for one with keys: unset "
+                "one of them"
             )
 
     @classmethod
     def from_env(cls, env: Mapping[str, str] | None = None) -> Settings:
         """Settings from ``env`` (default: the environment of the process); an empty value counts as unset.
 
-        Raises SettingsError for a value that cannot be, and for a ``WINGFIT_`` variable that nothing reads.
+        Raises SettingsError for an invalid value, and for a ``WINGFIT_`` variable that nothing reads, because a
+        misspelt setting would be ignored silently.
         """
         read = environment.given(os.environ if env is None else env)
-        _refuse_unknown(read)
-        return cls(
-            data=_folder(read.get("WINGFIT_DATA", "wingfit-data")),
-            host=read.get("WINGFIT_HOST", cls.host),
-            port=_integer(read, "WINGFIT_PORT", cls.port),
-            evaluator=read.get("WINGFIT_EVALUATOR", cls.evaluator),  # type: ignore[arg-type]  # checked above
-            workers=_some(read, "WINGFIT_WORKERS"),
-            ray_address=read.get("WINGFIT_RAY_ADDRESS"),
-            max_runs=_integer(read, "WINGFIT_MAX_RUNS", cls.max_runs),
-            max_runs_per_owner=_some(read, "WINGFIT_MAX_RUNS_PER_OWNER"),
-            max_starts=_integer(read, "WINGFIT_MAX_STARTS", cls.max_starts),
-            max_active=_integer(read, "WINGFIT_MAX_ACTIVE", cls.max_active),
-            max_stored_mb=_integer(read, "WINGFIT_MAX_STORED_MB", cls.max_stored_mb),
-            keep_days=_some(read, "WINGFIT_KEEP_DAYS"),
-            log=read.get("WINGFIT_LOG", cls.log),  # type: ignore[arg-type]  # checked above
-            require_keys=_yes(read, "WINGFIT_REQUIRE_KEYS"),
-            allow_remote=_yes(read, "WINGFIT_ALLOW_REMOTE"),
-            allowed_hosts=LOOPBACK_NAMES + _hosts(read.get("WINGFIT_ALLOWED_HOSTS", "")),
-        )
+        variables = {field.name: _variable(field.name) for field in fields(cls)}
+        if unknown := environment.unknown(read, variables.values()):
+            raise SettingsError(
+                f"the environment has variables that are no setting of wingfit: {', '.join(unknown)}; correct or unset "
+                "them"
+            )
+        read.setdefault("WINGFIT_DATA", DEFAULT_FOLDER)
+        given = {field: read[variable] for field, variable in variables.items() if variable in read}
+        return cls(**{field: _parsed(field, text) for field, text in given.items()})
 
     @property
     def keys(self) -> bool:
-        """Whether calls need an API key: wherever other machines can reach the server, unless told otherwise."""
+        """Whether calls need an API key: by default only where other machines can reach the server."""
         return self.require_keys or not (self.allow_remote or is_loopback(self.host))
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the service."""
+        """The address of the service for a browser on this machine."""
         host = self.host if is_loopback(self.host) else "localhost"
         return f"http://[{host}]:{self.port}/" if ":" in host else f"http://{host}:{self.port}/"
 
@@ -145,14 +140,19 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-def _refuse_unknown(read: Mapping[str, str]) -> None:
-    """SettingsError for names that nothing reads: a misspelt setting would be ignored in silence."""
-    names = [f"{environment.PREFIX}{field.name.upper()}" for field in fields(Settings)]
-    unknown = environment.unknown(read, names)
-    if unknown:
-        raise SettingsError(
-            f"the environment has what is no setting of wingfit: {', '.join(unknown)}; correct or unset it"
-        )
+def _variable(field: str) -> str:
+    return f"{environment.PREFIX}{field.upper()}"
+
+
+def _parsed(field: str, text: str) -> Any:
+    """The value of a setting; SettingsError if the text has not the form of one."""
+    if field in RANGES:
+        return _integer(field, text)
+    if field in FLAGS:
+        return _flag(field, text)
+    if field == "data":
+        return _folder(text)
+    return LOOPBACK_NAMES + _hosts(text) if field == "allowed_hosts" else text
 
 
 def _hosts(text: str) -> tuple[str, ...]:
@@ -184,31 +184,18 @@ def _folder(text: str) -> Path:
         ) from None
 
 
-def _yes(read: Mapping[str, str], name: str) -> bool:
-    text = read.get(name)
-    if text is None or text.lower() in NO:
-        return False
-    if text.lower() in YES:
-        return True
-    raise SettingsError(f"{name} is {text!r}; it must be one of {', '.join(YES)} (yes) or {', '.join(NO)} (no)")
+def _flag(field: str, text: str) -> bool:
+    if text.lower() not in YES + NO:
+        raise SettingsError(
+            f"{_variable(field)} is {text!r}; it must be one of {', '.join(YES)} (yes) or {', '.join(NO)} (no)"
+        )
+    return text.lower() in YES
 
 
-def _some(read: Mapping[str, str], name: str) -> int | None:
-    return _integer(read, name, 1) if name in read else None
-
-
-def _integer(read: Mapping[str, str], name: str, default: int) -> int:
-    text = read.get(name)
-    if text is None:
-        return default
+def _integer(field: str, text: str) -> int:
     if WHOLE_NUMBER.fullmatch(text):
         return int(text)
-    remedy = ""
+    variable, example, remedy = _variable(field), getattr(Settings, field) or RANGES[field][0], ""
     if "://" in text:
         remedy = "; if Kubernetes set it for a Service of that name, set it yourself, or enableServiceLinks: false"
-    raise SettingsError(f"{name} is {text!r}; it must be a whole number, for example {name}={default}{remedy}")
-
-
-def _in_range(name: str, value: int, lower: int, upper: int) -> None:
-    if not lower <= value <= upper:
-        raise SettingsError(f"{name} is {value}; it must lie in [{lower}, {upper}]")
+    raise SettingsError(f"{variable} is {text!r}; it must be a whole number, for example {variable}={example}{remedy}")

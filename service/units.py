@@ -1,4 +1,4 @@
-"""Units of people at the edge; numbers that do not exist become null."""
+"""Conversion from SI to the units of the API; numbers that JSON does not have become null."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def mn(value: float | None) -> float | None:
 
 
 def tidy_mm(stated: float) -> float:
-    """A distance (m) that somebody stated, in mm as they wrote it: 0.07, not 0.07000000000000001."""
+    """A distance (m) that a user gave, in mm without rounding errors: 0.07, not 0.07000000000000001."""
     return round(stated * MM, 9)
 
 
 def finite(value: float) -> float | None:
-    """``value``, or None where JSON has no number for it."""
+    """``value``, or None if it is infinite or not a number."""
     return float(value) if math.isfinite(value) else None

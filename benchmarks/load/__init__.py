@@ -1,1 +1,1 @@
-"""Reads, watchers and pages beside a calibration, over a database that has seen years of use."""
+"""Load: reads, event streams and pages beside a calibration, over a database as after years of use."""

@@ -1,7 +1,7 @@
-"""The same calibration again and again, undisturbed and under loads, in turn: what each costs the other.
+"""The same calibration alternately undisturbed and beside each load: what each costs the other.
 
-The same seed gives the same computation, bit for bit. So the times of two runs differ by what went on beside them, and
-by what else this machine does: hence in turn, and the order of the turns is reversed from round to round.
+The same seed gives the same computation, bit for bit, so the times of two runs differ only by the load and by other
+work on the machine. Therefore the loads alternate, in reversed order every second round.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from typing import Any
 
 from benchmarks.common.server_process import Server
 from benchmarks.load.calibrations import computed
-from benchmarks.load.crowd import Crowd, Told, visit
 from benchmarks.load.figures import milliseconds
+from benchmarks.load.generator import Observed, Traffic, generate
 from benchmarks.load.mix import KINDS, Stored, reads
 from wingfit.client.client import Client
 
 Json = dict[str, Any]
-READS = 20_000  # drawn; then again from the first
+READS = 20_000  # number drawn; then they are repeated
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
 class Load:
-    """Reads per second, and watchers of the run."""
+    """A load: its name, reads per second, and number of event streams of the run."""
 
     name: str
     rate: float
@@ -38,104 +38,104 @@ class Load:
 
 
 @dataclass(frozen=True)
-class Turn:
-    """One calibration under one load.
+class Trial:
+    """One calibration beside one load.
 
     Attributes:
-        seconds: from its first generation to its last.
-        evaluations: in that time.
-        processor_seconds: of the server without its workers, from before the run to after.
-        kinds: of the reads, by the number of their path.
-        told: by the crowd.
+        seconds: from the first generation to the last.
+        evaluations: number in that time.
+        processor_seconds: processor time of the server without its workers, from before the run to after it.
+        kinds: kind of each read, by the number of its path.
+        observed: what the load generator observed.
     """
 
     seconds: float
     evaluations: int
     processor_seconds: float
     kinds: Sequence[str]
-    told: Told
+    observed: Observed
 
 
 def beside(server: Server, client: Client, body: Json, stored: Stored, loads: Sequence[Load], rounds: int) -> Json:
-    """Take turns, the first of ``loads`` being none, and say of each load what it met with and what it cost."""
-    turns: dict[str, list[Turn]] = {load.name: [] for load in loads}
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as crowd:
-        crowd.submit(os.getpid).result()  # it starts before it is needed
+    """Alternate the ``loads``, of which the first is none; the figures of each load by its name."""
+    trials: dict[str, list[Trial]] = {load.name: [] for load in loads}
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        pool.submit(os.getpid).result()  # start the process before it is needed
 
-        def come(what: Crowd) -> Told:
-            return crowd.submit(visit, what).result()
+        def run_traffic(traffic: Traffic) -> Observed:
+            return pool.submit(generate, traffic).result()
 
         for number in range(rounds):
             for load in loads if number % 2 == 0 else reversed(loads):
                 _progress(f"round {number + 1} of {rounds}, {load.name}")
-                turns[load.name].append(_turn(server, client, body, stored, load, number, come))
+                trials[load.name].append(_trial(server, client, body, stored, load, number, run_traffic))
     _progress("")
-    alone = turns[loads[0].name]
-    return {load.name: _told(load, turns[load.name], alone) for load in loads}
+    alone = trials[loads[0].name]
+    return {load.name: _figures(load, trials[load.name], alone) for load in loads}
 
 
-def _turn(
+def _trial(
     server: Server,
     client: Client,
     body: Json,
     stored: Stored,
     load: Load,
     seed: int,
-    come: Callable[[Crowd], Told],
-) -> Turn:
+    run_traffic: Callable[[Traffic], Observed],
+) -> Trial:
     before = processor_seconds(server.pid)
     run = client.submit_run(**body)["id"]
-    asked = reads(stored, run, READS, seed) if load.rate else []
-    told = come(Crowd(server.port, run, load.watchers, load.rate, [path for _, path in asked]))
+    requests = reads(stored, run, READS, seed) if load.rate else []
+    observed = run_traffic(Traffic(server.port, run, load.watchers, load.rate, [path for _, path in requests]))
     after = processor_seconds(server.pid)
-    return Turn(*computed(client, run), after - before, [kind for kind, _ in asked], told)
+    return Trial(*computed(client, run), after - before, [kind for kind, _ in requests], observed)
 
 
-def _told(load: Load, turns: Sequence[Turn], alone: Sequence[Turn]) -> Json:
-    """Of one load, over all its turns, beside those of the undisturbed run of the same rounds."""
-    told = [turn.told for turn in turns]
-    latencies = [seconds for one in told for _, seconds in one.latencies]
-    slowdowns = [100 * (turn.seconds / other.seconds - 1) for turn, other in zip(turns, alone, strict=True)]
-    lasted, reading = (sum(getattr(one, name) for one in told) for name in ("seconds", "reading_seconds"))
-    taken = sum(turn.processor_seconds - other.processor_seconds for turn, other in zip(turns, alone, strict=True))
-    own, others_own = (sum(turn.told.processor_seconds for turn in some) for some in (turns, alone))
+def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Json:
+    """Figures of one load over its trials, compared with the undisturbed trials of the same rounds (``alone``)."""
+    observed = [trial.observed for trial in trials]
+    latencies = [seconds for one in observed for _, seconds in one.latencies]
+    slowdowns = [100 * (trial.seconds / other.seconds - 1) for trial, other in zip(trials, alone, strict=True)]
+    lasted, reading = (sum(getattr(one, name) for one in observed) for name in ("seconds", "reading_seconds"))
+    taken = sum(trial.processor_seconds - other.processor_seconds for trial, other in zip(trials, alone, strict=True))
+    own, alone_own = (sum(trial.observed.processor_seconds for trial in some) for some in (trials, alone))
     return {
-        "asked_per_second": load.rate,
+        "requested_per_second": load.rate,
         "watchers": load.watchers,
-        "calibration_seconds": [round(turn.seconds, 2) for turn in turns],
-        "evaluations_per_second": round(statistics.median(turn.evaluations / turn.seconds for turn in turns), 2),
+        "calibration_seconds": [round(trial.seconds, 2) for trial in trials],
+        "evaluations_per_second": round(statistics.median(trial.evaluations / trial.seconds for trial in trials), 2),
         "slowdown_percent": round(statistics.median(slowdowns), 1),
         "slowdowns_percent": [round(one, 1) for one in slowdowns],
         "reads_per_second": round(len(latencies) / reading, 1) if reading else 0.0,
         "reads": milliseconds(latencies) | {"of": len(latencies)},
-        "reads_by_kind": {kind: milliseconds(_of_kind(turns, kind)) for kind in KINDS} if latencies else {},
-        "events": milliseconds(lags := [lag for one in told for lag in one.lags]) | {"of": len(lags)},
-        "refused": sum(one.refused for one in told),
-        "unanswered": sum(one.unanswered for one in told),
-        "cut": sum(one.cut for one in told),
-        "crowd_late_ms": round(1e3 * max(one.late for one in told), 1),
+        "reads_by_kind": {kind: milliseconds(_of_kind(trials, kind)) for kind in KINDS} if latencies else {},
+        "events": milliseconds(lags := [lag for one in observed for lag in one.lags]) | {"of": len(lags)},
+        "refused": sum(one.refused for one in observed),
+        "unanswered": sum(one.unanswered for one in observed),
+        "cut": sum(one.cut for one in observed),
+        "generator_late_ms": round(1e3 * max(one.late for one in observed), 1),
         "server_processor_seconds": round(taken, 2),
-        "crowd_processor_seconds": round(own - others_own, 2),
+        "generator_processor_seconds": round(own - alone_own, 2),
         "server_percent_of_a_processor": round(100 * taken / lasted, 1),
-        "crowd_percent_of_a_processor": round(100 * (own - others_own) / lasted, 1),
+        "generator_percent_of_a_processor": round(100 * (own - alone_own) / lasted, 1),
     }
 
 
 def per_read_us(loaded: Json, watched: Json) -> float | None:
-    """Processor time of the server for a read: what it took more than for the watchers alone."""
+    """Processor time of the server per read, us: the difference to the load with event streams only."""
     number = loaded["reads"]["of"]
     more = loaded["server_processor_seconds"] - watched["server_processor_seconds"]
     return round(1e6 * more / number, 1) if number else None
 
 
 def processor_seconds(pid: int) -> float:
-    """That a process has taken, with its threads and without the processes that it started."""
+    """Processor time of a process with its threads, without the processes that it started."""
     fields = (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
-def _of_kind(turns: Sequence[Turn], kind: str) -> list[float]:
-    return [seconds for turn in turns for number, seconds in turn.told.latencies if turn.kinds[number] == kind]
+def _of_kind(trials: Sequence[Trial], kind: str) -> list[float]:
+    return [seconds for trial in trials for number, seconds in trial.observed.latencies if trial.kinds[number] == kind]
 
 
 def _progress(what: str) -> None:

@@ -1,4 +1,4 @@
-"""What is computed meanwhile: calibrations of the example wing, of a fixed number of generations."""
+"""The calibrations of the benchmark: the example wing, with a fixed number of generations."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ ROBIRD = EXAMPLES / "robird"
 
 
 def search(division: str, population: int, generations: int, **more: Any) -> Json:
-    """A genetic search that does not end before its last generation."""
+    """The body of a genetic search that does not end before its last generation."""
     size = {"division": division, "population": population, "max_generations": generations, "stall": generations}
     return size | {"mode": "joint", "tolerance": 0.0, "seed": 1} | more
 
 
-# Of 11 bodies on all six recordings that are not held out; of 4 on one.
+# 11 bodies, all six recordings that are not held out; 4 bodies, one recording.
 LONG = search("11", 32, 12)
 SHORT = search("4", 8, 12, recordings=["vac-0010mbar-lag0-2.0hz"])
 
 
 def computed(client: Client, run_id: str) -> tuple[float, int]:
-    """When a run has ended: seconds and evaluations from its first generation to its last."""
+    """Wait for a run to end; the seconds and evaluations from its first generation to its last."""
     ended = client.wait(run_id)
     if ended["state"] != "SUCCEEDED":
         raise RuntimeError(f"the calibration {ended['state']}: {ended['error']}")

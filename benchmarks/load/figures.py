@@ -1,4 +1,4 @@
-"""What is told of many times."""
+"""Statistics of response times."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Sequence
 
 
 def percentile(values: Sequence[float], percent: float) -> float | None:
-    """The smallest of ``values`` that at least ``percent`` of them do not exceed; None of none."""
+    """The smallest of ``values`` that at least ``percent`` per cent of them do not exceed; None if there are none."""
     if not values:
         return None
     return sorted(values)[max(1, math.ceil(percent / 100 * len(values))) - 1]
 
 
 def milliseconds(seconds: Sequence[float]) -> dict[str, float | None]:
-    """Median, 99th percentile and largest."""
+    """Median, 99th percentile and maximum, in ms, of times in s."""
     return {
         name: None if (found := percentile(seconds, percent)) is None else round(1e3 * found, 2)
-        for name, percent in (("p50_ms", 50), ("p99_ms", 99), ("most_ms", 100))
+        for name, percent in (("p50_ms", 50), ("p99_ms", 99), ("max_ms", 100))
     }

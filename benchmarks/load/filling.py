@@ -1,4 +1,4 @@
-"""A database as years of use leave it: copies, under names of their own, of a run that a server computed and stored."""
+"""Fills a database as years of use would, with copies of a run that a server computed and stored."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from wingfit.workers.jobs import State
 
 Values = dict[str, Any]
 DATASETS = 20
-# Of every ten runs; of the others one failed and one was cancelled.
+# Of every ten runs; of the other two one failed and one was cancelled.
 SUCCEEDED = 8
-BETWEEN = timedelta(minutes=50)
+INTERVAL = timedelta(minutes=50)
 
 
 @dataclass(frozen=True)
 class Filled:
-    """What is stored.
+    """What the filled database holds.
 
     Attributes:
-        runs: their number.
-        generations: of all runs.
+        runs: number of runs.
+        generations: number of generations of all runs.
         longest: id of the run with the most generations.
-        longest_generations: their number.
+        longest_generations: number of its generations.
     """
 
     runs: int
@@ -40,22 +40,22 @@ class Filled:
     longest_generations: int
 
 
-def fill(folder: Path, runs: int, each: int, longest: int) -> Filled:
-    """Copy the run that a stopped server left in ``folder`` until there are ``runs``.
+def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
+    """Copy the run in the database of a stopped server in ``folder`` until there are ``runs``.
 
-    Every copy has ``each`` generations, those of the original again and again, and the newest one ``longest``.
+    Every copy has ``generations`` generations, those of the original repeated; the newest copy has ``longest``.
     """
     database = Database(folder)
     try:
         with database.write() as session:
             original = session.scalars(select(RunRow).where(RunRow.state == State.SUCCEEDED.value)).first()
             if original is None:
-                raise RuntimeError(f"no run in {folder} has succeeded; one is needed to be copied")
+                raise RuntimeError(f"no run in {folder} has succeeded; let the server compute one first")
             past = [columns(row) for row in store.history(session, original.id, 0)]
             copies = _copies(columns(original), _datasets(session, original.dataset_id), runs - 1)
             first, last = copies[0], copies[-1]
             for copy in copies:
-                copy |= _length(past, longest if copy is last else each)
+                copy |= _length(past, longest if copy is last else generations)
             session.execute(insert(RunRow), copies)
             for copy in (first, last):
                 session.execute(insert(GenerationRow), _generations(past, copy))
@@ -67,7 +67,7 @@ def fill(folder: Path, runs: int, each: int, longest: int) -> Filled:
 
 
 def _datasets(session: Session, dataset_id: str) -> list[str]:
-    """Ids of the dataset and of copies of it."""
+    """The ids of the dataset and of its copies, which are stored."""
     row, body = store.dataset(session, dataset_id), store.archive(session, dataset_id)
     copies = [_unnumbered(row) | {"id": store.new_id("ds"), "name": f"{row.name} {n}"} for n in range(2, DATASETS + 1)]
     session.execute(insert(DatasetRow), copies)
@@ -76,18 +76,18 @@ def _datasets(session: Session, dataset_id: str) -> list[str]:
 
 
 def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
-    """Rows of runs that ended, one every 50 minutes until now, on every dataset, each with a seed of its own."""
+    """``number`` rows of runs, one every 50 minutes until now, on all datasets, each with its own seed."""
     until, copies = datetime.now(UTC), []
     for place in range(number):
-        ended = until - (number - place) * BETWEEN
-        began = store.timestamp(ended - timedelta(seconds=original["elapsed_seconds"]))
+        ended = until - (number - place) * INTERVAL
+        start = store.timestamp(ended - timedelta(seconds=original["elapsed_seconds"]))
         copy = original | {
             "id": store.new_id("run"),
             "name": f"{original['name']}, seed {place}",
             "dataset_id": datasets[place % len(datasets)],
             "spec": original["spec"] | {"seed": place},
-            "created_at": began,
-            "started_at": began,
+            "created_at": start,
+            "started_at": start,
             "finished_at": store.timestamp(ended),
         }
         del copy["number"]
@@ -108,7 +108,7 @@ def _unnumbered(row: DatasetRow) -> Values:
 
 
 def _generations(past: list[Values], run: Values) -> list[Values]:
-    """As many as ``run`` has, out of those of another."""
+    """The generations of ``run``: those of another run (``past``) repeated."""
     return [
         past[(sequence - 1) % len(past)]
         | {
@@ -125,7 +125,7 @@ def _generations(past: list[Values], run: Values) -> list[Values]:
 
 
 def _length(past: list[Values], generations: int) -> Values:
-    """What a run has taken after so many ``generations``, at the pace of another."""
+    """Generations, evaluations and seconds of a run after ``generations``, at the pace of another run (``past``)."""
     part = generations / len(past)
     return {
         "generations": generations,
@@ -135,7 +135,7 @@ def _length(past: list[Values], generations: int) -> Values:
 
 
 def _copy_generations(session: Session, model: str, have: list[str]) -> None:
-    """Those of ``model`` for every run but those that ``have`` some: one statement, for there are a million."""
+    """Copy the generations of ``model`` to all runs not in ``have``, in one statement because there are a million."""
     names = [column.key for column in GenerationRow.__table__.columns]
     theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
     rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.run_id == model, RunRow.id.not_in(have))

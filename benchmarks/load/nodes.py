@@ -1,4 +1,4 @@
-"""The same calibration on one and on two Ray nodes of one processor each, all on this machine, in turn."""
+"""The same calibration alternately on one and on two Ray nodes of one processor each, on this machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SETTLE_SECONDS = 120.0
 
 
 def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
-    """Pace with one and with two nodes, and the part of twice the first that the second reaches."""
+    """The pace with one and with two nodes; the efficiency is the second over twice the first."""
     folder.mkdir()
     cluster = Cluster(folder)
     server = Server(folder, "ray", cluster.token, cluster.address)
@@ -30,7 +30,7 @@ def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
             dataset = client.upload_dataset(ROBIRD)["id"]
             for number in range(rounds):
                 for nodes in (2, 1) if number % 2 == 0 else (1, 2):
-                    now = _have(cluster, nodes, now)
+                    now = _set_nodes(cluster, nodes, now)
                     _settle(client, short | {"dataset_id": dataset}, nodes)
                     seconds, evaluations = computed(client, client.submit_run(**work | {"dataset_id": dataset})["id"])
                     paces[nodes].append(evaluations / seconds)
@@ -45,8 +45,8 @@ def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
     }
 
 
-def _have(cluster: Cluster, nodes: int, now: int) -> int:
-    """Let ``nodes`` be there where ``now`` are."""
+def _set_nodes(cluster: Cluster, nodes: int, now: int) -> int:
+    """Change the number of nodes by one from ``now`` to ``nodes``, where they differ."""
     if nodes < now:
         cluster.kill_node()
     elif nodes > now:
@@ -55,11 +55,13 @@ def _have(cluster: Cluster, nodes: int, now: int) -> int:
 
 
 def _settle(client: Client, short: Json, nodes: int) -> None:
-    """Compute a little until the server knows of the nodes, and these have all that they need."""
+    """Compute short runs until the server knows the nodes and the nodes are warm."""
     deadline = time.monotonic() + SETTLE_SECONDS
     while True:
         computed(client, client.submit_run(**short)["id"])
         if client.health()["workers"] == nodes:
             return
         if time.monotonic() > deadline:
-            raise RuntimeError(f"the server knows of {client.health()['workers']} processors, and there are {nodes}")
+            raise RuntimeError(
+                f"the server has {client.health()['workers']} workers instead of {nodes} after {SETTLE_SECONDS:g} s"
+            )

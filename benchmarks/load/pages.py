@@ -1,6 +1,6 @@
-"""How long pages of the list and of a long history take, while a calibration uses all processors.
+"""Response times of pages of the run list and of a long history, while a calibration uses all processors.
 
-No page is asked for twice, so that a server which remembers is not flattered.
+No page is requested twice, so that a cache in the server does not improve the figures.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from benchmarks.load.mix import Stored
 from wingfit.service.http.responses import HISTORY_PAGE, LARGEST_HISTORY_PAGE, LARGEST_PAGE, PAGE
 
 Json = dict[str, Any]
-TIMES, TIMES_LARGEST = 100, 20
+PAGES, LARGEST_PAGES = 100, 20
 
 
 def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
-    """Times of each kind of page."""
+    """Response times of each kind of page."""
     rng = np.random.default_rng(1)
     cursors = rng.permutation(stored.cursors)
-    last = max(0, filled.longest_generations - HISTORY_PAGE - TIMES)
+    last = max(0, filled.longest_generations - HISTORY_PAGE - PAGES)
     history = f"/v1/runs/{filled.longest}/history"
     some: dict[str, Callable[[int], str]] = {
         "list, newest": lambda n: f"/v1/runs?limit={PAGE + n}",
@@ -38,23 +38,23 @@ def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
         "history, in the middle": lambda n: f"{history}?after={last // 2 + n}",
         "history, last page": lambda n: f"{history}?after={last + n}",
     }
-    largest = [f"{history}?after={n}&limit={LARGEST_HISTORY_PAGE}" for n in range(TIMES_LARGEST)]
-    asked = {name: [path(n) for n in range(TIMES)] for name, path in some.items()}
-    asked["history, largest page"] = largest
-    return {name: timed(port, paths) for name, paths in asked.items()}
+    largest = [f"{history}?after={n}&limit={LARGEST_HISTORY_PAGE}" for n in range(LARGEST_PAGES)]
+    paths_by_kind = {name: [path(n) for n in range(PAGES)] for name, path in some.items()}
+    paths_by_kind["history, largest page"] = largest
+    return {name: timed(port, paths) for name, paths in paths_by_kind.items()}
 
 
 def timed(port: int, paths: list[str]) -> Json:
-    """Times of ``paths``, one after the other, and the length of the longest answer."""
+    """Response times of ``paths``, one after the other, and the size of the largest response."""
     connection, took, longest = http.client.HTTPConnection("127.0.0.1", port, timeout=60.0), list[float](), 0
     for path in paths:
-        began = time.perf_counter()
+        start = time.perf_counter()
         connection.request("GET", path)
-        answer = connection.getresponse()
-        body = answer.read()
-        took.append(time.perf_counter() - began)
-        if answer.status != 200:
-            raise RuntimeError(f"{path} is answered with {answer.status}: {body[:300]!r}")
+        response = connection.getresponse()
+        body = response.read()
+        took.append(time.perf_counter() - start)
+        if response.status != 200:
+            raise RuntimeError(f"{path} returned {response.status}: {body[:300]!r}")
         longest = max(longest, len(body))
     connection.close()
     return milliseconds(took) | {"kilobytes": round(longest / 1000, 1)}

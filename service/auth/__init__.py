@@ -1,1 +1,1 @@
-"""API keys: who calls, what a key permits, and the audit log."""
+"""API keys: the caller of a request, the scopes of a key, and the audit log."""

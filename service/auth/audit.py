@@ -1,7 +1,7 @@
-"""A log line for every attempt to change something: who, what, and with which result.
+"""The audit log: one line for every request that can change something, with caller and status.
 
-The lines go to the logger ``wingfit.audit``. Whatever a caller can choose (path, name of an owner) is written with its
-control characters escaped, so that no request can forge a line.
+The lines go to the logger ``wingfit.audit``. Control characters in what a caller can choose (path, name of an owner)
+are escaped, so that no request can forge a line.
 """
 
 from __future__ import annotations
@@ -10,31 +10,31 @@ import logging
 
 from starlette.types import Scope
 
-from wingfit.service.auth.access import CALLER_OF, Caller
+from wingfit.service.auth.access import CALLER_IN_SCOPE, Caller
 from wingfit.service.auth.authentication import API
 from wingfit.service.http.request_limits import CHANGING
 
 LOG = logging.getLogger("wingfit.audit")
-LONGEST = 1000  # characters of a path
-NOBODY = "-"
+LONGEST_PATH = 1000  # characters
+UNKNOWN = "-"
 
 
-def record(scope: Scope, status: int, request: str) -> None:
-    """Log an answered ``request`` (its id) if its method can change something, also one that was refused.
+def record(scope: Scope, status: int, request_id: str) -> None:
+    """Log an answered or refused request if its method can change something.
 
-    Key and owner are ``-`` where no key is asked for, and where none that is good came.
+    Key and owner are ``-`` where no key is required, and where the request had no valid one.
     """
     if scope["method"] not in CHANGING or not scope["path"].startswith(API):
         return
-    caller: Caller | None = scope.get(CALLER_OF)
+    caller: Caller | None = scope.get(CALLER_IN_SCOPE)
     fields = {
         "method": scope["method"],
-        "template": getattr(scope.get("route"), "path", "") or NOBODY,
+        "template": getattr(scope.get("route"), "path", "") or UNKNOWN,
         "status": status,
-        "key": caller.key if caller else NOBODY,
-        "owner": caller.owner if caller else NOBODY,
-        "path": scope["path"][:LONGEST],
-        "request": request,
+        "key": caller.key if caller else UNKNOWN,
+        "owner": caller.owner if caller else UNKNOWN,
+        "path": scope["path"][:LONGEST_PATH],
+        "request": request_id,
     }
     line = "%(method)s %(template)s %(status)d key=%(key)s owner=%(owner)a path=%(path)a request=%(request)s"
     LOG.info(line, fields, extra=fields)

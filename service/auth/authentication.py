@@ -1,8 +1,4 @@
-"""Asks for an API key before anything of the API is answered.
-
-Plain ASGI like :mod:`wingfit.service.http.request_limits`. Who calls is kept for the length of the request
-(:data:`wingfit.service.auth.access.CALLER`).
-"""
+"""Requires an API key for every path below ``/v1/``, and sets :data:`wingfit.service.auth.access.CALLER`."""
 
 from __future__ import annotations
 
@@ -11,19 +7,20 @@ from http.cookies import CookieError, SimpleCookie
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from wingfit.service.auth.access import CALLER_OF, Caller, KeyRing, calling
+from wingfit.service.auth.access import CALLER, CALLER_IN_SCOPE, Caller, KeyRing
 from wingfit.service.auth.access import Scope as KeyScope
 from wingfit.service.http.problems import ProblemError, response
 
 COOKIE = "wingfit_key"
 API = "/v1/"
 ADMINISTRATION = ("/v1/keys", "/v1/backup")
-OPEN = frozenset({"/v1/health", "/v1/ready", "/v1/session"})  # says little, and lets a browser in
+# Open without a key: liveness, readiness, and the login of the web page.
+OPEN = frozenset({"/v1/health", "/v1/ready", "/v1/session"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
-class Gate:
-    """Refuses calls of the API without a good key for them; the page itself holds no data and is open."""
+class Authentication:
+    """Middleware that refuses API calls without a valid key of the needed scope; the web page holds no data."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -34,14 +31,17 @@ class Gate:
             await self.app(scope, receive, send)
             return
         caller = _caller(Headers(scope=scope), scope["app"].state.service.keys)
-        scope[CALLER_OF] = caller
+        scope[CALLER_IN_SCOPE] = caller
         refusal = _refusal(scope, caller)
         if refusal:
             challenge = {"WWW-Authenticate": "Bearer"} if refusal.status == 401 else {}
             await response(refusal, challenge)(scope, receive, send)
             return
-        with calling(caller):
+        token = CALLER.set(caller)
+        try:
             await self.app(scope, receive, send)
+        finally:
+            CALLER.reset(token)
 
 
 def _caller(headers: Headers, keys: KeyRing) -> Caller | None:
@@ -56,24 +56,26 @@ def _caller(headers: Headers, keys: KeyRing) -> Caller | None:
 
 
 def _refusal(scope: Scope, caller: Caller | None) -> ProblemError | None:
-    path, needed = scope["path"], needed_for(scope["method"], scope["path"])
+    path, needed = scope["path"], needed_scope(scope["method"], scope["path"])
     if not path.startswith(API) or path in OPEN:
         return None
     if caller is None:
         return ProblemError(
             401,
             "key",
-            "this server asks for an API key, and none came, or one that is not good; send 'Authorization: Bearer KEY' "
-            "or set WINGFIT_API_KEY. Whoever runs the server makes one: wingfit keys create NAME",
+            "this server requires an API key, and the request has no key or an invalid one; send 'Authorization: "
+            "Bearer KEY' or set WINGFIT_API_KEY. The operator of the server makes keys with: wingfit keys create NAME",
         )
     if not caller.may(needed):
-        good = ", ".join(sorted(caller.scopes))
-        return ProblemError(403, "scope", f"key {caller.key} is good for {good}, not {needed}; use another key")
+        scopes = ", ".join(sorted(caller.scopes))
+        return ProblemError(
+            403, "scope", f"key {caller.key} has the scope {scopes}; this call needs {needed}; use another key"
+        )
     return None
 
 
-def needed_for(method: str, path: str) -> KeyScope:
-    """What a key must be good for."""
+def needed_scope(method: str, path: str) -> KeyScope:
+    """The scope that a key needs for a call."""
     if any(path == root or path.startswith(f"{root}/") for root in ADMINISTRATION):
         return "admin"
     return "read" if method in READING else "write"

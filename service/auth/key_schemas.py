@@ -1,4 +1,4 @@
-"""Keys and the session of a browser, as they go over the wire."""
+"""Request and response bodies of keys and of the session of a browser."""
 
 from __future__ import annotations
 
@@ -20,20 +20,22 @@ _KEY: dict[str, Any] = {
     "created_at": "2026-11-05T09:30:00.000000Z",
     "revoked_at": None,
 }
-_SECRET = "wingfit_" + "x" * 43  # the form of one
+_SECRET = "wingfit_" + "x" * 43  # an example of the form
 
 
 class KeyIn(BaseModel):
-    """What to make a key for."""
+    """A key to be made."""
 
     model_config = ConfigDict(
         extra="forbid",
         json_schema_extra={"examples": [{key: _KEY[key] for key in ("name", "owner", "scopes")}]},
     )
 
-    name: Label = Field(description="what it is for")
-    owner: Label | None = Field(None, description="to whom belongs what is made with it; the name if left out")
-    scopes: Scopes = Field(["read", "write"], description="admin includes both, sees everyone's, and manages keys")
+    name: Label = Field(description="what the key is for")
+    owner: Label | None = Field(None, description="owner of what is made with the key; default: the name of the key")
+    scopes: Scopes = Field(
+        ["read", "write"], description="admin includes both, sees the data of all owners, and manages keys"
+    )
 
 
 class KeyOut(BaseModel):
@@ -50,12 +52,12 @@ class KeyOut(BaseModel):
 
     @classmethod
     def of(cls, row: KeyRow) -> KeyOut:
-        """A row on the wire."""
+        """The key of a row."""
         return cls.model_validate({name: getattr(row, name) for name in cls.model_fields})
 
 
 class NewKeyOut(KeyOut):
-    """A key that was made now, with its secret, which is told this once."""
+    """A new key with its secret, which is shown only this once."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [_KEY | {"secret": _SECRET}]})
 
@@ -69,7 +71,7 @@ class KeysOut(BaseModel):
 
 
 class SessionIn(BaseModel):
-    """A key that a browser is to use from now on."""
+    """The key that a browser will use from now on."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"key": _SECRET}]})
 
@@ -77,7 +79,7 @@ class SessionIn(BaseModel):
 
 
 class SessionOut(BaseModel):
-    """Who is calling."""
+    """The caller."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -99,7 +101,7 @@ class SessionOut(BaseModel):
 
     @classmethod
     def of(cls, caller: Caller | None, *, required: bool) -> SessionOut:
-        """Of a caller."""
+        """The session of ``caller``; ``required``: whether the server requires keys."""
         if caller is None:
             return cls(keys_required=required, key_id=None, owner=None, scopes=[])
         return cls(keys_required=required, key_id=caller.key, owner=caller.owner, scopes=sorted(caller.scopes))

@@ -1,1 +1,1 @@
-"""What stands between a request and a route: limits, errors, problem details, answers in pieces, events."""
+"""HTTP below the routes: limits, middleware, errors as problem details, shared response helpers, event streams."""

@@ -1,4 +1,4 @@
-"""Rows as CSV: RFC 4180, numbers with all their digits, and no text that a spreadsheet would compute."""
+"""CSV (RFC 4180) with numbers in full precision and no text that a spreadsheet would run as a formula."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 
 MEDIA_TYPE = "text/csv"
 Cell = str | float | bool | None
-# What makes a cell a formula, or hides what does; the wide forms count where they are typed (OWASP, CSV injection).
+# A cell that begins with one of these may be taken as a formula (OWASP, CSV injection), also with full-width signs.
 FORMULA = tuple("=+-@\t\r\n\0＝＋－＠")
 
 
 def lines(rows: Iterable[Sequence[Cell]]) -> str:
-    """Rows of cells; None is an empty one, a text that looks like a formula begins with an apostrophe."""
+    """CSV text of rows of cells. None gives an empty cell; a text that looks like a formula gets an apostrophe."""
     buffer = io.StringIO()
     csv.writer(buffer).writerows([_plain(cell) for cell in row] for row in rows)
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Errors that nothing else answers, and requests that are given up because the server stops."""
+"""Answers errors that no handler answers, and requests that are given up because the server stops."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ from wingfit.service.http.request_limits import SECURITY_HEADERS
 LOG = logging.getLogger("wingfit.http")
 
 
-class Unforeseen:
-    """Answers them without a word about them, with the headers of any answer.
+class ErrorBoundary:
+    """Middleware; an answer says nothing about the error, and has the headers of every other answer.
 
-    The framework's own way is to answer outside all other layers, which would leave out their headers, and to let the
-    error go on, which ends the connection. This stands outside the guards, whose mistakes it answers as well.
+    Starlette would answer outside all other middleware, without their headers, and end the connection.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -32,30 +31,30 @@ class Unforeseen:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        begun, since = False, time.monotonic()
+        started, since = False, time.monotonic()
 
-        async def noted(message: Message) -> None:
-            nonlocal begun
-            begun = begun or message["type"] == "http.response.start"
+        async def watched(message: Message) -> None:
+            nonlocal started
+            started = started or message["type"] == "http.response.start"
             await send(message)
 
-        under_way = scope["app"].state.service.under_way
-        under_way[id(scope)] = scope["method"], scope["path"], since
+        open_requests = scope["app"].state.service.open_requests
+        open_requests[id(scope)] = scope["method"], scope["path"], since
         try:
-            await self.app(scope, receive, noted)
-        except asyncio.CancelledError:  # by the stop of the server alone
+            await self.app(scope, receive, watched)
+        except asyncio.CancelledError:  # only when the server stops
             LOG.warning("given up: %s %s, since %.1f s", scope["method"], scope["path"], time.monotonic() - since)
-            if not begun:
-                await _guarded(problems.response(_STOPPING))(scope, receive, send)
+            if not started:
+                await _secured(problems.response(_STOPPING))(scope, receive, send)
         except Exception as error:
-            if begun:
+            if started:
                 raise
-            await _guarded(problems.of_a_mistake(Request(scope), error))(scope, receive, send)
+            await _secured(problems.internal(Request(scope), error))(scope, receive, send)
         finally:
-            del under_way[id(scope)]
+            del open_requests[id(scope)]
 
 
-def _guarded(answer: Response) -> Response:
+def _secured(answer: Response) -> Response:
     answer.headers.update(SECURITY_HEADERS)
     return answer
 
@@ -63,6 +62,6 @@ def _guarded(answer: Response) -> Response:
 _STOPPING = ProblemError(
     503,
     "stopping",
-    "the service stops before the request was answered, and may have done it or not; repeat it in some seconds, with "
-    "the same Idempotency-Key where it had one",
+    "the service stopped before it answered, and may or may not have carried out the request; repeat the request in "
+    "some seconds, with the same Idempotency-Key if it had one",
 )

@@ -1,4 +1,4 @@
-"""Server-sent events of a job, read from the database, so that a reconnect and a first look are one thing."""
+"""Server-sent events of a job, read from the database, so that a first connection and a reconnection are alike."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from wingfit.service.storage.database import Database, DatabaseClosedError
 from wingfit.workers.jobs import State
 
 HEARTBEAT_SECONDS = 15.0
-CHUNK = 500
-MOST_STREAMS = 500
+STEPS_PER_READ = 500
+MAX_STREAMS = 500
 MEDIA_TYPE = "text/event-stream"
 LastEventId = Annotated[
-    str | None, Header(alias="Last-Event-ID", description="id of the last event that the caller has")
+    str | None, Header(alias="Last-Event-ID", description="id of the last event that the client has received")
 ]
 
 
 @dataclass(frozen=True)
-class Told:
-    """The present state of a job, and its steps after a sequence, ascending."""
+class JobState:
+    """The present state of a job, and its steps after a sequence number, ascending."""
 
     job: RunOut | DiagnosisOut
     steps: Sequence[GenerationEvent | StepEvent]
@@ -42,51 +42,49 @@ class Told:
 
 @dataclass(frozen=True)
 class Watched:
-    """A job to watch: what its steps are called, and ``look(session, after, limit)``, which reads it."""
+    """A job to watch: its id, the event name of its steps, and ``read(session, after, limit)``, which reads it."""
 
     id: str
     step: str
-    look: Callable[[Session, int, int], Told]
+    read: Callable[[Session, int, int], JobState]
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a look found, as it goes out.
+class News:
+    """What one read found, as events.
 
     Attributes:
-        steps: their events.
-        after: sequence of the last of them.
-        complete: whether no step was left out.
-        standing: what tells one state from another.
-        state: its event.
-        final: whether it is the last.
+        steps: the events of new steps.
+        after: sequence number of the last of them.
+        complete: whether there are no further steps.
+        status: differs between two states that need an event each.
+        state: the event of the state.
+        final: whether the state is the last one.
     """
 
     steps: bytes
     after: int
     complete: bool
-    standing: tuple[object, ...]
+    status: tuple[object, ...]
     state: bytes
     final: bool
 
 
 class Events:
-    """The event streams of one service. Who waits for the same event shares the look at it."""
+    """The event streams of one service. All who wait for the same event share one database read."""
 
     def __init__(self, database: Database, changes: Changes, keys: KeyRing) -> None:
         self._database, self._changes, self._keys = database, changes, keys
-        self._looks: dict[tuple[str, int, int], asyncio.Future[Seen | None]] = {}
+        self._reads: dict[tuple[str, int, int], asyncio.Future[News | None]] = {}
 
     def answer(self, watched: Watched, last_event_id: str | None) -> StreamingResponse:
-        """The events after ``last_event_id``; a 422 for one that no stream has sent, a 503 where too many are open."""
+        """The events after ``last_event_id``; a 422 for an id that no stream has sent, a 503 for too many streams."""
         text = (last_event_id or "0").strip()
         if not (text.isascii() and text.isdecimal() and len(text) <= 15):
             item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
             raise invalid("the Last-Event-ID is not one of this stream", [item])
-        if (opened := self._changes.watchers) >= MOST_STREAMS:
-            raise ProblemError(
-                503, "busy", f"{opened} event streams are open, the most that may; try again in some seconds"
-            )
+        if (streams := self._changes.watchers) >= MAX_STREAMS:
+            raise ProblemError(503, "busy", f"{streams} event streams are open, the maximum; try again in some seconds")
         headers = {"Cache-Control": "no-store", "X-Accel-Buffering": "no"}
         stream = self._stream(watched, int(text), CALLER.get())
         return StreamingResponse(stream, headers=headers, media_type=MEDIA_TYPE)
@@ -97,70 +95,70 @@ class Events:
         with self._changes.watch(watched.id) as changed:
             while True:
                 changed.clear()
-                seen = await self._seen(watched, after)
-                if seen is None or not self._keys.admits(caller):
+                news = await self._read(watched, after)
+                if news is None or not self._keys.admits(caller):
                     return
-                after, news = seen.after, seen.steps
-                if seen.complete and sent != seen.standing:
-                    sent, news = seen.standing, news + seen.state
-                if news:
-                    yield news
-                if not seen.complete:
+                after, events = news.after, news.steps
+                if news.complete and sent != news.status:
+                    sent, events = news.status, events + news.state
+                if events:
+                    yield events
+                if not news.complete:
                     continue
-                if seen.final or self._changes.closed:
+                if news.final or self._changes.closed:
                     return
                 try:
                     await asyncio.wait_for(changed.wait(), HEARTBEAT_SECONDS)
                 except TimeoutError:
                     yield b": alive\n\n"
 
-    async def _seen(self, watched: Watched, after: int) -> Seen | None:
-        """What follows ``after``; None where there is no such job any more.
+    async def _read(self, watched: Watched, after: int) -> News | None:
+        """The news after sequence ``after``; None if the job was deleted.
 
-        Every watcher was let in before, so each may see what the first one that looks sees. Of the same version of the
-        database all see the same.
+        Each watcher's access was checked before its stream began, so all may share the result. Every read of the same
+        database version finds the same.
         """
         key = watched.id, after, self._database.version
-        look = self._looks.get(key)
-        if look is None:
-            self._looks[key] = look = asyncio.ensure_future(run_in_threadpool(_look, self._database, watched, after))
-            # Shared while it is under way, not kept: nobody reads the same again, and a failure must not stay.
-            look.add_done_callback(lambda _: self._looks.pop(key, None))
-        return await asyncio.shield(look)
+        read = self._reads.get(key)
+        if read is None:
+            self._reads[key] = read = asyncio.ensure_future(run_in_threadpool(_read, self._database, watched, after))
+            # Shared only while it runs: nobody reads the same again, and an error must not stay.
+            read.add_done_callback(lambda _: self._reads.pop(key, None))
+        return await asyncio.shield(read)
 
 
 def of_run(run_id: str) -> Watched:
-    """Of a run: its generations."""
+    """A run to watch, whose steps are its generations."""
 
-    def look(session: Session, after: int, limit: int) -> Told:
+    def read(session: Session, after: int, limit: int) -> JobState:
         generations = store.history(session, run_id, after, limit)
-        return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
+        return JobState(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
 
-    return Watched(run_id, "generation", look)
+    return Watched(run_id, "generation", read)
 
 
 def described(step: str, example: str) -> dict[str, Any]:
-    """A stream in the published description; the schema is that of one event."""
+    """OpenAPI of a stream: the schema of one event, and an example."""
     data = {"type": "string", "contentMediaType": "application/json"}
     properties = {"id": {"type": "string"}, "event": {"enum": [step, "state"]}, "data": data}
     schema = {"type": "object", "properties": properties, "required": list(properties)}
     return {"content": {MEDIA_TYPE: {"schema": schema, "example": example}}}
 
 
-def _look(database: Database, watched: Watched, after: int) -> Seen | None:
+def _read(database: Database, watched: Watched, after: int) -> News | None:
     try:
         with database.read() as session:
-            told = watched.look(session, after, CHUNK)
+            found = watched.read(session, after, STEPS_PER_READ)
     except (ProblemError, DatabaseClosedError):
         return None
-    job, steps = told.job, told.steps
+    job, steps = found.job, found.steps
     last = steps[-1].sequence if steps else after
-    return Seen(
+    return News(
         steps=b"".join(_event(watched.step, step, step.sequence) for step in steps),
         after=last,
-        complete=len(steps) < CHUNK,
-        standing=(job.state, job.wish, job.error),
-        # The id of a state is that of the last step sent before it: a reconnect then misses nothing.
+        complete=len(steps) < STEPS_PER_READ,
+        status=(job.state, job.wish, job.error),
+        # A state has the id of the last step sent before it, so that a client that reconnects misses nothing.
         state=_event("state", job, last),
         final=State(job.state).final,
     )

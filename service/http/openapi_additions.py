@@ -1,4 +1,4 @@
-"""The published description (OpenAPI), beyond what the framework writes: problems, and where an answer leads."""
+"""Additions to the OpenAPI document that FastAPI generates: problems, links, 304 responses."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from fastapi import FastAPI
 from wingfit.service.runs.schemas import ProblemOut
 
 Json = dict[str, Any]
-# What makes a thing, the parameter of paths by which it is named, and how bodies name it.
-MADE = (
+# Path and status of each call that creates something, and the name of its id in other paths and bodies.
+CREATING = (
     ("/v1/datasets", "201", "dataset_id"),
     ("/v1/runs", "202", "run_id"),
     ("/v1/diagnoses", "202", "diagnosis_id"),
@@ -20,21 +20,21 @@ ID = "$response.body#/id"
 FORM = "multipart/form-data"
 
 
-def describe(app: FastAPI) -> None:
-    """Let ``app`` publish more than the framework does."""
+def extend_openapi(app: FastAPI) -> None:
+    """Make ``app`` publish the additions."""
     generate = app.openapi
 
     def openapi() -> Json:
-        known = app.openapi_schema is not None
+        cached = app.openapi_schema is not None
         specification = generate()
-        if not known:
+        if not cached:
             _problems(specification)
             _links(specification)
-            _nothing_is_null(specification)
-            _unchanged(specification)
+            _remove_null(specification)
+            _not_modified(specification)
         return specification
 
-    app.openapi = openapi  # type: ignore[method-assign]  # the way that FastAPI documents
+    app.openapi = openapi  # type: ignore[method-assign]  # as FastAPI documents it
 
 
 def _problems(specification: Json) -> None:
@@ -45,8 +45,8 @@ def _problems(specification: Json) -> None:
 
 
 def _links(specification: Json) -> None:
-    """From every answer that makes something to the calls that take its id."""
-    for path, status, name in MADE:
+    """Links from every answer that creates something to the calls that take its id."""
+    for path, status, name in CREATING:
         links = specification["paths"][path]["post"]["responses"][status].setdefault("links", {})
         for other, methods in specification["paths"].items():
             for method, operation in methods.items():
@@ -58,27 +58,27 @@ def _links(specification: Json) -> None:
 
 
 def _fields(specification: Json, operation: Json, media_type: str = "application/json") -> Json:
-    """Fields of the body that an operation takes."""
+    """The fields of the request body of an operation."""
     content = operation.get("requestBody", {}).get("content", {}).get(media_type, {})
     name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
     fields: Json = specification["components"]["schemas"].get(name, {}).get("properties", {})
     return fields
 
 
-def _nothing_is_null(specification: Json) -> None:
-    """A parameter or field of a form that is not given is left out: unlike JSON, a text cannot say null."""
+def _remove_null(specification: Json) -> None:
+    """Remove null from parameters and form fields: unlike JSON they cannot be null, only omitted."""
     for methods in specification["paths"].values():
         for operation in methods.values():
             given = [parameter["schema"] for parameter in operation.get("parameters", ())]
             for schema in [*given, *_fields(specification, operation, FORM).values()]:
-                kept = [one for one in schema.get("anyOf", ()) if one != {"type": "null"}]
-                if len(kept) == 1:
-                    schema.update(kept[0])
+                others = [one for one in schema.get("anyOf", ()) if one != {"type": "null"}]
+                if len(others) == 1:
+                    schema.update(others[0])
                     del schema["anyOf"]
 
 
-def _unchanged(specification: Json) -> None:
-    """Who may say what he has may be told that it is still so."""
+def _not_modified(specification: Json) -> None:
+    """Add the 304 response to every operation that takes an ``If-None-Match``."""
     for methods in specification["paths"].values():
         for operation in methods.values():
             if any(parameter["name"] == "If-None-Match" for parameter in operation.get("parameters", ())):

@@ -1,4 +1,4 @@
-"""Errors as RFC 9457 problem details: what is wrong, where, and what to do."""
+"""Errors as problem details (RFC 9457): what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from wingfit.service.storage.database import DatabaseClosedError, is_full
 MEDIA_TYPE = "application/problem+json"
 LONGEST_VALUE = 200
 KINDS = {413: "too-large", 422: "invalid"}
-# Seconds after which to come again, by the kind of a problem that passes by itself.
+# Seconds after which to repeat the request, by the kind of problems that end by themselves.
 RETRY_AFTER = {"busy": 5, "not-ready": 5, "stopping": 5, "disk-full": 30}
 LOG = logging.getLogger("wingfit.http")
 
@@ -30,41 +30,35 @@ ErrorItem = dict[str, Any]
 
 
 class ProblemError(Exception):
-    """An answer that is not what was asked for. ``kind`` names it in the ``type`` URI."""
+    """An error to be sent as a problem; ``kind`` is the last part of its ``type`` URI, ``extra`` further members."""
 
     def __init__(self, status: int, kind: str, detail: str, *, errors: Sequence[ErrorItem] = (), **extra: Any) -> None:
         super().__init__(detail)
-        self.status, self.kind, self.detail, self.errors, self.extra = (
-            status,
-            kind,
-            detail,
-            list(errors),
-            extra,
-        )
+        self.status, self.kind, self.detail, self.errors, self.extra = status, kind, detail, list(errors), extra
 
 
 def not_found(what: str, name: str, remedy: str = "") -> ProblemError:
-    """There is no ``what`` called ``name``."""
+    """A 404: there is no ``what`` called ``name``."""
     return ProblemError(404, "not-found", f"there is no {what} {shown(name)!r}{'; ' if remedy else ''}{remedy}")
 
 
 def conflict(detail: str, **extra: Any) -> ProblemError:
-    """The state of the thing does not allow the request."""
+    """A 409: the present state of the resource does not allow the request."""
     return ProblemError(409, "conflict", detail, **extra)
 
 
 def invalid(detail: str, errors: Sequence[ErrorItem]) -> ProblemError:
-    """The request cannot be meant; ``errors`` say where."""
+    """A 422: the request is not valid; ``errors`` say where."""
     return ProblemError(422, "invalid", detail, errors=errors)
 
 
 def error_item(where: str, value: object, message: str) -> ErrorItem:
-    """One entry of ``errors``."""
+    """An item of ``errors``: the place in the request, the value there, and what is wrong with it."""
     return {"where": where, "value": shown(value), "message": message}
 
 
 def shown(value: object) -> object:
-    """``value`` as an error may repeat it: short, and JSON whatever came in."""
+    """``value`` as an error may repeat it: short, and valid JSON for any value."""
     if value is None or isinstance(value, bool) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, int) and abs(value) < 2**63:
@@ -74,7 +68,7 @@ def shown(value: object) -> object:
 
 
 def response(problem: ProblemError, headers: Mapping[str, str] | None = None) -> Response:
-    """``problem`` on the wire."""
+    """The response that sends ``problem``."""
     body: dict[str, Any] = {
         "type": f"urn:wingfit:problem:{problem.kind}",
         "title": HTTPStatus(problem.status).phrase,
@@ -84,13 +78,13 @@ def response(problem: ProblemError, headers: Mapping[str, str] | None = None) ->
     }
     if problem.errors:
         body["errors"] = problem.errors
-    later = {"Retry-After": str(RETRY_AFTER[problem.kind])} if problem.kind in RETRY_AFTER else {}
-    # ASCII, because a lone surrogate that came in must be able to go out again.
-    return Response(json.dumps(body), problem.status, {**later, **(headers or {})}, MEDIA_TYPE)
+    retry = {"Retry-After": str(RETRY_AFTER[problem.kind])} if problem.kind in RETRY_AFTER else {}
+    # json.dumps writes ASCII, so that a lone surrogate in the request can be repeated.
+    return Response(json.dumps(body), problem.status, {**retry, **(headers or {})}, MEDIA_TYPE)
 
 
 def install(app: FastAPI) -> None:
-    """Make every error of ``app`` a problem."""
+    """Make ``app`` answer every error with a problem."""
     app.add_exception_handler(ProblemError, _on_problem)
     app.add_exception_handler(HTTPException, _on_http)
     app.add_exception_handler(RequestValidationError, _on_validation)
@@ -123,8 +117,8 @@ async def _on_closed(_: Request, error: Exception) -> Response:
 
 async def _on_operational(request: Request, error: Exception) -> Response:
     if not is_full(error):
-        return of_a_mistake(request, error)
-    detail = "the disk of the server is full or fails; nothing was stored. Make room, and repeat the request"
+        return internal(request, error)
+    detail = "the disk of the server is full or fails; nothing was stored. Free some space, and repeat the request"
     return _without_room(request, error, detail)
 
 
@@ -133,8 +127,8 @@ def _without_room(request: Request, error: BaseException | None, detail: str) ->
     return response(ProblemError(507, "disk-full", detail))
 
 
-def of_a_mistake(request: Request, error: Exception) -> Response:
-    """The answer to an error that nothing else answers: a full disk, or a mistake of ours, which the log describes."""
+def internal(request: Request, error: Exception) -> Response:
+    """The response to an unexpected error: 507 for a full disk, else 500; the log has the details."""
     if detail := disk_space.anywhere(error):
         return _without_room(request, error, detail)
     LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)

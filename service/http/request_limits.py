@@ -1,11 +1,10 @@
-"""What stands before every request: who may ask, how much may be sent, which headers go out.
+"""Checks host, origin and size of every request; adds the security headers and sends large bodies in chunks.
 
-Plain ASGI, because wrapping a stream in a request-response middleware would buffer the event stream.
+All middleware of the service is plain ASGI, because a request-response middleware would buffer the event streams.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
@@ -17,10 +16,11 @@ from wingfit.service.http.problems import ProblemError, response
 
 UPLOAD_PATH = "/v1/datasets"
 UPLOAD_LIMIT = 64 * 2**20
-# Boundaries and headers of the multipart form around a file of the largest size.
-FORM_SLACK = 64 * 2**10
+# Boundaries and headers of the multipart form around the file.
+FORM_OVERHEAD = 64 * 2**10
 BODY_LIMIT = 2**20
-# Load balancers and Kubernetes probe by address; no answer has anything that was uploaded or computed.
+CHUNK = 256 * 2**10
+# Load balancers and Kubernetes probe these by IP address; they return nothing that was uploaded or computed.
 PROBES = frozenset({"/v1/health", "/v1/ready", "/v1/metrics"})
 CHANGING = frozenset({"POST", "PUT", "PATCH", "DELETE"})
 
@@ -39,8 +39,8 @@ SECURITY_HEADERS = {
 RAW_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURITY_HEADERS.items()]
 
 
-class Guard:
-    """Checks host, origin and size, and adds the security headers."""
+class RequestLimits:
+    """Middleware; ``allowed_hosts`` are the host names that a request may carry."""
 
     def __init__(self, app: ASGIApp, allowed_hosts: tuple[str, ...]) -> None:
         self.app, self.allowed_hosts = app, frozenset(allowed_hosts)
@@ -50,28 +50,29 @@ class Guard:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        guarded = _with_headers(send)
         refusal = self._refusal(scope)
         if refusal:
-            await response(refusal)(scope, receive, guarded)
+            await response(refusal)(scope, receive, _response_sender(send))
             return
-        if scope["method"] == "HEAD" and not scope["path"].endswith("/events"):  # which would never end
-            scope, guarded = {**scope, "method": "GET"}, _without_body(guarded)
-        await self.app(scope, _limited(receive, _limit(scope)), guarded)
+        # HEAD is answered as GET without its body; an event stream would never end.
+        headers_only = scope["method"] == "HEAD" and not scope["path"].endswith("/events")
+        if headers_only:
+            scope = {**scope, "method": "GET"}
+        await self.app(scope, _limited(receive, _limit(scope)), _response_sender(send, headers_only=headers_only))
 
     def _refusal(self, scope: Scope) -> ProblemError | None:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if _name(host) not in self.allowed_hosts and not _is_probe(scope):
+        if _host_name(host) not in self.allowed_hosts and not _is_probe(scope):
             return ProblemError(
                 400,
                 "host",
-                f"this server does not answer for the host name {host[:200]!r}; use localhost, or name the "
-                "host in WINGFIT_ALLOWED_HOSTS",
+                f"this server does not answer for the host name {host[:200]!r}; use localhost, or add the host to "
+                "WINGFIT_ALLOWED_HOSTS",
             )
         if _is_foreign(headers, host):
             if scope["method"] in CHANGING:
-                return ProblemError(403, "origin", "a page of another origin may not change anything here")
+                return ProblemError(403, "origin", "a page of another origin may not change anything on this server")
             if scope["path"].startswith(API):
                 return ProblemError(
                     403, "origin", f"a page of another site may not read or link to {API}; open the page of this server"
@@ -86,67 +87,66 @@ def _is_probe(scope: Scope) -> bool:
     return scope["path"] in PROBES and scope["method"] in ("GET", "HEAD")
 
 
-def _name(host: str) -> str:
+def _host_name(host: str) -> str:
     try:
         return (urlsplit(f"//{host}").hostname or "").lower()
     except ValueError:
         return ""
 
 
-def _place(origin: str) -> str | None:
-    try:
-        return urlsplit(origin).netloc.lower()
-    except ValueError:
-        return None
-
-
 def _is_foreign(headers: Headers, host: str) -> bool:
     origin = headers.get("origin")
-    if origin is not None:
-        return not _name(host) or _place(origin) != host.lower()
-    return headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
+    if origin is None:
+        return headers.get("sec-fetch-site", "none") not in ("none", "same-origin")
+    try:
+        return not _host_name(host) or urlsplit(origin).netloc.lower() != host.lower()
+    except ValueError:
+        return True
 
 
 def _limit(scope: Scope) -> int:
-    return UPLOAD_LIMIT + FORM_SLACK if scope["path"] == UPLOAD_PATH else BODY_LIMIT
+    return UPLOAD_LIMIT + FORM_OVERHEAD if scope["path"] == UPLOAD_PATH else BODY_LIMIT
 
 
 def _too_large(limit: int) -> ProblemError:
-    return ProblemError(413, "too-large", f"the request body is larger than {limit / 2**20:.0f} MiB")
+    return ProblemError(413, "too-large", f"the request body is larger than {limit / 2**20:.0f} MiB; send less")
 
 
 def _limited(receive: Receive, limit: int) -> Receive:
-    taken = 0
+    """Count what is received, because a chunked body has no Content-Length; a 413 beyond ``limit`` bytes."""
+    received = 0
 
     async def counted() -> Message:
-        nonlocal taken
+        nonlocal received
         message = await receive()
         if message["type"] == "http.request":
-            taken += len(message.get("body", b""))
-            if taken > limit:
+            received += len(message.get("body", b""))
+            if received > limit:
                 raise HTTPException(413, _too_large(limit).detail)
         return message
 
     return counted
 
 
-def _without_body(send: Callable[[Message], Awaitable[None]]) -> Callable[[Message], Awaitable[None]]:
-    """Answer a HEAD as a GET is answered, headers and all, without what they describe."""
+def _response_sender(send: Send, *, headers_only: bool = False) -> Send:
+    """Add the security headers, and send a large body in chunks, each after the client has taken the one before.
 
-    async def headed(message: Message) -> None:
-        if message["type"] == "http.response.body":
-            message = {**message, "body": b""}
-        await send(message)
+    A body sent whole would wait in the buffer of its connection while the request counts as answered: the limits on
+    concurrent requests would then not limit the bodies in memory.
+    """
 
-    return headed
-
-
-def _with_headers(send: Send) -> Callable[[Message], Awaitable[None]]:
-    async def headed(message: Message) -> None:
+    async def sender(message: Message) -> None:
         if message["type"] == "http.response.start":
             given = list(message["headers"])
             names = {name for name, _ in given}
             message["headers"] = given + [header for header in RAW_HEADERS if header[0] not in names]
-        await send(message)
+        body = b"" if headers_only else message.get("body", b"")
+        if message["type"] != "http.response.body" or len(body) <= CHUNK:
+            await send({**message, "body": body} if headers_only and "body" in message else message)
+            return
+        view = memoryview(body)
+        for start in range(0, len(body), CHUNK):
+            more = start + CHUNK < len(body) or message.get("more_body", False)
+            await send({"type": message["type"], "body": view[start : start + CHUNK], "more_body": more})
 
-    return headed
+    return sender

@@ -1,4 +1,4 @@
-"""Small pieces that the routes share: documented errors, repeated requests, answers sent once."""
+"""Helpers that the routes share: documented errors, idempotent requests, ETags."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ from wingfit.service.storage.database import Database
 
 PAGE, LARGEST_PAGE = 50, 200
 HISTORY_PAGE, LARGEST_HISTORY_PAGE = 1000, 10_000
-LARGEST_INTEGER = 2**53 - 1  # that every reader of JSON takes
+LARGEST_INTEGER = 2**53 - 1  # the largest that every JSON parser reads exactly
 
-Limit = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="items on a page")]
-Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the last page")]
+Limit = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="number of items on a page")]
+Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the page before")]
 RepeatKey = Annotated[
     str | None,
     Header(
         alias="Idempotency-Key",
         min_length=1,
         max_length=200,
-        description="names this request: the same key and body give the same answer again",
+        description="names this request: the same key and body have no further effect and give the same answer",
     ),
 ]
 IfNoneMatch = Annotated[str | None, Header(alias="If-None-Match", description="the ETag that the caller has")]
 
 Responses = dict[int | str, dict[str, Any]]
 JSON = "application/json"
-LOCATION = {"Location": {"description": "where it is", "schema": {"type": "string"}}}
+LOCATION = {"Location": {"description": "path of the new resource", "schema": {"type": "string"}}}
 
 
 def errors(*statuses: int) -> Responses:
-    """Documents the problems that a route may answer with; `default` stands for those of every route."""
+    """OpenAPI of the problems that a route may answer with; `default` documents those of every route."""
     content = {problems.MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     documented: Responses = {
         status: {"description": HTTPStatus(status).phrase, "content": content} for status in (422, *statuses)
     }
     documented["default"] = {
         "description": (
-            "host (400), key (401), scope or origin (403), size (413), internal (500), busy or ending (503), "
+            "host (400), key (401), scope or origin (403), size (413), internal (500), busy or stopping (503), "
             "disk full (507)"
         ),
         "headers": {"Retry-After": {"description": "of a 503: seconds", "schema": {"type": "integer"}}},
@@ -59,7 +59,7 @@ def errors(*statuses: int) -> Responses:
 
 
 async def refuse_unknown_query(request: Request) -> None:
-    """A 422 for a query parameter that the route does not have: a misspelt one would be ignored in silence."""
+    """A 422 for an unknown query parameter, because a misspelt one would be ignored silently."""
     path = getattr(request.scope.get("route"), "path", "")
     if not request.query_params:
         return
@@ -68,16 +68,16 @@ async def refuse_unknown_query(request: Request) -> None:
         return
     known = {one["name"] for one in operation.get("parameters", ()) if one["in"] == "query"}
     faults = [
-        error_item(f"query.{name[:200]}", value, f"unknown; known are {', '.join(sorted(known)) or 'none'}")
+        error_item(f"query.{name[:200]}", value, f"unknown parameter; known: {', '.join(sorted(known)) or 'none'}")
         for name, value in request.query_params.multi_items()
         if name not in known
     ]
     if faults:
-        raise invalid("the request has query parameters that do not exist here", faults)
+        raise invalid("the request has unknown query parameters", faults)
 
 
 def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | None:
-    """What makes a request the same as an earlier one with the same key."""
+    """What identifies a repeated request: path, owner, idempotency key, and hash of the ``parts`` of its body."""
     if key is None:
         return None
     caller = CALLER.get()
@@ -88,7 +88,10 @@ def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | Non
 def created(
     database: Database, again: store.Repeat | None, create: Callable[[Session], store.Answer]
 ) -> tuple[store.Answer, bool]:
-    """Create once: the answer, and whether it is new. Creation and answer are one transaction."""
+    """Call ``create`` unless the request is a repetition, in one transaction with storing its answer.
+
+    Return the answer, and whether it is new.
+    """
     with database.write() as session:
         earlier = store.earlier_answer(session, again)
         if earlier:
@@ -99,39 +102,29 @@ def created(
 
 
 def sent(answer: store.Answer) -> Response:
-    """``answer`` on the wire."""
+    """The response that sends ``answer``."""
     return JSONResponse(answer.body, answer.status, {"Location": answer.location})
 
 
 def tagged(model: BaseModel, known: str | None) -> Response:
-    """``model`` with an ETag, or 304 when the caller has it."""
+    """``model`` as JSON with an ETag, or a 304 if the caller has it (``known``: its ``If-None-Match``)."""
     return marked(model.model_dump_json().encode(), JSON, known)
 
 
-def json_of(body: bytes) -> Response:
-    """``body``, which is JSON already."""
-    return Response(body, media_type=JSON)
-
-
 def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:
-    """``body`` with an ETag and further ``headers``, or 304 when the caller has it."""
-    mark = mark_of(body)
-    if matches(known, mark["ETag"]):
-        return Response(status_code=304, headers={"ETag": mark["ETag"]})
-    return Response(body, media_type=media_type, headers={**mark, **(headers or {})})
-
-
-def mark_of(body: bytes) -> dict[str, str]:
-    """The headers by which who has ``body`` asks whether it is outdated."""
-    return {"ETag": f'"{hashlib.sha256(body).hexdigest()[:32]}"', "Cache-Control": "no-cache"}
+    """``body`` with an ETag and further ``headers``, or a 304 if the caller has it."""
+    tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+    if matches(known, tag):
+        return Response(status_code=304, headers={"ETag": tag})
+    return Response(body, media_type=media_type, headers={"ETag": tag, "Cache-Control": "no-cache", **(headers or {})})
 
 
 def attachment(filename: str) -> dict[str, str]:
-    """The header by which a browser saves an answer under ``filename``."""
+    """The header that makes a browser save an answer as ``filename``."""
     return {"Content-Disposition": f'attachment; filename="{filename}"'}
 
 
 def matches(known: str | None, tag: str) -> bool:
-    """Whether an ``If-None-Match`` names ``tag``."""
+    """Whether the ``If-None-Match`` header ``known`` contains ``tag``."""
     given = [part.strip().removeprefix("W/") for part in (known or "").split(",")]
     return tag in given or "*" in given

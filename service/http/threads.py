@@ -1,4 +1,4 @@
-"""Daemon threads for one call each: unlike those of a pool they are never used up, and no exit waits for them."""
+"""Daemon threads for one call each. Unlike a thread pool they cannot be exhausted, and the exit waits for none."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Result = TypeVar("Result")
 
 
 def call(name: str, function: Callable[[], Result]) -> Future[Result]:
-    """Call ``function`` in a thread of its own called ``name``; the result, when there is one."""
+    """Call ``function`` in a new thread called ``name``; return the future of its result."""
     future: Future[Result] = Future()
-    future.set_running_or_notify_cancel()  # who no longer waits does not stop it
+    future.set_running_or_notify_cancel()  # so that cancelling the future does not lose the result
 
     def run() -> None:
         try:
@@ -33,7 +33,7 @@ def call(name: str, function: Callable[[], Result]) -> Future[Result]:
 
 
 def done_within(seconds: float, name: str, function: Callable[[], bool]) -> bool:
-    """Whether ``function`` returns True within ``seconds``; it goes on in its thread if it takes longer."""
+    """Whether ``function`` returns True within ``seconds``; a longer call continues in its thread."""
     try:
         return call(name, function).result(seconds)
     except TimeoutError:
@@ -43,20 +43,20 @@ def done_within(seconds: float, name: str, function: Callable[[], bool]) -> bool
         return False
 
 
-class Shared(Generic[Result]):
-    """A function in a thread of its own, called once for all who wait for it at a time; never twice at a time."""
+class SharedCall(Generic[Result]):
+    """A function called in a thread; all who wait at the same time share one call."""
 
     def __init__(self, name: str, function: Callable[[], Result]) -> None:
         self._name, self._function = name, function
-        self._under_way: Future[Result] | None = None
-        self._began = 0.0
+        self._future: Future[Result] | None = None
+        self._start = 0.0
 
     async def result(self, seconds: float) -> Result:
-        """What the function returns; TimeoutError once the call under way lasts longer than ``seconds``.
+        """The result of the function; TimeoutError once its call lasts longer than ``seconds``.
 
-        To be awaited in one event loop.
+        To be awaited in one event loop only.
         """
-        if self._under_way is None or self._under_way.done():
-            self._began, self._under_way = time.monotonic(), call(self._name, self._function)
-        left = max(0.0, self._began + seconds - time.monotonic())
-        return await asyncio.wait_for(asyncio.wrap_future(self._under_way), left)
+        if self._future is None or self._future.done():
+            self._start, self._future = time.monotonic(), call(self._name, self._function)
+        left = max(0.0, self._start + seconds - time.monotonic())
+        return await asyncio.wait_for(asyncio.wrap_future(self._future), left)

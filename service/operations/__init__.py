@@ -1,1 +1,1 @@
-"""What operators need: health, metrics and log, shutdown, forwarding."""
+"""What operators need: health, metrics, log, shutdown and the TCP forwarder."""

@@ -1,7 +1,7 @@
-"""Passes TCP connections on to the server: ``python -m wingfit.service.operations.forward api:8321``.
+"""Forwards TCP connections to the server: ``python -m wingfit.service.operations.forward api:8321``.
 
-In the containers this process alone is on the network that is published. Ray listens on every interface, so the
-container of the API, which holds a Ray node, may only be on the network of the cluster.
+In the containers only this process is on the published network. Ray listens on every interface, so the container of
+the API, which holds a Ray node, must be on the internal network of the cluster only.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ import asyncio
 import sys
 from contextlib import suppress
 
-PIECE_BYTES = 64 * 1024
+CHUNK_BYTES = 64 * 1024
 CONNECT_SECONDS = 10.0
 
 
-def main(words: list[str] | None = None) -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Listen on every address of this machine and forward until the process is ended."""
     parser = argparse.ArgumentParser(prog="python -m wingfit.service.operations.forward", description=__doc__)
-    parser.add_argument("target", help="where connections go, as host:port")
+    parser.add_argument("target", help="address to forward to, as host:port")
     parser.add_argument("--host", default="0.0.0.0", help="address to listen on (default: all)")  # noqa: S104  its purpose
     parser.add_argument("--port", type=int, default=8321, help="TCP port to listen on (default: 8321)")
-    options = parser.parse_args(words)
+    options = parser.parse_args(arguments)
     host, _, port = options.target.rpartition(":")
     if not host or not port.isdigit():
         parser.error(f"the target is {options.target!r}; write host:port, for example api:8321")
@@ -34,7 +34,7 @@ async def forward(host: str, port: int, target_host: str, target_port: int) -> N
 
     async def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
-            await _join(reader, writer, target_host, target_port)
+            await _connect_both(reader, writer, target_host, target_port)
         except OSError as error:
             print(f"cannot reach {target_host}:{target_port}: {error}", file=sys.stderr, flush=True)
         finally:
@@ -45,12 +45,12 @@ async def forward(host: str, port: int, target_host: str, target_port: int) -> N
         await listening.serve_forever()
 
 
-async def _join(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host: str, port: int) -> None:
+async def _connect_both(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host: str, port: int) -> None:
     """Connect to the target and copy both ways until both sides have finished. OSError if it cannot be reached."""
     target_reader, target_writer = await asyncio.wait_for(asyncio.open_connection(host, port), CONNECT_SECONDS)
     try:
         ways = (_copy(reader, target_writer), _copy(target_reader, writer))
-        # A side that breaks off says nothing about the other: both are closed by the callers.
+        # If one side breaks the connection, the caller closes both.
         with suppress(ConnectionError):
             await asyncio.gather(*ways)
     finally:
@@ -58,9 +58,9 @@ async def _join(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host
 
 
 async def _copy(source: asyncio.StreamReader, target: asyncio.StreamWriter) -> None:
-    """Copy until ``source`` ends, then tell ``target`` that no more will come; answers may still come back."""
-    while piece := await source.read(PIECE_BYTES):
-        target.write(piece)
+    """Copy until ``source`` ends, then close that direction of ``target``; the other direction may go on."""
+    while chunk := await source.read(CHUNK_BYTES):
+        target.write(chunk)
         await target.drain()
     target.write_eof()
 

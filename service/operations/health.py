@@ -1,4 +1,4 @@
-"""How the service is: answered without a thread of the pool or a lock, which anything slow may hold."""
+"""The health of the service, answered without a pool thread or a lock, which a slow request may hold."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.version import wingfit_version
 
-# For which a caller waits for the database: what looks after services mostly gives up after a few seconds.
-LOOK_SECONDS = 1.0
+# Time that a caller waits for the database; most service managers stop waiting after a few seconds.
+READ_SECONDS = 1.0
 
 _COUNT = "SELECT state, count(*) FROM {} GROUP BY state"
 
@@ -25,28 +25,28 @@ Jobs = dict[str, dict[str, int]]
 
 
 class Health:
-    """Counts jobs in a thread of its own; who asks meanwhile shares the count."""
+    """Counts jobs in a thread of its own; concurrent callers share the count."""
 
     def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[Work]) -> None:
         self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
-        self._counting = threads.Shared("health", self._count)
+        self._counting = threads.SharedCall("health", self._count)
         self.jobs: Jobs | None = None
-        """Of all owners, by kind and state; None where the database did not answer in time."""
+        """Number of jobs of all owners by kind and state; None if the database did not answer in time."""
 
     async def look(self) -> str | None:
-        """Count anew; why there is no count, None where there is one."""
+        """Count the jobs again. Return None, or why there is no count."""
         try:
-            self.jobs = await self._counting.result(LOOK_SECONDS)
+            self.jobs = await self._counting.result(READ_SECONDS)
         except TimeoutError:
             self.jobs = None
-            return f"the database does not answer within {LOOK_SECONDS:g} s"
+            return f"the database does not answer within {READ_SECONDS:g} s"
         except sqlite3.Error as error:
             self.jobs = None
             return f"the database cannot be read: {error}"
         return None
 
     async def now(self) -> HealthOut:
-        """Standing of the service, of all owners, whoever asks."""
+        """The health of the service; counts are over all owners, for every caller."""
         silent = await self.look()
         run, diagnosis = (None if self.jobs is None else _active(self.jobs[work.what]) for work in self._kinds)
         return HealthOut(

@@ -1,9 +1,9 @@
-"""A stop that always ends: what is not done in time is given up, and the log says what.
+"""A stop in bounded time: what does not end in time is given up, and the log names it.
 
-Three things end the process, each for when the one before it hangs. The steps of the graceful stop
-(:meth:`wingfit.service.container.Service.stop`) take bounded time. A thread that waits for the first signal
-(:class:`Deadline`) exits the process. Another process (:mod:`wingfit.service.operations.watchdog`) kills this one when
-no thread can run Python.
+Three mechanisms end the process, each in case the one before hangs: the graceful stop
+(:meth:`wingfit.service.container.Service.stop`), whose steps have time limits; a thread (:class:`Deadline`) that exits
+the process; and another process (:mod:`wingfit.service.operations.watchdog`) that kills this one when no thread can run
+Python.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from wingfit.service.operations import watchdog
 
 LOG = logging.getLogger("wingfit")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-REPORT_SECONDS = 2.0  # for which the log may take a report of what is given up
-LEAVE_SECONDS = 1.0  # for which threads that were let go may take to end
+REPORT_SECONDS = 2.0  # time to log what is given up
+JOIN_SECONDS = 1.0  # time for threads to end after the stop
 FRAMES = 3
 DEADLINE = "stop-deadline"
 
 
 @dataclass(frozen=True)
 class StopLimits:
-    """Seconds from the first signal, or from the end of the step before.
+    """Time limits of the stop, in seconds; the first four apply one after the other.
 
     Attributes:
-        requests: that requests under way have to be answered.
-        jobs: that jobs have to store the step under way.
-        evaluator: that the evaluator has to stop its workers.
-        database: that a write under way has to end.
-        give_up: from the signal, after which the process exits whatever goes on: more than the steps take together.
-        kill: from the signal, after which it is killed: less than service managers and containers wait, mostly 30 s.
+        requests: for open requests to be answered.
+        jobs: for jobs to store their present step.
+        evaluator: for the evaluator to stop its workers.
+        database: for a write to end.
+        give_up: from the signal until the process exits regardless; more than the four above together.
+        kill: from the signal until the process is killed; less than service managers and containers wait (mostly 30 s).
     """
 
     requests: int = 2
@@ -57,16 +57,16 @@ class StopLimits:
 
 
 class Deadline:
-    """Exits ``seconds`` after the first signal; ``unfinished`` says what is under way then."""
+    """Exits the process ``seconds`` after the first signal; ``unfinished`` describes what is running then."""
 
     def __init__(self, unfinished: Callable[[], Iterable[str]], seconds: float) -> None:
         self._unfinished, self._seconds = unfinished, seconds
-        # Its put may interrupt itself, as a second signal does; that of other ways to wake a thread may not.
+        # SimpleQueue.put is reentrant, so that a second signal may interrupt it; other ways to wake a thread are not.
         self._signals: queue.SimpleQueue[None] = queue.SimpleQueue()
         threading.Thread(target=self._wait, name=DEADLINE, daemon=True).start()
 
     def begin(self) -> None:
-        """A signal has arrived. Safe in a signal handler."""
+        """Start the time at a signal. Safe in a signal handler."""
         self._signals.put(None)
 
     def _wait(self) -> None:
@@ -76,7 +76,7 @@ class Deadline:
         leave()
 
     def _report(self) -> bool:
-        LOG.warning("the stop takes longer than %g s; given up is what goes on:", self._seconds)
+        LOG.warning("the stop takes longer than %g s; the following is given up:", self._seconds)
         for line in self._unfinished():
             LOG.warning("given up: %s", line)
         log_threads()
@@ -84,14 +84,14 @@ class Deadline:
 
 
 def leave() -> NoReturn:
-    """Exit at once, as after a clean stop: nothing that was acknowledged is lost, and no thread is waited for."""
+    """Exit with status 0 without waiting for any thread; nothing that was acknowledged is lost."""
     threads.done_within(REPORT_SECONDS, "stop-log", _flush)
     os._exit(0)
 
 
 def held_up() -> bool:
-    """Whether threads are left that an exit would wait for."""
-    deadline = time.monotonic() + LEAVE_SECONDS
+    """Whether threads are still running that a normal exit would wait for."""
+    deadline = time.monotonic() + JOIN_SECONDS
     own = threading.current_thread()
     waited_for = [one for one in threading.enumerate() if one is not own and not one.daemon]
     for thread in waited_for:
@@ -100,7 +100,7 @@ def held_up() -> bool:
 
 
 def log_threads() -> None:
-    """Log every other thread that is alive, with the line where it is."""
+    """Log every other living thread with the lines that it is executing."""
     for line in _threads():
         LOG.warning("given up: %s", line)
 
@@ -110,11 +110,11 @@ def _threads() -> Iterator[str]:
     for thread in threading.enumerate():
         frame = frames.get(thread.ident or 0)
         if frame is not None and thread.ident != own and thread.name != DEADLINE:
-            yield f"thread {thread.name!r} at {' < '.join(_places(frame))}"
+            yield f"thread {thread.name!r} at {' < '.join(_stack_lines(frame))}"
 
 
-def _places(frame: FrameType | None) -> Iterator[str]:
-    """The innermost first."""
+def _stack_lines(frame: FrameType | None) -> Iterator[str]:
+    """The innermost ``FRAMES`` lines of a stack, innermost first."""
     for _ in range(FRAMES):
         if frame is None:
             return
@@ -129,14 +129,14 @@ def _flush() -> bool:
 
 
 class Watchdog:
-    """The process that kills this one ``seconds`` after a signal, even if no thread of it can run Python.
+    """Starts the process that kills this one ``seconds`` after a signal, even if no thread can run Python.
 
-    It learns of the signal not by Python's own handler, which needs the interpreter, but by that of faulthandler, which
-    writes into the pipe between both the instant the signal arrives. Without the process the server works as well.
+    Python's signal handlers need the interpreter; faulthandler's handler does not, and writes into the pipe to that
+    process as soon as the signal arrives. If the process cannot be started, the server works without it.
     """
 
     def __init__(self, seconds: float) -> None:
-        reading, self._alarm = os.pipe()  # neither end is inherited: the end of the server must be the end of the pipe
+        reading, self._alarm = os.pipe()  # not inherited, so that the end of the server ends the pipe
         os.set_blocking(self._alarm, False)
         command = [sys.executable, "-I", "-S", str(Path(watchdog.__file__)), str(os.getpid()), f"{seconds:g}"]
         try:
@@ -144,15 +144,15 @@ class Watchdog:
                 command, stdin=reading, stdout=subprocess.DEVNULL, start_new_session=True, cwd="/"
             )
         except OSError as error:
-            LOG.warning("nothing ends this process if it hangs while it stops: %s", error)
+            LOG.warning("the watchdog cannot start (%s); nothing kills this process if it hangs while it stops", error)
         finally:
             os.close(reading)
-        with suppress(OSError, ValueError, AttributeError):  # no standard error that is a file
+        with suppress(OSError, ValueError, AttributeError):  # standard error is not a file
             faulthandler.register(watchdog.STACKS, file=sys.stderr, all_threads=True)
 
     def listen(self) -> None:
-        """Listen for the signals, before the handlers that are there now; again when these have changed."""
+        """Install faulthandler's handlers before the present ones; to be repeated when those have changed."""
         for number in SIGNALS:
             faulthandler.unregister(number)
-            # Of the thread that takes it only: to walk through the others while they run is for the last resort.
+            # Only the stack of the thread that takes the signal: reading the others while they run is not safe.
             faulthandler.register(number, file=self._alarm, all_threads=False, chain=True)

@@ -1,9 +1,9 @@
-"""A process beside the server that kills it, if it does not end after a signal to stop.
+"""A process beside the server that kills it if it does not end after a signal to stop.
 
-The last resort, for when no thread of the server can run Python: one of them may hold the interpreter's lock for ever.
-It runs this file by its path, without the package, so that it starts in milliseconds and takes few megabytes. Its
-standard input is a pipe from the server. Whatever comes through it says that a signal has arrived; its end says that
-the server has ended, however that happened, and then this process ends as well.
+It is needed when no thread of the server can run Python, because one of them holds the interpreter lock for ever. The
+server starts this file by its path, without the package, so that it starts in milliseconds and takes few megabytes. Its
+standard input is a pipe from the server: any byte means that a signal has arrived; the end of the pipe means that the
+server has ended, and then this process ends as well.
 
     python -I -S watchdog.py PID SECONDS
 """
@@ -20,14 +20,14 @@ from contextlib import suppress
 # On this signal the server writes the stacks of all its threads to its standard error.
 STACKS = signal.SIGUSR1
 STACKS_SECONDS = 1.0
-PIECE = 65536
+CHUNK = 65536
 
 
 def main(server: int, seconds: float) -> None:
-    """Wait for the alarm, then ``seconds`` for the end of the process ``server``, then kill it."""
+    """Wait for a signal, then ``seconds`` for the process ``server`` (its id) to end, then kill it."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)  # sent to all processes of a service, or of a terminal, at once
-    if not os.read(0, PIECE) or ended(server, seconds):
+        signal.signal(number, signal.SIG_IGN)  # also sent to this process, by a service manager or a terminal
+    if not os.read(0, CHUNK) or ended(server, seconds):
         return
     say(f"wingfit: process {server} has not ended {seconds:g} s after the signal to stop, and is killed; its threads:")
     os.kill(server, STACKS)
@@ -36,17 +36,17 @@ def main(server: int, seconds: float) -> None:
 
 
 def ended(server: int, seconds: float) -> bool:
-    """Whether the server has ended, within ``seconds``."""
+    """Whether the server ends within ``seconds``."""
     deadline = time.monotonic() + seconds
     while (left := deadline - time.monotonic()) > 0:
-        if select.select([0], [], [], left)[0] and not os.read(0, PIECE):
+        if select.select([0], [], [], left)[0] and not os.read(0, CHUNK):
             return True
     return os.getppid() != server
 
 
 def say(line: str) -> None:
-    """Write to the server's log, if somebody still takes it."""
-    with suppress(OSError):  # what matters comes after it
+    """Write a line to the server's log."""
+    with suppress(OSError):  # nobody reads the log any more; killing is what matters
         os.write(2, f"{line}\n".encode())
 
 

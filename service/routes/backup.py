@@ -23,7 +23,7 @@ PIECE = 2**20
 
 async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
     """A copy of the database, one at a time, which goes with the request, however that ends."""
-    async with service.backups.turn():
+    async with service.backups.slot():
         if await request.is_disconnected():
             raise ProblemError(503, "busy", "nobody waits for this backup any more")
         opened = await run_in_threadpool(_opened, service)

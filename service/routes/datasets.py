@@ -15,7 +15,7 @@ from starlette.responses import Response, StreamingResponse
 from wingfit.records import Dataset
 from wingfit.records.files.confined import ReaderError
 from wingfit.service.auth.access import owner_of_new
-from wingfit.service.container import IN_TURN_OF_DOWNLOADS, IN_TURN_OF_UPLOADS, Service, ServiceDep
+from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
 from wingfit.service.datasets.parsed_datasets import Opened
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, error_item, invalid
@@ -39,7 +39,7 @@ ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
     response_model=DatasetOut,
     responses={201: {"headers": http.LOCATION}, **http.errors(400, 409, 413, 429)},
     summary="Upload a dataset",
-    dependencies=[IN_TURN_OF_UPLOADS],
+    dependencies=[UPLOAD_SLOT],
 )
 def upload(
     request: Request,
@@ -102,7 +102,7 @@ def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch 
         **http.errors(404),
     },
     summary="Fetch the archive",
-    dependencies=[IN_TURN_OF_DOWNLOADS],
+    dependencies=[DOWNLOAD_SLOT],
 )
 def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the bytes that were uploaded."""

@@ -9,11 +9,11 @@ from fastapi import APIRouter, Query, Request
 from sqlalchemy.orm import Session
 from starlette.responses import HTMLResponse, Response, StreamingResponse
 
-from wingfit.service.container import IN_TURN_OF_DOWNLOADS, Service, ServiceDep
+from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
 from wingfit.service.diagnoses import checks, specs, views
 from wingfit.service.diagnoses.schemas import DiagnosisIn, DiagnosisOut
 from wingfit.service.http import responses as http
-from wingfit.service.http.events import LastEventId, Told, Watched, described
+from wingfit.service.http.events import JobState, LastEventId, Watched, described
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.routes.runs import load
 from wingfit.service.runs import spec_views
@@ -127,7 +127,7 @@ def cancel(service: ServiceDep, diagnosis_id: str) -> DiagnosisOut:
     response_model=dict[str, Any],
     responses=http.errors(404, 409),
     summary="Finding",
-    dependencies=[IN_TURN_OF_DOWNLOADS],
+    dependencies=[DOWNLOAD_SLOT],
 )
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return what a diagnosis found; see /v1/schemas/finding."""
@@ -140,7 +140,7 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
     response_class=HTMLResponse,
     responses=http.errors(404, 409),
     summary="Report",
-    dependencies=[IN_TURN_OF_DOWNLOADS],
+    dependencies=[DOWNLOAD_SLOT],
 )
 def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the report: one HTML file that needs nothing else."""
@@ -159,12 +159,12 @@ def events(service: ServiceDep, diagnosis_id: str, last_event_id: LastEventId = 
     with service.database.read() as session:
         store.diagnosis(session, diagnosis_id)
 
-    def look(session: Session, after: int, limit: int) -> Told:
+    def read(session: Session, after: int, limit: int) -> JobState:
         steps = store.past_steps(session, diagnosis_id, after, limit)
         job = views.diagnosis(store.diagnosis(session, diagnosis_id))
-        return Told(job, [views.step(one) for one in steps])
+        return JobState(job, [views.step(one) for one in steps])
 
-    return service.events.answer(Watched(diagnosis_id, "step", look), last_event_id)
+    return service.events.answer(Watched(diagnosis_id, "step", read), last_event_id)
 
 
 def _run(service: Service, run_id: str | None) -> RunRow | None:

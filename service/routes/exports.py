@@ -11,7 +11,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.service.container import IN_TURN_OF_DOWNLOADS, PlaceDep, Service, ServiceDep
+from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, ServiceDep
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
@@ -54,19 +54,19 @@ def _described(example: str) -> dict[str, Any]:
 async def export_run(
     request: Request,
     service: ServiceDep,
-    place: PlaceDep,
+    held: HeldSlots,
     run_id: str,
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
     """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
     if format != "netcdf":
-        await place.take(service.downloads)
+        await held.enter_async_context(service.downloads.slot())
         return await run_in_threadpool(_run, service, run_id, format)
     exported = await run_in_threadpool(run_exports.of, service, run_id)
     genome = await run_in_threadpool(best_genome.standing, service, exported.row)
-    async with service.exports.turn():
+    async with service.exports.slot():
         body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
-        await place.take(service.answers)
+        await held.enter_async_context(service.answers.slot())
     return Response(body, media_type=netcdf_variables.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
 
 
@@ -96,7 +96,7 @@ def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A0
     response_model=DiagnosisExportOut,
     responses={200: _described(_RANKING), **http.errors(404, 409)},
     summary="Export a diagnosis",
-    dependencies=[IN_TURN_OF_DOWNLOADS],
+    dependencies=[DOWNLOAD_SLOT],
 )
 def export_diagnosis(
     service: ServiceDep,

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response
 
-from wingfit.service.container import IN_TURN, ServiceDep
+from wingfit.service.container import SIMULATION_SLOT, ServiceDep
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import conflict
 from wingfit.service.outcomes import coefficient_source, force_views
@@ -29,7 +29,7 @@ def models() -> ModelsOut:
     response_model=ForcesOut,
     responses=http.errors(404, 409),
     summary="Forces over the beat",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def forces(
     service: ServiceDep,
@@ -60,7 +60,7 @@ def forces(
     response_model=PredictionOut,
     responses=http.errors(404, 409),
     summary="Predict forces under any condition",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
     """Return the forces over a beat that the run's global model predicts; nothing is stored."""

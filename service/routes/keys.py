@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request
 from starlette.responses import JSONResponse, Response
 
 from wingfit.service.auth import keys
-from wingfit.service.auth.access import CALLER, CALLER_OF
+from wingfit.service.auth.access import CALLER, CALLER_IN_SCOPE
 from wingfit.service.auth.authentication import COOKIE
 from wingfit.service.auth.key_schemas import KeyIn, KeyOut, KeysOut, NewKeyOut, SessionIn, SessionOut
 from wingfit.service.container import ServiceDep
@@ -54,7 +54,7 @@ def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
     caller = service.keys.caller(body.key)
     if caller is None:
         raise ProblemError(401, "key", "this is not a key of this server, or one that was revoked")
-    request.scope[CALLER_OF] = caller
+    request.scope[CALLER_IN_SCOPE] = caller
     answer = JSONResponse(SessionOut.of(caller, required=service.settings.keys).model_dump())
     secure = request.url.scheme == "https"
     answer.set_cookie(COOKIE, body.key, COOKIE_SECONDS, httponly=True, samesite="strict", secure=secure)

@@ -10,7 +10,8 @@ from starlette.responses import JSONResponse, Response, StreamingResponse
 
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset, Recording
-from wingfit.service.container import IN_TURN, IN_TURN_OF_DOWNLOADS, Service, ServiceDep
+from wingfit.service.container import DOWNLOAD_SLOT, SIMULATION_SLOT, Service, ServiceDep
+from wingfit.service.http import json_reads
 from wingfit.service.http import responses as http
 from wingfit.service.http.events import LastEventId, described, of_run
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
@@ -54,16 +55,17 @@ data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
     response_model=Page[HistoryItem],
     responses=http.errors(404),
     summary="Fetch the history",
-    dependencies=[IN_TURN_OF_DOWNLOADS],
+    dependencies=[DOWNLOAD_SLOT],
 )
-def history(
+async def history(
     service: ServiceDep,
     run_id: str,
     after: Annotated[int, Query(ge=0, le=http.LARGEST_INTEGER, description="last sequence that the caller has")] = 0,
     limit: Annotated[int, Query(ge=1, le=http.LARGEST_HISTORY_PAGE)] = http.HISTORY_PAGE,
 ) -> Response:
     """Return finished generations, ascending; ``next_cursor`` is the next ``after``."""
-    return http.json_of(service.reading.history(run_id, after, limit))
+    short = limit <= http.HISTORY_PAGE
+    return await json_reads.answer(short, json_reads.history, service.database, run_id, after, limit)
 
 
 @router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
@@ -86,7 +88,7 @@ def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
     response_model=ComparisonOut,
     responses=http.errors(404, 409),
     summary="Tracks",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def comparison(
     service: ServiceDep,
@@ -108,7 +110,7 @@ def comparison(
     response_model=LoadsOut,
     responses=http.errors(404, 409),
     summary="Loads",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def loads(
     service: ServiceDep,
@@ -131,9 +133,9 @@ def loads(
     responses={200: described("generation", _EVENTS), **http.errors(404)},
     summary="Watch a run",
 )
-def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
+async def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
     """Send generations and states as they happen; ends after the final state."""
-    run_row(service, run_id)
+    json_reads.run(service.database, run_id)  # or a 404
     return service.events.answer(of_run(run_id), last_event_id)
 
 
@@ -142,7 +144,7 @@ def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) 
     response_model=SimulationOut | ForceSimulationOut,
     responses=http.errors(409),
     summary="Simulate one recording's condition",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
@@ -165,7 +167,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     response_model=LoadsOut,
     responses=http.errors(409),
     summary="Simulate any condition's loads",
-    dependencies=[IN_TURN],
+    dependencies=[SIMULATION_SLOT],
 )
 def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     """Simulate a genome of the caller's for its loads, under any condition; nothing is stored."""

@@ -1,4 +1,4 @@
-"""Settings of a server: every spelling counts as what it says, or the server refuses to start."""
+"""Settings of a server: every value is read as it is written, or the server refuses to start."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_every_variable_of_the_project_is_known() -> None:
             assert "no setting of wingfit" not in str(error), name  # noqa: PT017  other refusals are fine
 
 
-def test_what_kubernetes_sets_for_a_service_is_no_mistake() -> None:
+def test_variables_that_kubernetes_sets_are_accepted() -> None:
     links = {
         "WINGFIT_SERVICE_HOST": "10.0.0.1",
         "WINGFIT_SERVICE_PORT": "8321",
@@ -127,7 +127,7 @@ def test_numbers_are_written_in_ascii_digits(text: str) -> None:
     ["http://wings.lab", "wings.lab:80", "*.lab", "*", "[::1]", "wings lab", "a/b", "-", "\uff41.lab"],
     ids=ascii,
 )
-def test_host_names_that_no_request_can_match_are_refused(text: str) -> None:
+def test_impossible_host_names_are_refused(text: str) -> None:
     with pytest.raises(SettingsError, match="which no request can match"):
         Settings.from_env({"WINGFIT_ALLOWED_HOSTS": f"wings.lab,{text}"})
 
@@ -139,7 +139,7 @@ def test_host_names_and_addresses_are_allowed() -> None:
     assert names[3:] == ("wings.lab", "10.0.0.7", "fe80::1", "my_rig", "xn--flgel-kva.de")
 
 
-def test_an_address_that_is_not_of_this_machine_is_the_fault_of_the_host(tmp_path: Path) -> None:
+def test_a_wrong_address_blames_the_host_setting(tmp_path: Path) -> None:
     for host in ("192.0.2.1", "no-such-host.invalid"):
         with pytest.raises(ServeError, match=f"cannot listen on {host}.*set WINGFIT_HOST to an address"):
             serve(Settings(data=tmp_path, host=host))

@@ -1,4 +1,4 @@
-"""A log line for every attempt to change something, which no caller can forge."""
+"""The audit log has a line for every attempt to change something, which no caller can forge."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def fields(record: logging.LogRecord) -> Line:
     return tuple(getattr(record, name) for name in FIELDS)
 
 
-def test_every_change_says_who_what_and_the_result(as_: As, audited: Audited) -> None:
+def test_every_change_is_logged_with_caller_and_status(as_: As, audited: Audited) -> None:
     ann, admin = as_("ann"), as_("admin")
     key, root = (api.get("/v1/session")["key_id"] for api in (ann, admin))
     dataset = ann.upload()["id"]
@@ -81,7 +81,7 @@ def test_every_change_says_who_what_and_the_result(as_: As, audited: Audited) ->
     assert all(record.levelno == logging.INFO for record in records)
 
 
-def test_what_is_refused_or_fails_counts_as_well(
+def test_refused_and_failed_changes_are_logged(
     as_: As, client: httpx.Client, audited: Audited, secrets: dict[str, str]
 ) -> None:
     reads = as_("ann-reads")
@@ -107,7 +107,7 @@ def test_what_is_refused_or_fails_counts_as_well(
     ]
 
 
-def test_a_mistake_of_the_server_counts_as_well(tmp_path: Path, audited: Audited) -> None:
+def test_internal_errors_are_logged_in_the_audit_log(tmp_path: Path, audited: Audited) -> None:
     with toy_service(tmp_path) as (service, api):
         service.engine.load = None  # type: ignore[method-assign, assignment]
         assert api.client.post("/v1/datasets", files={"file": ("a.zip", toy.archive())}).status_code == 500
@@ -168,7 +168,7 @@ def _is_whole(line: str, form: str) -> bool:
     return parsed["logger"] == "wingfit.audit" and parsed["key"].startswith("key_") and parsed["status"] in (404, 405)
 
 
-def test_a_mistake_of_the_server_forges_no_line_either(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_no_internal_error_forges_a_line(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     def fails(*_: object) -> None:
         raise ArithmeticError("a mistake")
 

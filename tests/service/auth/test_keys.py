@@ -1,4 +1,4 @@
-"""API keys: who is let in, for what, and whose data they see."""
+"""API keys: which calls they permit, and whose data they show."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def bearer(secret: str) -> dict[str, str]:
         {"Cookie": "=;=; ,"},
     ],
 )
-def test_without_a_good_key_nothing_is_told(client: httpx.Client, headers: dict[str, str]) -> None:
+def test_without_a_valid_key_every_call_is_refused(client: httpx.Client, headers: dict[str, str]) -> None:
     for method, path in (
         ("GET", "runs"),
         ("POST", "runs"),
@@ -55,20 +55,20 @@ def test_without_a_good_key_nothing_is_told(client: httpx.Client, headers: dict[
         assert answer.headers["X-Content-Type-Options"] == "nosniff"
 
 
-def test_a_key_is_good_only_as_it_was_written(client: httpx.Client, secrets: dict[str, str]) -> None:
+def test_a_changed_key_is_invalid(client: httpx.Client, secrets: dict[str, str]) -> None:
     secret = secrets["ann"]
     assert client.get("/v1/runs", headers=bearer(secret)).status_code == 200
     for other in (secret.lower(), secret.upper(), secret.swapcase(), secret[:-1], secret + "A"):
         assert client.get("/v1/runs", headers=bearer(other)).status_code == 401, other
 
 
-def test_the_page_health_and_who_is_calling_are_open(client: httpx.Client) -> None:
+def test_page_health_and_session_need_no_key(client: httpx.Client) -> None:
     for path in ("/", "/app.js", "/v1/health", "/docs", "/openapi.json"):
         assert client.get(path).status_code == 200, path
     assert client.get("/v1/session").json() == {"keys_required": True, "key_id": None, "owner": None, "scopes": []}
 
 
-def test_every_path_of_the_api_asks_for_a_key(client: httpx.Client) -> None:
+def test_every_path_of_the_api_requires_a_key(client: httpx.Client) -> None:
     """By the published description, so that a path that is added later is asked for as well."""
     asked = 0
     for path, methods in client.get("/openapi.json").json()["paths"].items():
@@ -79,7 +79,7 @@ def test_every_path_of_the_api_asks_for_a_key(client: httpx.Client) -> None:
     assert asked > 30
 
 
-def test_metrics_need_a_key_by_whatever_name_they_are_asked_for(client: httpx.Client, secrets: dict[str, str]) -> None:
+def test_metrics_need_a_key_under_every_host_name(client: httpx.Client, secrets: dict[str, str]) -> None:
     by_address = {"Host": "10.0.0.7"}
     assert client.get("/v1/metrics", headers=by_address).status_code == 401
     assert client.get("/v1/metrics", headers=by_address | bearer(secrets["ann-reads"])).status_code == 200
@@ -87,19 +87,19 @@ def test_metrics_need_a_key_by_whatever_name_they_are_asked_for(client: httpx.Cl
     assert client.get("/v1/health", headers=by_address).status_code == 200
 
 
-def test_a_key_is_good_for_its_scopes_only(as_: As) -> None:
+def test_a_key_permits_only_its_scopes(as_: As) -> None:
     dataset = as_("ann").upload()["id"]
     reader, writer = as_("ann-reads").client, as_("ann").client
     assert reader.get(f"/v1/datasets/{dataset}").status_code == 200
     refused = reader.post("/v1/runs", json={"dataset_id": dataset})
     assert (refused.status_code, refused.json()["type"]) == (403, "urn:wingfit:problem:scope")
-    assert "read, not write" in refused.json()["detail"]
+    assert "has the scope read; this call needs write" in refused.json()["detail"]
     assert reader.delete(f"/v1/datasets/{dataset}").status_code == 403
     assert writer.get("/v1/keys").status_code == 403
     assert writer.post("/v1/keys", json={"name": "x", "scopes": ["admin"]}).status_code == 403
 
 
-def test_nobody_sees_what_belongs_to_others(as_: As) -> None:
+def test_nobody_sees_data_of_other_owners(as_: As) -> None:
     ann, bob, admin = as_("ann"), as_("bob"), as_("admin")
     dataset = ann.upload()["id"]
     run = ann.submit(dataset)["id"]
@@ -131,7 +131,7 @@ def test_nobody_sees_what_belongs_to_others(as_: As) -> None:
         assert bob.client.post(f"/v1/{path}", json=body).status_code == 422, path
 
 
-def test_how_busy_the_server_is_does_not_depend_on_who_asks(as_: As, gate: Gate) -> None:
+def test_health_counts_the_jobs_of_all_owners(as_: As, gate: Gate) -> None:
     ann, bob = as_("ann"), as_("bob")
     run = ann.submit(ann.upload()["id"])["id"]
     ann.until(run, lambda now: now["state"] == "RUNNING")
@@ -141,7 +141,7 @@ def test_how_busy_the_server_is_does_not_depend_on_who_asks(as_: As, gate: Gate)
     ann.finish(run)
 
 
-def test_a_job_belongs_to_whom_its_dataset_belongs_to(as_: As) -> None:
+def test_a_job_has_the_owner_of_its_dataset(as_: As) -> None:
     ann, admin = as_("ann"), as_("admin")
     dataset = ann.upload()["id"]
     run = admin.submit(dataset)["id"]
@@ -158,7 +158,7 @@ def test_repeated_requests_of_different_owners_are_different_ones(as_: As) -> No
     assert as_("ann").client.post("/v1/datasets", files=files, headers=headers).json()["id"] == ids[0]
 
 
-def test_no_owner_takes_more_than_his_share(as_: As, gate: Gate) -> None:
+def test_an_owner_has_limited_jobs(as_: As, gate: Gate) -> None:
     ann, bob = as_("ann"), as_("bob")
     of_ann = [ann.submit(ann.upload()["id"])["id"] for _ in range(3)]
     refused = ann.client.post("/v1/runs", json={"dataset_id": ann.get(f"/v1/runs/{of_ann[0]}")["dataset_id"]})
@@ -171,7 +171,7 @@ def test_no_owner_takes_more_than_his_share(as_: As, gate: Gate) -> None:
         assert ann.finish(run)["state"] == "SUCCEEDED"
 
 
-def test_keys_are_made_told_once_and_revoked_at_once(as_: As, client: httpx.Client, settings: Settings) -> None:
+def test_keys_are_made_shown_once_and_revoked_at_once(as_: As, client: httpx.Client, settings: Settings) -> None:
     admin = as_("admin").client
     new = admin.post("/v1/keys", json={"name": "bench", "owner": "ann"}).json()
     assert (new["owner"], new["scopes"], new["revoked_at"]) == ("ann", ["read", "write"], None)
@@ -189,7 +189,7 @@ def test_the_last_key_that_manages_keys_stays(as_: As) -> None:
     admin = as_("admin").client
     first = next(key for key in admin.get("/v1/keys").json()["items"] if "admin" in key["scopes"])
     refused = admin.delete(f"/v1/keys/{first['id']}")
-    assert (refused.status_code, "make another one" in refused.json()["detail"]) == (409, True)
+    assert (refused.status_code, "make another key" in refused.json()["detail"]) == (409, True)
     assert admin.post("/v1/keys", json={"name": "second", "scopes": ["admin"]}).status_code == 201
     assert admin.delete(f"/v1/keys/{first['id']}").status_code == 200
     assert admin.get("/v1/keys").status_code == 401
@@ -207,7 +207,7 @@ def test_the_last_key_that_manages_keys_stays(as_: As) -> None:
         {"name": "x", "secret": "mine"},
     ],
 )
-def test_a_key_that_cannot_be_is_refused(as_: As, body: Json) -> None:
+def test_an_invalid_new_key_is_refused(as_: As, body: Json) -> None:
     assert as_("admin").client.post("/v1/keys", json=body).status_code == 422
 
 
@@ -274,7 +274,7 @@ def test_the_first_key_is_made_before_the_server_starts(tmp_path: Path) -> None:
         assert client.get("/v1/keys", headers=bearer(secret.strip())).status_code == 200
 
 
-def test_when_keys_are_asked_for() -> None:
+def test_when_keys_are_required() -> None:
     def asked(**env: str) -> bool:
         return Settings.from_env({f"WINGFIT_{name}": value for name, value in env.items()}).keys
 
@@ -286,7 +286,7 @@ def test_when_keys_are_asked_for() -> None:
         asked(HOST="192.168.0.7", ALLOW_REMOTE="1", REQUIRE_KEYS="1")
 
 
-def test_without_keys_everything_is_everyones(tmp_path: Path) -> None:
+def test_without_keys_data_has_no_owner(tmp_path: Path) -> None:
     with serving(create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)) as client:
         api = Api(client)
         assert api.get("/v1/session") == {"keys_required": False, "key_id": None, "owner": None, "scopes": []}

@@ -1,4 +1,4 @@
-"""By the published description, so that a call that is added later is tested as well: to whom each call is closed."""
+"""Access of other owners to every call of the OpenAPI document, so that a call added later is tested as well."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _calls(specification: dict[str, Any]) -> Iterator[Call]:
             yield method.upper(), path, specification["components"]["schemas"][name]["examples"][0] if name else {}
 
 
-def test_every_call_on_a_thing_is_closed_to_other_owners(as_: As, calls: list[Call]) -> None:
+def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Call]) -> None:
     ann, bob = as_("ann"), as_("bob")
     dataset = ann.upload()["id"]
     run, diagnosis = ann.submit(dataset)["id"], ann.diagnose(dataset)["id"]
@@ -61,7 +61,7 @@ def test_every_call_on_a_thing_is_closed_to_other_owners(as_: As, calls: list[Ca
     assert ann.diagnosis(diagnosis)["state"] == ann.run(run)["state"] == "SUCCEEDED"
 
 
-def test_no_body_reaches_what_belongs_to_another_owner(as_: As, calls: list[Call]) -> None:
+def test_no_body_reaches_data_of_another_owner(as_: As, calls: list[Call]) -> None:
     ann, bob = as_("ann"), as_("bob")
     dataset = ann.upload()["id"]
     run = ann.submit(dataset)["id"]
@@ -116,7 +116,7 @@ def test_every_call_needs_its_scope(as_: As, calls: list[Call]) -> None:
         "/.//v1/keys",
     ],
 )
-def test_no_spelling_of_a_path_gets_past_the_gate(client: httpx.Client, path: str) -> None:
+def test_no_spelling_of_a_path_bypasses_authentication(client: httpx.Client, path: str) -> None:
     for method in ("GET", "POST", "HEAD", "PUT", "PROPFIND"):
         request = client.build_request(method, client.base_url)
         request.url = request.url.copy_with(raw_path=path.encode())
@@ -124,7 +124,7 @@ def test_no_spelling_of_a_path_gets_past_the_gate(client: httpx.Client, path: st
         assert answer.status_code in (401, 404, 405), (method, answer.status_code)
 
 
-def test_a_caller_cannot_say_whose_things_are(as_: As) -> None:
+def test_a_caller_cannot_set_an_owner(as_: As) -> None:
     ann = as_("ann")
     dataset = ann.upload()["id"]
     for path, body in (

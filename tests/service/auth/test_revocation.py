@@ -1,4 +1,4 @@
-"""Event streams end with the key with which they were opened; those of other keys go on and miss nothing."""
+"""Event streams end when their key is revoked; those of other keys go on and miss nothing."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def key_of(api: Api) -> str:
 
 
 @pytest.mark.parametrize("kind", ["runs", "diagnoses"])
-def test_the_streams_of_a_revoked_key_end_and_the_others_miss_nothing(as_: As, gate: Gate, kind: str) -> None:
+def test_streams_of_a_revoked_key_end_and_others_miss_nothing(as_: As, gate: Gate, kind: str) -> None:
     ann, reads, admin = as_("ann"), as_("ann-reads"), as_("admin")
     dataset = ann.upload()["id"]
     job = (ann.submit(dataset) if kind == "runs" else ann.diagnose(dataset))["id"]
@@ -99,7 +99,7 @@ def test_the_streams_of_a_revoked_key_end_and_the_others_miss_nothing(as_: As, g
     assert reads.client.get(path).status_code == 401
 
 
-def test_a_stream_whose_key_is_revoked_while_it_is_opened_tells_nothing(
+def test_a_stream_whose_key_is_revoked_while_it_opens_sends_nothing(
     app: FastAPI, as_: As, gate: Gate, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The gate has let the request in; the key is revoked before the stream watches."""

@@ -81,7 +81,7 @@ def test_a_broken_form_is_a_problem(api: Api) -> None:
 
 def test_what_is_too_large_is_a_413(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(request_limits, "UPLOAD_LIMIT", 1000)
-    monkeypatch.setattr(request_limits, "FORM_SLACK", 200)
+    monkeypatch.setattr(request_limits, "FORM_OVERHEAD", 200)
     big = toy.archive(pad="x" * 3000)
     answer = api.client.post("/v1/datasets", files={"file": ("a.zip", big)})
     assert (answer.status_code, answer.headers["Content-Type"]) == (413, "application/problem+json")

@@ -1,4 +1,4 @@
-"""Simulations take turns, and reading does not wait for them."""
+"""Few simulations and uploads at a time, and reads do not wait for them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from wingfit.calibration.result import Comparison
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset
 from wingfit.service.app import create_app
-from wingfit.service.http.concurrency_limit import AT_ONCE, UPLOADS_AT_ONCE, Turns
+from wingfit.service.http.concurrency_limit import SIMULATIONS, UPLOADS, ConcurrencyLimit
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.settings import Settings
 
@@ -50,7 +50,7 @@ def test_reading_goes_on_while_simulations_wait(tmp_path: Path) -> None:
 
         with ThreadPoolExecutor(crowd) as pool:
             asked = [pool.submit(simulate, k) for k in range(crowd)]
-            for _ in range(AT_ONCE):
+            for _ in range(SIMULATIONS):
                 assert engine.entered.acquire(timeout=20)
             for _ in range(20):
                 assert client.get("/v1/runs", timeout=5).status_code == 200
@@ -72,8 +72,8 @@ class HeldReader(toy.ToyEngine):
         return super().load(data, filename)
 
 
-def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
-    engine, crowd = HeldReader(), UPLOADS_AT_ONCE + 4
+def test_few_uploads_are_read_concurrently(tmp_path: Path) -> None:
+    engine, crowd = HeldReader(), UPLOADS + 4
     with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
 
         def upload(_: int) -> int:
@@ -82,7 +82,7 @@ def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
 
         with ThreadPoolExecutor(crowd) as pool:
             asked = [pool.submit(upload, k) for k in range(crowd)]
-            for _ in range(UPLOADS_AT_ONCE):
+            for _ in range(UPLOADS):
                 assert engine.entered.acquire(timeout=20)
             assert not engine.entered.acquire(timeout=0.2)  # no more at once
             assert client.get("/v1/datasets", timeout=5).status_code == 200
@@ -90,20 +90,25 @@ def test_few_uploads_are_read_at_once(tmp_path: Path) -> None:
             assert {one.result() for one in asked} == {201}
 
 
-def test_a_crowd_is_told_to_come_later() -> None:
+def test_too_many_waiting_requests_get_a_503() -> None:
     async def scene() -> None:
-        turns = Turns("simulations", at_once=1, most_waiting=2)
-        await turns.take()
-        waiting = [asyncio.create_task(turns.take()) for _ in range(2)]
+        limit, release = ConcurrencyLimit("simulations", 1, max_waiting=2), asyncio.Semaphore(0)
+
+        async def request() -> None:
+            async with limit.slot():
+                await release.acquire()
+
+        first = asyncio.create_task(request())
         await asyncio.sleep(0)
-        with pytest.raises(ProblemError, match="2 simulations wait already"):
-            await turns.take()
-        waiting[0].cancel()  # who goes away gives its place
+        waiting = [asyncio.create_task(request()) for _ in range(2)]
         await asyncio.sleep(0)
-        late = asyncio.create_task(turns.take())
-        for _ in range(2):
-            turns.give_back()
-            await asyncio.sleep(0)
-        await asyncio.wait_for(asyncio.gather(waiting[1], late), 1)
+        with pytest.raises(ProblemError, match="2 simulations are waiting, the maximum"):
+            await request()
+        waiting[0].cancel()  # a request that is cancelled while it waits makes room for another
+        await asyncio.sleep(0)
+        late = asyncio.create_task(request())
+        for _ in range(3):
+            release.release()
+        await asyncio.wait_for(asyncio.gather(first, waiting[1], late), 1)
 
     asyncio.run(scene())

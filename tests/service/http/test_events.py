@@ -36,7 +36,7 @@ def parse(answer: httpx.Response) -> Iterator[Event]:
             fields[name] = value
 
 
-def test_a_stream_tells_everything_and_ends(api: Api) -> None:
+def test_a_stream_sends_every_event_and_ends(api: Api) -> None:
     run = api.submit(api.upload()["id"])["id"]
     told = list(events(api, run))
     generations = [data for _, kind, data in told if kind == "generation"]
@@ -49,8 +49,8 @@ def test_a_stream_tells_everything_and_ends(api: Api) -> None:
     assert all(data["eta_seconds"] is not None for data in generations)
 
 
-def test_a_crowd_of_streams_is_told_to_come_later(api: Api, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streams, "MOST_STREAMS", 1)
+def test_too_many_event_streams_get_a_503(api: Api, gate: Gate, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(streams, "MAX_STREAMS", 1)
     run = api.submit(api.upload()["id"])["id"]
     open_stream = events(api, run)
     assert next(open_stream)[1] == "state"
@@ -106,7 +106,7 @@ def test_a_silent_stream_is_kept_alive(api: Api, gate: Gate, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("last", ["x", "-1", "1" * 16, "\u00b2"])
-def test_a_foreign_event_id_is_refused(api: Api, last: str) -> None:
+def test_an_unknown_event_id_is_refused(api: Api, last: str) -> None:
     run = api.submit(api.upload()["id"])["id"]
     headers = {b"Last-Event-ID": last.encode("latin-1")}
     assert api.client.get(f"/v1/runs/{run}/events", headers=headers).status_code == 422

@@ -1,9 +1,10 @@
-"""The quick way to the commonest reads: the same answers as the shapes and the routes give, and never an old one."""
+"""Reads that pass by the object mapper: the same answers as the schemas give, of the caller's own rows."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
+from contextlib import ExitStack
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,11 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from tests.service import toy
-from tests.service.conftest import Api, toy_service
+from tests.service.conftest import Api, made, toy_service
 from wingfit.service.auth.access import KeyRing
 from wingfit.service.container import Service
-from wingfit.service.http import json_reads, quick
-from wingfit.service.http.events import Events, Told, Watched
+from wingfit.service.http import json_reads
+from wingfit.service.http.events import Events, JobState, Watched
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.runs import views
 from wingfit.service.runs.schemas import HistoryItem, Page, RunOut
@@ -51,7 +52,7 @@ def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
         yield Used(service, api)
 
 
-def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:
+def test_answers_are_what_the_schemas_make_of_the_rows(used: Used) -> None:
     with used.service.database.read() as session:
         rows = list(session.scalars(select(RunRow).order_by(RunRow.number.desc())))
         past = store.history(session, used.runs[0], 0)
@@ -65,94 +66,70 @@ def test_answers_are_what_the_shapes_make_of_the_rows(used: Used) -> None:
 
 
 FILTERS = ("dataset_id", "state", "owner", "before")
-USUAL = (
-    "runs?limit=2", "runs?limit=2&cursor=CURSOR", "runs?limit=50", "runs/RUN", "runs/RUN/history",
-    "runs/RUN/history?after=3&limit=4", "runs/RUN/history?after=9007199254740991",
-)  # fmt: skip
-UNUSUAL = (
-    "runs?dataset_id=ONE", "runs?state=FAILED", "runs?dataset_id=ONE&state=FAILED", "runs?dataset_id=none",
-    "runs?limit=200",
-    "runs/", "runs?limit=0", "runs?limit=201", "runs?limit=-1", "runs?limit=", "runs?limit=1.0", "runs?state=NONE",
-    "runs?state=", "runs?cursor=none", "runs?limit=1&limit=2", "runs?limit=1&", "runs?&limit=1", "runs?other=1",
-    "runs/RUN?limit=1", "runs/none", "runs/none/history", "runs/RUN/history?after=-1", "runs/RUN/history?limit=10001",
-    "runs/RUN/history?limit=5000", "runs/RUN/history?cursor=1", "runs/RUN/history?after=9007199254740992",
-)  # fmt: skip
 
 
-@pytest.fixture
-def framed(used: Used, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that is asked goes to the framework."""
-    monkeypatch.setattr(used.service.shortcut, "answer", lambda *_: None)
+def test_filters_and_pages_select_what_they_name(used: Used) -> None:
+    def names(query: str) -> list[str]:
+        return [run["id"] for run in used.api.get(f"/v1/runs{query}")["items"]]
 
-
-@pytest.mark.usefixtures("framed")
-@pytest.mark.parametrize("form", [*USUAL, *UNUSUAL])
-def test_the_routes_answer_alike(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = used.path(form)
-    first = seen(used.api.client.get(path))
-    routed = []
-
-    def leave(scope: Json) -> None:
-        routed.append(scope["path"])
-        raise quick.UnusualError
-
-    monkeypatch.setattr(quick, "_answer", leave)
-    assert seen(used.api.client.get(path)) == first
-    assert routed
-
-
-@pytest.mark.usefixtures("framed")
-@pytest.mark.parametrize("form", USUAL)
-def test_what_is_usual_is_not_left_to_the_routes(used: Used, form: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = used.path(form)
-    answered = []
-    answer = quick._answer
-
-    def noted(scope: Any) -> Any:
-        answered.append(answer(scope))
-        return answered[-1]
-
-    monkeypatch.setattr(quick, "_answer", noted)
-    assert used.api.client.get(path).status_code == 200
-    assert len(answered) == 1
+    oldest_first = used.runs
+    assert names("") == oldest_first[::-1]
+    assert names(f"?dataset_id={used.one}") == [oldest_first[2], oldest_first[0]]
+    assert names("?state=FAILED") == [oldest_first[2]]
+    assert names(f"?dataset_id={used.one}&state=SUCCEEDED") == [oldest_first[0]]
+    assert names("?dataset_id=none") == []
+    cursor = used.api.get("/v1/runs?limit=2")["next_cursor"]
+    assert names(f"?limit=2&cursor={cursor}") == [oldest_first[0]]
+    path = f"/v1/runs/{oldest_first[0]}/history"
+    page = used.api.get(f"{path}?after=3&limit=4")
+    assert ([item["sequence"] for item in page["items"]], page["next_cursor"]) == ([4, 5, 6, 7], "7")
+    whole = used.api.get(path)
+    assert used.api.get(f"{path}?limit=5000") == whole  # read in a thread
+    assert used.api.get(f"{path}?after=9007199254740991") == {"items": [], "next_cursor": None}
 
 
 @pytest.mark.parametrize(
-    ("run", "last", "status"), [("RUN", "", 200), ("RUN", "7", 200), ("RUN", "none", 422), ("none", "", 404)]
-)
-def test_events_are_the_same_the_quick_way(
-    used: Used, run: str, last: str, status: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, headers = used.path(f"runs/{run}/events"), {"Last-Event-ID": last} if last else {}
-    quickly = []
-    events = quick._events
-
-    def noted(*asked: Any) -> Any:
-        quickly.append(events(*asked))
-        return quickly[-1]
-
-    monkeypatch.setattr(quick, "_events", noted)
-    first = used.api.client.get(path, headers=headers)
-    monkeypatch.undo()
-    monkeypatch.setattr(quick, "_events", leave)
-    second = used.api.client.get(path, headers=headers)
-    assert (first.status_code, first.text, len(quickly)) == (status, second.text, int(status == 200))
-    assert second.status_code == status
-    assert dict(first.headers).keys() == dict(second.headers).keys()
-    assert status != 200 or first.text.count("event: generation") == (3 if last else 10)
+    "form",
+    [
+        "runs?limit=0", "runs?limit=201", "runs?limit=-1", "runs?limit=", "runs?limit=1.5", "runs?state=NONE",
+        "runs?state=", "runs?cursor=none", "runs?other=1", "runs/RUN?limit=1", "runs/RUN/history?after=-1",
+        "runs/RUN/history?limit=10001", "runs/RUN/history?cursor=1", "runs/RUN/history?after=9007199254740992",
+    ],
+)  # fmt: skip
+def test_invalid_queries_are_refused(used: Used, form: str) -> None:
+    answer = used.api.client.get(f"/v1/{form.replace('RUN', used.runs[0])}")
+    assert (answer.status_code, answer.json()["type"]) == (422, "urn:wingfit:problem:invalid")
 
 
-def leave(*_: object) -> None:
-    raise quick.UnusualError
+@pytest.mark.parametrize("path", ["runs/none", "runs/none/history", "runs/none/events"])
+def test_an_unknown_run_is_not_found(used: Used, path: str) -> None:
+    assert used.api.client.get(f"/v1/{path}").status_code == 404
 
 
-def seen(answer: httpx.Response) -> tuple[object, ...]:
-    own = {"date", "x-request-id"}
-    headers = {name: value for name, value in answer.headers.items() if name not in own}
-    return answer.status_code, answer.json() if answer.content else None, headers
+def test_every_read_is_of_the_callers_own_rows(tmp_path: Path) -> None:
+    secrets = {name: made(tmp_path, name, *scopes) for name, scopes in KEYS.items()}
+    with toy_service(tmp_path, require_keys=True) as (_, api), ExitStack() as opened:
+        apis = {name: Api(opened.enter_context(with_key(api.client, secret))) for name, secret in secrets.items()}
+        used = Used(_, apis["ann"])
+        for _ in range(2):
+            assert [len(apis[name].get("/v1/runs")["items"]) for name in KEYS] == [3, 3, 0]
+            for path in ("", "/history", "/events"):
+                answers = [apis[name].client.get(f"/v1/runs/{used.runs[0]}{path}").status_code for name in KEYS]
+                assert answers == [200, 200, 404], path
+            assert api.client.get("/v1/runs").status_code == 401
+        ann = next(key for key in apis["admin"].get("/v1/keys")["items"] if key["name"] == "ann")
+        assert apis["admin"].client.delete(f"/v1/keys/{ann['id']}").status_code == 200
+        assert apis["ann"].client.get(f"/v1/runs/{used.runs[0]}").status_code == 401
 
 
-def test_what_was_written_is_read_at_once(used: Used) -> None:
+KEYS = {"admin": ["admin"], "ann": ["read", "write"], "bob": ["read", "write"]}
+
+
+def with_key(client: httpx.Client, secret: str) -> httpx.Client:
+    return httpx.Client(base_url=client.base_url, headers={"Authorization": f"Bearer {secret}"}, timeout=20.0)
+
+
+def test_a_write_is_visible_in_the_next_read(used: Used) -> None:
     paths = [f"/v1/runs/{used.runs[1]}", "/v1/runs"]
     before = [used.api.get(path) for path in paths]
     for name in ("another", before[0]["name"]):
@@ -163,7 +140,7 @@ def test_what_was_written_is_read_at_once(used: Used) -> None:
     assert [used.api.get(path) for path in paths] == before
 
 
-def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
+def test_an_unchanged_run_is_a_304(used: Used) -> None:
     path = f"/v1/runs/{used.runs[0]}"
     tag = used.api.client.get(path).headers["ETag"]
     again = used.api.client.get(path, headers={"If-None-Match": tag})
@@ -171,14 +148,14 @@ def test_a_run_that_the_caller_has_is_not_sent_again(used: Used) -> None:
     assert used.api.client.get(path, headers={"If-None-Match": '"other"'}).status_code == 200
 
 
-def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Path) -> None:
+def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) -> None:
     database, changes = Database(tmp_path), Changes()
     events, looks = Events(database, changes, KeyRing()), []
     states = ["QUEUED", "RUNNING", "SUCCEEDED"]
 
-    def look(_session: Session, after: int, _limit: int) -> Told:
+    def look(_session: Session, after: int, _limit: int) -> JobState:
         looks.append(after)
-        return Told(job(states[min(database.version - first, 2)]), [])
+        return JobState(job(states[min(database.version - first, 2)]), [])
 
     async def watch() -> list[bytes]:
         return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
@@ -197,19 +174,19 @@ def test_who_watches_the_same_shares_the_look_and_sees_every_change(tmp_path: Pa
     assert [[state for state in states if state.encode() in part] for part in told[0]] == [[state] for state in states]
     assert told == [told[0]] * 20
     assert len(looks) == 3
-    assert not events._looks, "nothing is kept of what was sent"
+    assert not events._reads, "nothing is kept of what was sent"
     database.close()
 
 
-def test_a_look_that_fails_is_done_anew(tmp_path: Path) -> None:
+def test_a_failed_read_is_repeated(tmp_path: Path) -> None:
     database = Database(tmp_path)
     events, looks = Events(database, Changes(), KeyRing()), []
 
-    def look(_session: Session, after: int, _limit: int) -> Told:
+    def look(_session: Session, after: int, _limit: int) -> JobState:
         looks.append(after)
         if len(looks) == 1:
             raise OSError("the disk did not answer")
-        return Told(job("SUCCEEDED"), [])
+        return JobState(job("SUCCEEDED"), [])
 
     async def watch() -> list[bytes]:
         return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
@@ -226,9 +203,9 @@ def job(state: str) -> RunOut:
 
 
 @pytest.mark.parametrize("filters", [some for n in range(5) for some in combinations(FILTERS, n)])
-def test_pages_are_found_through_an_index_and_need_no_sorting(used: Used, filters: tuple[str, ...]) -> None:
+def test_pages_use_an_index_and_need_no_sorting(used: Used, filters: tuple[str, ...]) -> None:
     where = tuple("number < :before" if name == "before" else f"{name} = :{name}" for name in filters)
-    values = {"dataset_id": used.one, "state": "FAILED", "owner": None, "before": 9, "most": 51}
+    values = {"dataset_id": used.one, "state": "FAILED", "owner": None, "before": 9, "rows": 51}
     with used.service.database.look() as look:
         plans = [
             *look.execute(f"EXPLAIN QUERY PLAN {json_reads._page_of_runs(where)}", values),

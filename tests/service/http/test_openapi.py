@@ -1,4 +1,4 @@
-"""The published description: complete, and in step with docs/api.md."""
+"""The OpenAPI document: complete, and in step with docs/api.md."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def test_every_operation_is_described(specification: Specification) -> None:
             assert "404" in operation["responses"], (method, path)
 
 
-def test_every_reference_leads_somewhere(specification: Specification) -> None:
+def test_every_reference_exists(specification: Specification) -> None:
     names = set(re.findall(r"#/components/schemas/([\w-]+)", str(specification)))
     assert names <= set(specification["components"]["schemas"])
     assert "Problem" in names
 
 
-def test_what_is_made_leads_to_the_calls_on_it(specification: Specification) -> None:
+def test_creating_calls_link_to_the_calls_on_their_result(specification: Specification) -> None:
     by_id = {operation["operationId"]: path for _, path, operation in operations(specification)}
     links = specification["paths"]["/v1/runs"]["post"]["responses"]["202"]["links"]
     reached = {by_id[link["operationId"]] for link in links.values()}
@@ -68,7 +68,7 @@ def test_what_is_made_leads_to_the_calls_on_it(specification: Specification) -> 
     assert of_dataset["Fetch a dataset"]["parameters"] == {"dataset_id": "$response.body#/id"}
 
 
-def test_nothing_is_null_that_is_sent_as_text(specification: Specification) -> None:
+def test_parameters_and_form_fields_are_never_null(specification: Specification) -> None:
     for method, path, operation in operations(specification):
         for parameter in operation.get("parameters", ()):
             assert "null" not in str(parameter["schema"]), (method, path, parameter["name"])
@@ -77,7 +77,7 @@ def test_nothing_is_null_that_is_sent_as_text(specification: Specification) -> N
     assert "anyOf" not in form["name"]
 
 
-def test_what_is_unchanged_is_answered_as_described(api: Api, specification: Specification) -> None:
+def test_unchanged_answers_are_304_as_described(api: Api, specification: Specification) -> None:
     run = api.submit(api.upload()["id"])["id"]
     diagnosis = api.diagnose(api.run(run)["dataset_id"])["id"]
     api.finish(run)
@@ -155,7 +155,7 @@ def test_examples_are_valid(model: type[BaseModel]) -> None:
         model.model_validate(example)
 
 
-def test_the_page_to_read_needs_no_other_origin(client: httpx.Client, specification: Specification) -> None:
+def test_the_documentation_page_needs_no_other_origin(client: httpx.Client, specification: Specification) -> None:
     page = client.get("/docs")
     assert page.status_code == 200
     assert not re.findall(r"""(?:src|href)=["'](?:https?:)?//""", page.text)

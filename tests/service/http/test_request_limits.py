@@ -1,4 +1,4 @@
-"""Who may call, and what the browser is told."""
+"""Hosts, origins, sizes and security headers of requests; unknown paths; some settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wingfit.service.settings import Settings, SettingsError
 
 
 @pytest.mark.parametrize(("host", "status"), [("localhost", 200), ("LOCALHOST:99", 200), ("[::1]:8321", 200)])
-def test_loopback_names_are_served(client: httpx.Client, host: str, status: int) -> None:
+def test_loopback_host_names_are_accepted(client: httpx.Client, host: str, status: int) -> None:
     assert client.get("/v1/health", headers={"Host": host}).status_code == status
 
 
@@ -24,7 +24,7 @@ OTHER_HOSTS = ["evil.example", "evil.example:8321", "127.0.0.1.evil.example", "[
 
 
 @pytest.mark.parametrize("host", OTHER_HOSTS)
-def test_other_names_are_not(client: httpx.Client, host: str) -> None:
+def test_other_host_names_are_refused(client: httpx.Client, host: str) -> None:
     for path in ("/v1/runs", "/", "/openapi.json", "/v1/session", "/v1/healthy", "/v1/health/", "/v1/metrics/x"):
         answer = client.get(path, headers={"Host": host})
         assert (answer.status_code, answer.headers["Content-Type"]) == (400, "application/problem+json"), path
@@ -87,7 +87,7 @@ def test_a_page_of_another_site_reads_nothing(api: Api, headers: dict[str, str])
         assert api.client.get(path, headers=headers).status_code == 200, path
 
 
-def test_the_page_and_who_types_an_address_read(api: Api) -> None:
+def test_the_own_page_and_typed_addresses_may_read(api: Api) -> None:
     own = str(api.client.base_url).rstrip("/")
     for headers in ({"Sec-Fetch-Site": "same-origin"}, {"Sec-Fetch-Site": "none"}, {"Origin": own}, {}):
         assert api.client.get("/v1/runs", headers=headers).status_code == 200, headers
@@ -128,14 +128,30 @@ def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(
         assert [server.client.get("/v1/health", headers=long).status_code for _ in range(4)] == [200] * 4
 
 
+@pytest.mark.parametrize("upgrade", ["", "Connection: Upgrade\r\nUpgrade: x\r\n"])
+def test_a_body_is_never_taken_for_a_request(client: httpx.Client, upgrade: str) -> None:
+    """Also where the client asks for an upgrade, which the server does not support."""
+    host = f"Host: 127.0.0.1:{client.base_url.port}\r\n"
+    hidden = f"GET /v1/runs HTTP/1.1\r\n{host}\r\n"
+    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=10.0) as plain:
+        plain.sendall(
+            f"POST /v1/runs HTTP/1.1\r\n{host}{upgrade}Content-Length: {len(hidden)}\r\n\r\n{hidden}".encode()
+        )
+        plain.shutdown(socket.SHUT_WR)
+        answers = b""
+        while more := plain.recv(65536):
+            answers += more
+    assert (answers.count(b"HTTP/1.1 "), answers.startswith(b"HTTP/1.1 422 ")) == (1, True)
+
+
 @pytest.mark.parametrize("origin", ["http://[", "http://[::1", "null", "http://evil.example", "//", ""])
-def test_an_origin_that_is_none_is_a_foreign_one(client: httpx.Client, origin: str) -> None:
+def test_an_invalid_origin_counts_as_foreign(client: httpx.Client, origin: str) -> None:
     answer = client.post("/v1/runs", json={}, headers={"Origin": origin})
     assert (answer.status_code, answer.json()["status"]) == (403, 403)
     assert answer.headers["X-Frame-Options"] == "DENY"
 
 
-def test_unknown_paths_and_methods_are_told_apart(client: httpx.Client) -> None:
+def test_unknown_paths_are_404_and_unknown_methods_405(client: httpx.Client) -> None:
     assert client.get("/v1/nothing").status_code == 404
     assert client.get("/v1/runs/x/y/z").json()["type"] == "urn:wingfit:problem:not-found"
     answer = client.put("/v1/runs")
@@ -155,7 +171,7 @@ def test_a_head_is_a_get_without_its_body(api: Api) -> None:
     assert api.client.head(f"/v1/runs/{run}/events").status_code == 405
 
 
-def test_a_misspelt_query_parameter_is_told(client: httpx.Client) -> None:
+def test_a_misspelt_query_parameter_is_refused(client: httpx.Client) -> None:
     answer = client.get("/v1/runs", params={"stat": "RUNNING", "limit": 3})
     assert answer.status_code == 422
     (fault,) = answer.json()["errors"]
@@ -165,7 +181,7 @@ def test_a_misspelt_query_parameter_is_told(client: httpx.Client) -> None:
     assert client.get("/", params={"x": "1"}).status_code == 200
 
 
-def test_plotly_comes_from_here(client: httpx.Client) -> None:
+def test_plotly_is_served_by_this_server(client: httpx.Client) -> None:
     answer = client.get("/assets/plotly.min.js")
     assert answer.status_code == 200
     assert answer.headers["Content-Type"].startswith("text/javascript")
@@ -190,18 +206,18 @@ def test_remote_addresses_need_keys_or_consent() -> None:
         ("WINGFIT_EVALUATOR", "dask"),
     ],
 )
-def test_a_setting_that_cannot_be_names_itself(name: str, value: str) -> None:
+def test_an_invalid_setting_is_named(name: str, value: str) -> None:
     with pytest.raises(SettingsError, match=name):
         Settings.from_env({name: value})
 
 
-def test_an_address_of_ray_is_for_ray() -> None:
+def test_a_ray_address_needs_the_ray_evaluator() -> None:
     with pytest.raises(SettingsError, match="WINGFIT_EVALUATOR is 'processes': set that to ray"):
         Settings.from_env({"WINGFIT_RAY_ADDRESS": "h:1", "WINGFIT_EVALUATOR": "processes"})
 
 
 @pytest.mark.parametrize("folder", ["~no-such-user/x", "a-\udcff"])
-def test_a_folder_that_cannot_be_is_refused_in_words(folder: str) -> None:
+def test_an_invalid_folder_is_refused(folder: str) -> None:
     with pytest.raises(SettingsError, match=r"WINGFIT_DATA is .*write its whole path"):
         Settings.from_env({"WINGFIT_DATA": folder})
 

@@ -1,4 +1,4 @@
-"""What the service defends against; docs/security.md says which test shows what, and is kept true here."""
+"""Defences of the service; docs/security.md names the test of each, and is checked here."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Schema = dict[str, Any]
 # -- answers -----------------------------------------------------------------------------------------------
 
 
-def test_a_mistake_is_answered_without_a_word_about_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_answer_to_an_internal_error_does_not_describe_it(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     app = create_app(Settings(data=tmp_path), engine=toy.FaultyEngine(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client:
         body = {"dataset_id": Api(client).upload()["id"], "recording": "slow"}
@@ -66,7 +66,7 @@ def test_no_other_origin_may_read_an_answer(client: httpx.Client) -> None:
         assert answer.headers["Cross-Origin-Resource-Policy"] == "same-origin"
 
 
-def test_no_page_needs_a_script_in_its_text(api: Api) -> None:
+def test_no_page_has_an_inline_script(api: Api) -> None:
     diagnosis = api.diagnose(api.upload()["id"])["id"]
     api.diagnosed(diagnosis)
     for path in ("/", "/docs", f"/v1/diagnoses/{diagnosis}/report"):
@@ -123,7 +123,7 @@ def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
     }
 
 
-def test_the_server_has_nothing_to_fetch_addresses_with() -> None:
+def test_the_server_loads_no_http_client() -> None:
     clients = (
         "httpx",
         "requests",
@@ -145,7 +145,7 @@ def test_the_server_has_nothing_to_fetch_addresses_with() -> None:
     assert called == set()
 
 
-def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
+def test_a_submitted_address_is_not_opened(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as trap:
         trap.settimeout(0.5)
         url = f"http://127.0.0.1:{trap.getsockname()[1]}/x"
@@ -163,7 +163,7 @@ def test_an_address_that_is_sent_is_not_followed(tmp_path: Path) -> None:
             trap.accept()
 
 
-def test_an_upload_writes_no_file_of_a_name_of_its_own(tmp_path: Path) -> None:
+def test_an_upload_does_not_name_files(tmp_path: Path) -> None:
     with serving(create_app(Settings(data=tmp_path / "data"), make_evaluator=toy.NoEvaluator)) as client:
         for filename in ("../../evil.zip", "/etc/evil.zip", "evil.zip", "..\\evil.zip"):
             data = zipped_with(example_files(), "evil/evil.csv")
@@ -197,7 +197,7 @@ def unbounded(schema: Schema, known: Schema, where: str) -> Iterator[str]:
             yield from unbounded(one, known, f"{where}.{name}")
 
 
-def test_every_body_and_query_is_bounded_in_every_part(client: httpx.Client) -> None:
+def test_every_field_of_bodies_and_queries_has_a_limit(client: httpx.Client) -> None:
     specification = client.get("/openapi.json").json()
     known = specification["components"]["schemas"]
     found, bodies = list[str](), 0
@@ -213,7 +213,7 @@ def test_every_body_and_query_is_bounded_in_every_part(client: httpx.Client) -> 
     assert bodies >= 7
 
 
-def test_every_list_of_a_dataset_is_bounded() -> None:
+def test_every_list_of_a_dataset_has_a_limit() -> None:
     schema = dataset_schema()
     lists = [one for one in _all(schema) if one.get("type") == "array"]
     assert len(lists) > 8
@@ -235,15 +235,15 @@ def highest(model: Any, name: str) -> int:
     return int(next(one.le for one in model.model_fields[name].metadata if hasattr(one, "le")))
 
 
-def test_the_limits_that_are_documented_are_those_in_force() -> None:
+def test_the_documented_limits_are_those_of_the_code() -> None:
     rows = dict(re.findall(r"^\| ([^|]+?) \| ([\d,]+)[^|]*\|", PAGE.partition("## Limits")[2], re.MULTILINE))
     run, diagnosis = spec_schemas.RunIn, diagnosis_schemas.DiagnosisIn
     in_force = {
-        "head of a request": header_limits.HEAD_LIMIT // 2**10,
+        "request line and headers": header_limits.HEAD_LIMIT // 2**10,
         "body of an upload": request_limits.UPLOAD_LIMIT // 2**20,
         "any other body": request_limits.BODY_LIMIT // 2**20,
-        "an archive unpacked": limits.MAX_EXPANDED_BYTES // 2**20,
-        "unpacked over packed": limits.MAX_COMPRESSION_RATIO,
+        "unpacked archive": limits.MAX_EXPANDED_BYTES // 2**20,
+        "unpacked over packed size": limits.MAX_COMPRESSION_RATIO,
         "entries of an archive": limits.MAX_ENTRIES,
         "`dataset.yaml`": limits.MAX_DESCRIPTION_BYTES // 2**20,
         "levels of `dataset.yaml`": limits.MAX_DEPTH,
@@ -256,10 +256,10 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "memory to read a NetCDF upload": confined.limits_of_upload(0).memory_mib,
         "processor time to read a small NetCDF upload": confined.limits_of_upload(0).processor_s,
         "time to read a NetCDF upload": confined.limits_of_upload(request_limits.UPLOAD_LIMIT).wall_s,
-        "bodies of a division": division.MAX_BODIES,
-        "genes named by a request": listed(run, "genes"),
-        "recordings named by a request": listed(run, "recordings"),
-        "effects named by a request": listed(run, "effects"),
+        "bodies of a discretisation": division.MAX_BODIES,
+        "genes in a request": listed(run, "genes"),
+        "recordings in a request": listed(run, "recordings"),
+        "effects in a request": listed(run, "effects"),
         "suspects of a diagnosis": listed(diagnosis, "suspects"),
         "effects that a diagnosis refits": highest(diagnosis, "refits"),
         "population": highest(run, "population"),
@@ -267,22 +267,22 @@ def test_the_limits_that_are_documented_are_those_in_force() -> None:
         "items on a page": responses.LARGEST_PAGE,
         "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
         "coordinates in an answer": schemas.MOST_COORDINATES,
-        "simulations at once": concurrency_limit.AT_ONCE,
-        "uploads read at once": concurrency_limit.UPLOADS_AT_ONCE,
-        "exports as NetCDF at once": concurrency_limit.EXPORTS_AT_ONCE,
-        "archives, exports, findings, reports, histories sent at once": concurrency_limit.DOWNLOADS_AT_ONCE,
-        "answers that were simulated sent at once": concurrency_limit.ANSWERS_AT_ONCE,
-        "requests that wait for each of these": concurrency_limit.MOST_WAITING,
-        "backups at once": concurrency_limit.BACKUPS_AT_ONCE,
-        "requests that wait for a backup": concurrency_limit.BACKUPS_WAITING,
-        "slowest client that is waited for": header_limits.SLOWEST_BYTES_PER_SECOND // 2**10,
-        "event streams": events.MOST_STREAMS,
-        "jobs of an owner that have not ended": settings.Settings.max_active,
-        "jobs computed at once": settings.Settings.max_runs,
+        "concurrent simulations": concurrency_limit.SIMULATIONS,
+        "concurrent uploads": concurrency_limit.UPLOADS,
+        "concurrent NetCDF exports": concurrency_limit.EXPORTS,
+        "concurrent downloads of archives, exports, findings, reports and histories": concurrency_limit.DOWNLOADS,
+        "simulated answers sent concurrently": concurrency_limit.ANSWERS,
+        "requests waiting for each of these": concurrency_limit.MAX_WAITING,
+        "concurrent backups": concurrency_limit.BACKUPS,
+        "requests waiting for a backup": concurrency_limit.MAX_WAITING_BACKUPS,
+        "slowest accepted client": header_limits.SLOWEST_BYTES_PER_SECOND // 2**10,
+        "event streams": events.MAX_STREAMS,
+        "unfinished jobs of an owner": settings.Settings.max_active,
+        "concurrently computed jobs": settings.Settings.max_runs,
         "MB of archives of an owner": settings.Settings.max_stored_mb,
     }
     assert {name: int(value.replace(",", "")) for name, value in rows.items()} == in_force
-    assert f"KiB/s, over {header_limits.SLOW_SECONDS:g} s" in PAGE
+    assert f"KiB/s over {header_limits.SLOW_SECONDS:g} s" in PAGE
     assert DiagnosisSpec().refits <= in_force["effects that a diagnosis refits"]
 
 
@@ -299,7 +299,7 @@ def test_every_test_that_the_page_names_exists() -> None:
         )
 
 
-def test_the_page_answers_all_ten_and_shows_each_by_a_test() -> None:
+def test_the_page_answers_all_ten_items_and_names_tests() -> None:
     rows = re.findall(r"^\| API(\d+) [^|]*\|([^|]*)\|([^|]*)\|$", PAGE, re.MULTILINE)
     assert [int(number) for number, _, _ in rows] == list(range(1, 11))
     for number, answer, shown in rows:

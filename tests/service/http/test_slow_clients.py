@@ -1,4 +1,4 @@
-"""Clients that read slowly, or not at all, or go away: they hold little, not for long, and hurt nobody else."""
+"""Clients that read slowly, never, or disconnect hold little memory for a short time and delay nobody else."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from wingfit.calibration.result import Comparison
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset
 from wingfit.service.container import Service
-from wingfit.service.http import header_limits, pieces
-from wingfit.service.http.concurrency_limit import AT_ONCE, BACKUPS_AT_ONCE, BACKUPS_WAITING
+from wingfit.service.http import header_limits, request_limits
+from wingfit.service.http.concurrency_limit import BACKUPS, MAX_WAITING_BACKUPS, SIMULATIONS
 from wingfit.sim.model import Solution
 
 MIB = 2**20
@@ -75,14 +75,14 @@ def copies_held(pid: int) -> list[str]:
     return [name for name in held if "copy-" in name]
 
 
-def test_backups_that_nobody_takes_are_few_and_go_with_their_clients(tmp_path: Path) -> None:
+def test_untaken_backups_are_few_and_end_with_their_clients(tmp_path: Path) -> None:
     with toy_server(tmp_path) as server, ExitStack() as crowd:
         server.api.upload(pad="x" * 30 * MIB)
         readers = [crowd.enter_context(reader(server.port, "/v1/backup")) for _ in range(8)]
         assert status(readers[0]) == 200
         refused = [one for one in readers[1:] if refuses_at_once(one)]
-        assert len(refused) == len(readers) - BACKUPS_AT_ONCE - BACKUPS_WAITING
-        assert len(copies_held(server.process.pid)) == BACKUPS_AT_ONCE
+        assert len(refused) == len(readers) - BACKUPS - MAX_WAITING_BACKUPS
+        assert len(copies_held(server.process.pid)) == BACKUPS
         quick(server.client, "/v1/health")
         crowd.close()
         eventually(lambda: not copies_held(server.process.pid), 10.0)
@@ -97,7 +97,7 @@ def refuses_at_once(one: socket.socket) -> bool:
         return False
     assert head.startswith(b"HTTP/1.1 503 ")
     assert b"\r\nretry-after: 5\r\n" in head.lower()
-    assert b"backups wait already" in head
+    assert b"backups are waiting" in head
     return True
 
 
@@ -147,7 +147,7 @@ def test_slow_readers_of_simulations_do_not_keep_others_from_simulating(
         run = api.submit(api.upload()["id"])["id"]
         api.finish(run)
         path = f"/v1/runs/{run}/comparison"
-        for one in [crowd.enter_context(reader(port_of(api.client), path)) for _ in range(AT_ONCE)]:
+        for one in [crowd.enter_context(reader(port_of(api.client), path)) for _ in range(SIMULATIONS)]:
             assert status(one) == 200
         assert len(api.client.get(path, timeout=10).content) > 4 * MIB
 
@@ -181,7 +181,7 @@ def hung_up(api: Api) -> float:
     return float(text.partition("\nwingfit_slow_clients_total ")[2].split()[0])
 
 
-def test_a_client_that_reads_too_slowly_is_hung_up_on(large: tuple[Service, Api, str]) -> None:
+def test_the_connection_of_a_slow_client_is_closed(large: tuple[Service, Api, str]) -> None:
     service, api, path = large
     with reader(port_of(api.client), path, 2**18) as one:
         with pytest.raises(ConnectionError):
@@ -197,7 +197,7 @@ def ask_again_and_again(one: socket.socket, path: str, seconds: float) -> None:
         time.sleep(0.0005)
 
 
-def test_a_client_that_asks_and_never_reads_is_hung_up_on(
+def test_the_connection_of_a_client_that_never_reads_is_closed(
     large: tuple[Service, Api, str], caplog: pytest.LogCaptureFixture
 ) -> None:
     _, api, path = large
@@ -217,8 +217,8 @@ def test_a_slow_client_that_reads_fast_enough_gets_all(large: tuple[Service, Api
     assert hung_up(api) == 0
 
 
-def test_a_large_body_is_sent_in_pieces_each_after_the_one_before() -> None:
-    body, sent = os.urandom(2 * pieces.PIECE + 5), list[Message]()
+def test_a_large_body_is_sent_in_chunks() -> None:
+    body, sent = os.urandom(2 * request_limits.CHUNK + 5), list[Message]()
 
     async def app(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
         await send({"type": "http.response.start", "status": 200, "headers": []})
@@ -228,10 +228,11 @@ def test_a_large_body_is_sent_in_pieces_each_after_the_one_before() -> None:
     async def send(message: Message) -> None:
         sent.append(message)
 
-    asyncio.run(pieces.Pieces(app)({"type": "http"}, None, send))  # type: ignore[arg-type]
+    scope: Scope = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"localhost")]}
+    asyncio.run(request_limits.RequestLimits(app, ("localhost",))(scope, None, send))  # type: ignore[arg-type]
     bodies = sent[1:]
     assert b"".join(bytes(message["body"]) for message in bodies) == 2 * body
-    assert max(len(message["body"]) for message in bodies) == pieces.PIECE
+    assert max(len(message["body"]) for message in bodies) == request_limits.CHUNK
     assert [message.get("more_body", False) for message in bodies] == [True] * 5 + [False]
 
 

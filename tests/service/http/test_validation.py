@@ -1,4 +1,4 @@
-"""Specifications and simulations that cannot be meant are refused with where, value and remedy."""
+"""Invalid specifications and simulations are refused with place, value and remedy."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, 
 
 
 @pytest.mark.parametrize("path", ["runs", "runs?validate_only=true", "diagnoses"])
-def test_half_a_character_is_no_name(api: Api, path: str) -> None:
+def test_a_lone_surrogate_in_a_name_is_refused(api: Api, path: str) -> None:
     text = json.dumps({"dataset_id": api.upload()["id"], "name": "half \ud83e"})
     answer = api.client.post(f"/v1/{path}", content=text, headers={"Content-Type": "application/json"})
     assert (answer.status_code, answer.json()["errors"][0]["where"]) == (422, "body.name")
@@ -80,7 +80,7 @@ def test_a_specification_is_checked_without_a_run(api: Api) -> None:
 
 @pytest.mark.parametrize("division", ["eleven", "128x1", "4 ", "", "4\n", ",".join(["1"] * 65), "1," * 150 + "1"])
 @pytest.mark.parametrize("route", ["runs", "simulations", "loads"])
-def test_a_division_that_is_none_is_answered_with_what_one_looks_like(api: Api, route: str, division: str) -> None:
+def test_an_invalid_discretisation_is_refused_with_an_example(api: Api, route: str, division: str) -> None:
     answer = api.client.post(f"/v1/{route}", json={"dataset_id": "x", "recording": "slow", "division": division})
     (said,) = [error["message"] for error in answer.json()["errors"] if error["where"] == "body.division"]
     assert "preset 4, 11, 24; strips x bodies of each: 6x4" in said
@@ -94,7 +94,7 @@ def test_an_unknown_name_lists_the_known_ones(api: Api) -> None:
     assert errors[1]["value"] == "stifness"
 
 
-def test_what_is_known_is_listed_once(api: Api) -> None:
+def test_known_names_are_listed_once(api: Api) -> None:
     body = {"dataset_id": api.upload()["id"], "recordings": [f"r{k}" for k in range(1000)]}
     answer = api.client.post("/v1/runs", json=body)
     errors = answer.json()["errors"]
@@ -123,7 +123,7 @@ def test_a_simulation(api: Api) -> None:
     assert nominal["mean_distance_mm"] > tracks["mean_distance_mm"]
 
 
-def test_of_a_long_recording_some_instants_are_answered(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_recording_is_thinned_out(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     body: dict[str, Any] = {"dataset_id": api.upload()["id"], "recording": "fast"}
     whole = api.client.post("/v1/simulations", json=body).json()
     assert (whole["every"], len(whole["phase"])) == (1, 4)
@@ -146,7 +146,7 @@ def test_of_a_long_recording_some_instants_are_answered(api: Api, monkeypatch: p
         ({"genome": {"stiffness": 9.5}}, 409, None),
     ],
 )
-def test_a_simulation_that_cannot_be(api: Api, body: dict[str, Any], status: int, where: str | None) -> None:
+def test_an_invalid_simulation_is_refused(api: Api, body: dict[str, Any], status: int, where: str | None) -> None:
     complete = {"dataset_id": api.upload()["id"], "recording": "slow"} | body
     answer = api.client.post("/v1/simulations", json=complete)
     assert answer.status_code == status, answer.text

@@ -17,7 +17,7 @@ from tests.service.toy_diagnosis import ToyDiagnoser
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.search import CalibrationSpec, Generation
 from wingfit.records import Dataset
-from wingfit.service.http.json_reads import Reading
+from wingfit.service.http import json_reads
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.server import serve
 from wingfit.service.settings import Settings
@@ -83,7 +83,7 @@ if __name__ == "__main__":
 
     Database.__init__ = noted  # type: ignore[method-assign, assignment]
     if "loop" in PARTS:
-        Reading.run = hang_here  # type: ignore[method-assign, assignment]  # which the event loop itself calls
+        json_reads.run = hang_here  # type: ignore[assignment]  # which the event loop itself calls
     limits = StopLimits(1, 0.3, 0.3, 0.3, float(sys.argv[2]), float(sys.argv[3]))
     settings = Settings.from_env()
     serve(settings, engine=StuckEngine(), make_evaluator=StuckEvaluator, diagnoser=ToyDiagnoser(), limits=limits)

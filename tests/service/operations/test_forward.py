@@ -1,4 +1,4 @@
-"""The way in to the containers: bytes both ways, the end of either side, and a server that is not there."""
+"""The TCP forwarder of the containers: bytes both ways, the end of either side, and an unreachable server."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_bytes_go_both_ways_and_an_answer_after_the_end_of_the_request() -> None
     assert seen == [sent]
 
 
-def test_who_leaves_a_stream_ends_it_for_the_server() -> None:
+def test_a_client_that_leaves_a_stream_ends_it_at_the_server() -> None:
     """Else the server would keep places for event streams of readers who have gone."""
     with target() as (target_port, listening), front(target_port) as (port, _):
         client = connect(port)
@@ -89,7 +89,7 @@ def test_who_leaves_a_stream_ends_it_for_the_server() -> None:
             assert connection.recv(1) == b""
 
 
-def test_a_server_that_is_away_is_reported_and_the_next_connection_served() -> None:
+def test_an_unreachable_server_is_logged_and_the_next_connection_is_served() -> None:
     away = free_port()
     with front(away) as (port, process):
         with closing(connect(port)) as client:
@@ -105,7 +105,7 @@ def test_a_server_that_is_away_is_reported_and_the_next_connection_served() -> N
 
 
 @pytest.mark.parametrize("wrong", ["api", "api:", ":8321", "api:http"])
-def test_a_target_that_is_none_is_refused(wrong: str) -> None:
+def test_an_invalid_target_is_refused(wrong: str) -> None:
     done = subprocess.run(
         [sys.executable, "-m", "wingfit.service.operations.forward", wrong],
         cwd=REPOSITORY,

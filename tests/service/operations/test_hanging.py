@@ -1,4 +1,4 @@
-"""A worker that hangs holds up neither a cancellation nor the stop of the service."""
+"""A hanging worker delays neither a cancellation nor the stop of the service."""
 
 # ruff: noqa: ARG002  they take what an evaluator takes
 
@@ -99,7 +99,7 @@ def test_the_service_stops_at_once_though_a_worker_hangs(settings: Settings, han
         assert Api(client).finish(run)["state"] == "SUCCEEDED"
 
 
-def test_what_is_not_interrupted_is_evaluated_as_ever() -> None:
+def test_uninterrupted_evaluations_are_unchanged() -> None:
     evaluator = make_evaluator("in_process")
     problem, values = pendulum.problem(), pendulum.population(9)
     plain = evaluator.evaluate(problem, values, residuals=True)
@@ -116,7 +116,7 @@ def test_an_error_of_the_model_arrives_as_it_was() -> None:
         evaluator.evaluate(pendulum.problem(pendulum.refuse), pendulum.population(3))
 
 
-def test_nothing_is_begun_once_it_is_interrupted(hanging: Hanging) -> None:
+def test_nothing_starts_after_an_interruption(hanging: Hanging) -> None:
     with pytest.raises(InterruptedStepError):
         InterruptibleEvaluator(hanging, lambda: True).evaluate(pendulum.problem(), pendulum.population(3))
     assert not hanging.called.is_set()

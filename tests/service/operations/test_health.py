@@ -76,12 +76,12 @@ def test_health_does_not_wait_for_the_threads_of_requests_or_for_the_database(
             with silent_database(monkeypatch):
                 answer, seconds = timed(api.client, "/v1/health")
                 assert (answer.status_code, answer.json()["status"]) == (200, "degraded")
-                assert seconds < health.LOOK_SECONDS + 5
+                assert seconds < health.READ_SECONDS + 5
                 assert answer.json()["runs_active"] is None
                 assert "the database does not answer within 1 s" in answer.json()["detail"]
                 answer, seconds = timed(api.client, "/v1/health")  # while the same look goes on
                 assert answer.json()["status"] == "degraded"
-                assert seconds < health.LOOK_SECONDS
+                assert seconds < health.READ_SECONDS
                 answer, _ = timed(api.client, "/v1/ready")
                 assert (answer.status_code, answer.headers["Retry-After"]) == (503, "5")
                 assert "the database does not answer" in answer.json()["detail"]
@@ -91,7 +91,7 @@ def test_health_does_not_wait_for_the_threads_of_requests_or_for_the_database(
         assert "wingfit_database_up 1.0" in api.client.get("/v1/metrics").text
 
 
-def test_who_asks_at_the_same_time_shares_one_look(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_concurrent_callers_share_one_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with toy_service(tmp_path) as (service, api), ThreadPoolExecutor(20) as crowd:
         looks = []
         count = service.health._counting._function
@@ -109,7 +109,7 @@ def test_who_asks_at_the_same_time_shares_one_look(tmp_path: Path, monkeypatch: 
         assert set(looks) == {"health"}
 
 
-def test_a_database_that_cannot_be_read_is_not_a_mistake_of_the_server(tmp_path: Path) -> None:
+def test_an_unreadable_database_is_no_internal_error(tmp_path: Path) -> None:
     with toy_service(tmp_path) as (service, api):
         with service.database.write() as session:
             session.connection().exec_driver_sql("ALTER TABLE diagnosis RENAME TO gone")

@@ -1,4 +1,4 @@
-"""What operators see: metrics, readiness, ids of requests, and a log that machines read."""
+"""Metrics, readiness, request ids and the JSON log."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def requests(found: Samples, path: str, status: int, method: str = "GET") -> flo
     return found.get(("wingfit_http_requests_total", labels), 0.0)
 
 
-def test_metrics_count_what_happened(api: Api) -> None:
+def test_metrics_count_requests_and_jobs(api: Api) -> None:
     run = api.submit(api.upload()["id"])["id"]
     api.finish(run)
     for _ in range(3):
@@ -95,7 +95,7 @@ def test_not_ready_while_no_worker_lives(tmp_path: Path) -> None:
         assert found["wingfit_worker_restarts_total", ()] == 1
 
 
-def test_jobs_that_stand_still_and_a_line_that_does_not_move_are_seen(api: Api, gate: Gate) -> None:
+def test_stalled_jobs_and_the_age_of_the_queue_are_reported(api: Api, gate: Gate) -> None:
     dataset = api.upload()["id"]
     runs = [api.submit(dataset)["id"] for _ in range(3)]  # two at a time
     api.until(runs[0], lambda run: run["state"] == "RUNNING")
@@ -113,7 +113,7 @@ def test_jobs_that_stand_still_and_a_line_that_does_not_move_are_seen(api: Api, 
     assert samples(api.client)["wingfit_queue_age_seconds", ()] == 0
 
 
-def test_the_example_alerts_are_about_metrics_that_exist(api: Api) -> None:
+def test_the_example_alerts_use_existing_metrics(api: Api) -> None:
     rules = yaml.safe_load((ROOT / "deploy/prometheus/alerts.yml").read_text())
     (group,) = rules["groups"]
     api.get("/v1/runs")  # a request is counted once it is answered
@@ -131,7 +131,7 @@ def test_ready(api: Api) -> None:
     assert api.get("/v1/ready")["status"] == "ok"
 
 
-def test_every_answer_has_an_id_which_a_caller_may_give(client: httpx.Client) -> None:
+def test_every_answer_has_a_request_id(client: httpx.Client) -> None:
     first, second = (client.get("/v1/health").headers["X-Request-ID"] for _ in range(2))
     assert first != second
     given = {"X-Request-ID": "trace-7"}
@@ -140,7 +140,7 @@ def test_every_answer_has_an_id_which_a_caller_may_give(client: httpx.Client) ->
         assert client.get("/v1/health", headers={"X-Request-ID": bad}).headers["X-Request-ID"] != bad
 
 
-def test_the_log_is_json_where_asked_for(tmp_path: Path) -> None:
+def test_the_log_can_be_json(tmp_path: Path) -> None:
     env = {"WINGFIT_LOG": "json"}
     with ServerProcess(tmp_path / "data", ("tests.service.toy_server", "0"), env) as server:
         server.client.get("/v1/runs/run_none", headers={"X-Request-ID": "trace-8"})
@@ -163,6 +163,6 @@ def test_an_exception_is_one_line_of_json() -> None:
     assert "ValueError" in json.loads(line)["exception"]
 
 
-def test_a_form_of_log_that_cannot_be_names_itself() -> None:
+def test_an_invalid_log_format_is_named() -> None:
     with pytest.raises(SettingsError, match="WINGFIT_LOG"):
         Settings.from_env({"WINGFIT_LOG": "xml"})

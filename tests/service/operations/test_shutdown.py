@@ -1,4 +1,4 @@
-"""A signal ends the server in bounded time whatever hangs, and the log says what was given up."""
+"""A signal ends the server in bounded time whatever hangs, and the log names what was given up."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def with_a_run(server: ServerProcess) -> str:
     return run
 
 
-def test_a_job_that_never_ends_is_given_up_and_goes_on_later(tmp_path: Path) -> None:
+def test_a_hanging_job_is_given_up_and_continues_later(tmp_path: Path) -> None:
     with stuck(tmp_path / "data", "job") as server:
         run = with_a_run(server)
         assert stopped(server, 5) == 0
-        assert f"run {run} is left as stored (after step 2) and goes on at the next start" in server.log
+        assert f"run {run} stays as stored (after step 2) and continues at the next start" in server.log
         assert re.search(rf"thread '{run}' at \S+stuck_server.py:\d+ \(hang_here\)", server.log)
     with toy(tmp_path) as again:
         assert again.api.finish(run)["state"] == "SUCCEEDED"
 
 
-def test_what_hangs_does_not_hold_up_the_stop(tmp_path: Path) -> None:
+def test_hanging_parts_do_not_delay_the_stop(tmp_path: Path) -> None:
     """Every thread of the pool, a write to the database, the end of the evaluator, all at once."""
     with (
         stuck(tmp_path / "data", "requests,database,evaluator") as server,
@@ -79,11 +79,11 @@ def test_what_hangs_does_not_hold_up_the_stop(tmp_path: Path) -> None:
         assert "Traceback" not in server.log
         assert len(re.findall(r"given up: POST /v1/runs, since \d", server.log)) == ANYIO_THREADS
         assert server.log.count("given up: thread 'AnyIO worker thread' at") == ANYIO_THREADS
-        assert "a write to the database does not end within 0.3 s; it is undone" in server.log
-        assert "the evaluator does not stop within 0.3 s" in server.log
+        assert "a database write has not ended within 0.3 s; it is rolled back" in server.log
+        assert "the evaluator has not stopped within 0.3 s" in server.log
 
 
-def test_what_holds_up_the_graceful_stop_itself_is_given_up(tmp_path: Path) -> None:
+def test_a_hanging_event_loop_is_given_up(tmp_path: Path) -> None:
     with stuck(tmp_path / "data", "loop", give_up=1.0) as server:
         with pytest.raises(httpx.ReadTimeout):
             server.client.get("/v1/runs/run_none", timeout=0.5)
@@ -129,9 +129,9 @@ def test_a_server_whose_watchdog_has_died_works_and_stops(tmp_path: Path) -> Non
         assert "WARNING" not in server.log
 
 
-def test_the_steps_take_less_than_the_limits_beyond_them() -> None:
+def test_the_steps_of_the_stop_fit_into_its_limits() -> None:
     limits = StopLimits()
-    slack = shutdown.REPORT_SECONDS + shutdown.LEAVE_SECONDS
+    slack = shutdown.REPORT_SECONDS + shutdown.JOIN_SECONDS
     assert limits.requests + limits.jobs + limits.evaluator + limits.database < limits.give_up
     assert limits.give_up + shutdown.REPORT_SECONDS * 2 + slack < limits.kill
     assert limits.kill + shutdown.REPORT_SECONDS < 30

@@ -25,7 +25,7 @@ from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset
 from wingfit.service.app import create_app
 from wingfit.service.http import csv_text
-from wingfit.service.http.concurrency_limit import Turns
+from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.runs import exports as run_exports
 from wingfit.service.runs.export_schemas import RunExportOut
@@ -234,7 +234,7 @@ def test_only_what_simulates_takes_its_turn(tmp_path: Path) -> None:
 
     app = create_app(Settings(data=tmp_path), engine=Held(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client, ThreadPoolExecutor(1) as pool:
-        api, app.state.service.exports = Api(client), Turns("exports", 1, most_waiting=0)
+        api, app.state.service.exports = Api(client), ConcurrencyLimit("exports", 1, max_waiting=0)
         run = api.finish(api.submit(api.upload()["id"])["id"])["id"]
         held = pool.submit(exported, api, f"runs/{run}", "netcdf")
         try:
@@ -250,13 +250,14 @@ def test_only_what_simulates_takes_its_turn(tmp_path: Path) -> None:
         assert exported(api, f"runs/{run}", "netcdf"), "the turn was given back"
 
 
-def test_a_turn_that_fails_is_given_back() -> None:
+def test_a_slot_of_a_request_that_fails_is_released() -> None:
     async def scene() -> None:
-        turns = Turns(at_once=1, most_waiting=0)
+        limit = ConcurrencyLimit("simulations", 1, max_waiting=0)
         with pytest.raises(ProblemError, match="no run"):
-            async with turns.turn():
+            async with limit.slot():
                 raise ProblemError(404, "not-found", "no run")
-        await asyncio.wait_for(turns.take(), 1)
+        async with asyncio.timeout(1), limit.slot():
+            pass
 
     asyncio.run(scene())
 

@@ -1,7 +1,7 @@
-"""Those who read and watch while a run is computed: one light process, so that it takes little from what it measures.
+"""The load generator: reads and event streams while a run is computed, in one process that takes little itself.
 
-Reads are due at even intervals, whether the server keeps up or not, and each is timed from when it was due. So an
-answer that comes late also delays those that it kept waiting, as for people it would.
+Reads are due at even intervals whether the server keeps up or not (an open loop), and each is timed from when it was
+due. So a late answer also counts for the reads that waited behind it, as it would for users.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)\r", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
-class Crowd:
-    """What is asked of a server until a run ends.
+class Traffic:
+    """Requests to a server until a run ends.
 
     Attributes:
-        port: of the server.
-        run: id of the run that is watched.
-        watchers: number of those who watch it.
+        port: port of the server.
+        run: id of the run whose events are streamed.
+        watchers: number of its event streams.
         rate: reads per second; 0 for none.
-        paths: what is read, one after the other, again and again.
+        paths: paths to read, one after the other, repeated.
     """
 
     port: int
@@ -47,19 +47,19 @@ class Crowd:
 
 
 @dataclass
-class Told:
-    """What the crowd met with.
+class Observed:
+    """What the load generator observed.
 
     Attributes:
-        seconds: that the visit took.
-        reading_seconds: during which reads became due.
-        latencies: of each answer, s, from when it was due; by number of its path.
-        refused: answers that were not 200.
-        unanswered: reads that were due and had no answer in the end.
-        late: the longest that this process itself was late in noticing that a read was due, s.
-        lags: of each generation at each watcher, s.
-        cut: streams that ended before their run.
-        processor_seconds: that this process took.
+        seconds: duration.
+        reading_seconds: time during which reads became due.
+        latencies: number of the path, and time from when the read was due to its answer (s), of each answer.
+        refused: number of answers that were not 200.
+        unanswered: number of reads that were due and got no answer.
+        late: longest delay of this process in noticing that a read was due, s.
+        lags: delay of each generation at each event stream, s.
+        cut: number of event streams that ended before their run.
+        processor_seconds: processor time of this process.
     """
 
     seconds: float = 0.0
@@ -73,136 +73,136 @@ class Told:
     processor_seconds: float = 0.0
 
 
-def visit(crowd: Crowd) -> Told:
-    """Read and watch until the run ends."""
-    began, took = time.monotonic(), time.process_time()
-    told = uvloop.run(asyncio.wait_for(_visit(crowd), LONGEST_SECONDS))
-    told.seconds, told.processor_seconds = time.monotonic() - began, time.process_time() - took
-    return told
+def generate(traffic: Traffic) -> Observed:
+    """Read and stream events until the run ends."""
+    start, took = time.monotonic(), time.process_time()
+    observed = uvloop.run(asyncio.wait_for(_generate(traffic), LONGEST_SECONDS))
+    observed.seconds, observed.processor_seconds = time.monotonic() - start, time.process_time() - took
+    return observed
 
 
-async def _visit(crowd: Crowd) -> Told:
-    told, over = Told(), asyncio.Event()
-    watchers = [Watcher(crowd.port, crowd.run, over) for _ in range(crowd.watchers)]
+async def _generate(traffic: Traffic) -> Observed:
+    observed, over = Observed(), asyncio.Event()
+    watchers = [Watcher(traffic.port, traffic.run, over) for _ in range(traffic.watchers)]
     await asyncio.gather(*(watcher.connect() for watcher in watchers))
-    if crowd.rate:
-        await Reads(crowd, told).go(over)
+    if traffic.rate:
+        await Reads(traffic, observed).go(over)
     await asyncio.gather(*(watcher.ended for watcher in watchers))
     for watcher in watchers:
-        told.lags += watcher.lags()
-        told.cut += watcher.cut
-    return told
+        observed.lags += watcher.lags()
+        observed.cut += watcher.cut
+    return observed
 
 
 # -- reads --------------------------------------------------------------------------------------------------
 
 
 class Reads:
-    """An open loop: reads become due whatever happens to those before."""
+    """An open loop: reads become due independently of earlier answers."""
 
-    def __init__(self, crowd: Crowd, told: Told) -> None:
-        self._crowd, self._told = crowd, told
-        self._requests = [_request(crowd.port, path) for path in crowd.paths]
+    def __init__(self, traffic: Traffic, observed: Observed) -> None:
+        self._traffic, self._observed = traffic, observed
+        self._requests = [_request(traffic.port, path) for path in traffic.paths]
         self._idle: list[_Reader] = []
         self._waiting: deque[tuple[int, float]] = deque()
         self._open, self._opening = 0, set[asyncio.Task[object]]()
         self._number = 0
 
     async def go(self, over: asyncio.Event) -> None:
-        """Read until it is over, then wait a little for the last answers."""
-        self._loop, self._began = asyncio.get_running_loop(), time.monotonic()
+        """Read until ``over`` is set, then wait up to ``LAST_SECONDS`` for the last answers."""
+        self._loop, self._start = asyncio.get_running_loop(), time.monotonic()
         self._tick()
         await over.wait()
         self._next.cancel()
         ended = time.monotonic()
-        self._told.reading_seconds = ended - self._began
-        while len(self._told.latencies) < self._number and time.monotonic() < ended + LAST_SECONDS:
+        self._observed.reading_seconds = ended - self._start
+        while len(self._observed.latencies) < self._number and time.monotonic() < ended + LAST_SECONDS:
             await asyncio.sleep(0.01)
-        self._told.unanswered = self._number - len(self._told.latencies)
+        self._observed.unanswered = self._number - len(self._observed.latencies)
         for reader in list(self._idle):
             reader.close()
 
     def _tick(self) -> None:
-        """Ask what is due by now, and be back when the next is."""
-        now, rate = time.monotonic(), self._crowd.rate
-        while (due := self._began + self._number / rate) <= now:
-            self._told.late = max(self._told.late, now - due)
+        """Send the reads that are due, and schedule the next call."""
+        now, rate = time.monotonic(), self._traffic.rate
+        while (due := self._start + self._number / rate) <= now:
+            self._observed.late = max(self._observed.late, now - due)
             self._waiting.append((self._number, due))
             self._number += 1
         self._send()
-        # The loop rounds to whole milliseconds, and down to none at all.
+        # The event loop rounds delays to whole milliseconds, down to zero.
         self._next = self._loop.call_later(max(due - now, 0.001), self._tick)
 
     def free(self, reader: _Reader) -> None:
-        """``reader`` can ask."""
+        """``reader`` is ready for a request."""
         self._idle.append(reader)
         self._send()
 
-    def lost(self, reader: _Reader, asked: tuple[int, float] | None) -> None:
-        """The server hung up, as it does after some seconds; what was just ``asked`` is asked again, as clients do."""
+    def lost(self, reader: _Reader, request: tuple[int, float] | None) -> None:
+        """The server closed an idle connection; a read just sent on it (``request``) is repeated, as clients do."""
         self._open -= 1
-        if asked:
-            self._waiting.appendleft(asked)
+        if request:
+            self._waiting.appendleft(request)
             self._send()
         else:
             self._idle.remove(reader)
 
     def answered(self, number: int, status: int, seconds: float) -> None:
-        """An answer came, so long after it was due."""
-        self._told.latencies.append((number % len(self._requests), seconds))
-        self._told.refused += status != 200
+        """Note an answer that came ``seconds`` after it was due."""
+        self._observed.latencies.append((number % len(self._requests), seconds))
+        self._observed.refused += status != 200
 
     def _send(self) -> None:
         while self._waiting and self._idle:
             number, due = self._waiting.popleft()
-            self._idle.pop().ask(self._requests[number % len(self._requests)], number, due)
+            self._idle.pop().send(self._requests[number % len(self._requests)], number, due)
         if self._waiting and self._open < CONNECTIONS:
             self._open += 1
             loop = asyncio.get_running_loop()
-            opening = loop.create_task(loop.create_connection(lambda: _Reader(self), "127.0.0.1", self._crowd.port))
+            opening = loop.create_task(loop.create_connection(lambda: _Reader(self), "127.0.0.1", self._traffic.port))
             self._opening.add(opening)
             opening.add_done_callback(self._opening.discard)
 
 
 class _Reader(asyncio.Protocol):
-    """One connection, kept alive."""
+    """One persistent connection."""
 
     def __init__(self, reads: Reads) -> None:
         self._reads = reads
-        self._asked: tuple[int, float] | None = None
+        self._pending: tuple[int, float] | None = None
         self._data = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Be ready."""
+        """Report that the connection is ready."""
         self._transport = cast(asyncio.Transport, transport)
         self._reads.free(self)
 
-    def ask(self, request: bytes, number: int, due: float) -> None:
+    def send(self, request: bytes, number: int, due: float) -> None:
         """Send a request."""
-        self._asked, self._data = (number, due), b""
+        self._pending, self._data = (number, due), b""
         self._transport.write(request)
 
     def data_received(self, data: bytes) -> None:
-        """Take a part of the answer."""
+        """Take a part of the answer, and report it once it is complete."""
         self._data = self._data + data if self._data else data
         status = answered(self._data)
-        if status and self._asked:
-            number, due = self._asked
-            self._asked = None
+        if status and self._pending:
+            number, due = self._pending
+            self._pending = None
             self._reads.answered(number, status, time.monotonic() - due)
             self._reads.free(self)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  as asyncio calls it
-        """Be no more."""
-        self._reads.lost(self, self._asked)
+        """Report that the connection is closed."""
+        self._reads.lost(self, self._pending)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._transport.close()
 
 
 def answered(data: bytes) -> int:
-    """Status of the answer that is in ``data``, 0 while it is not all there."""
+    """The status of the answer in ``data``; 0 while it is incomplete."""
     end = data.find(HEAD_END)
     length = LENGTH.search(data, 0, end + 2) if end > 0 else None
     return int(data[9:12]) if length and len(data) - end - len(HEAD_END) >= int(length[1]) else 0
@@ -212,20 +212,20 @@ def _request(port: int, path: str) -> bytes:
     return f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept: application/json\r\n\r\n".encode()
 
 
-# -- watching -----------------------------------------------------------------------------------------------
+# -- event streams -----------------------------------------------------------------------------------------------
 
 
 class Watcher(asyncio.Protocol):
-    """One who watches a run until its end.
+    """One event stream of a run.
 
-    What is timed is the whole way of a generation: from the end of its computation, which is ``started_at`` of the run
-    and ``elapsed_seconds`` of the generation by the server's clock, over its durable storage, until it is here.
+    It times each generation from the end of its computation (``started_at`` of the run plus ``elapsed_seconds`` of the
+    generation, by the server's clock) through its durable storage to its arrival here.
     """
 
     def __init__(self, port: int, run: str, over: asyncio.Event) -> None:
         self._port, self._run, self._over = port, run, over
         self._data = b""
-        self._came: list[tuple[float, bytes]] = []
+        self._arrived: list[tuple[float, bytes]] = []
         self._live = False
         self._state: dict[str, object] = {}
         self.ended = asyncio.get_running_loop().create_future()
@@ -236,16 +236,16 @@ class Watcher(asyncio.Protocol):
         return self._state.get("state") not in FINAL
 
     async def connect(self) -> None:
-        """Begin to watch."""
+        """Open the connection."""
         await asyncio.get_running_loop().create_connection(lambda: self, "127.0.0.1", self._port)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Ask for the events."""
+        """Request the events."""
         self._transport = cast(asyncio.Transport, transport)
         self._transport.write(_request(self._port, f"/v1/runs/{self._run}/events"))
 
     def data_received(self, data: bytes) -> None:
-        """Note when each event came."""
+        """Note when each event arrived."""
         now = time.time()
         self._data += data
         end = 0
@@ -253,8 +253,8 @@ class Watcher(asyncio.Protocol):
             end = event.end()
             if event[1] == b"state":
                 self._state, self._live = json.loads(event[2]), True
-            elif self._live:  # what was there before is older than the stream
-                self._came.append((now, event[2]))
+            elif self._live:  # earlier generations were computed before the stream start
+                self._arrived.append((now, event[2]))
         self._data = self._data[end:]
         if not self.cut:
             self._transport.close()
@@ -266,9 +266,9 @@ class Watcher(asyncio.Protocol):
             self.ended.set_result(None)
 
     def lags(self) -> list[float]:
-        """How long after it was computed each generation came, s."""
+        """Delay of each generation, from its computation to its arrival, s."""
         started = self._state.get("started_at")
         if not isinstance(started, str):
             return []
-        began = datetime.fromisoformat(started).timestamp()
-        return [came - began - json.loads(data)["elapsed_seconds"] for came, data in self._came]
+        start = datetime.fromisoformat(started).timestamp()
+        return [arrived - start - json.loads(data)["elapsed_seconds"] for arrived, data in self._arrived]
