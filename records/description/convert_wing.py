@@ -111,8 +111,7 @@ def describe_wing(wing: Wing) -> dict[str, object]:
             for s in wing.stations
         ],
         "materials": decimals(
-            foam_density_kg_m3=wing.materials.foam_density,
-            skin_areal_density_kg_m2=wing.materials.skin_areal_density,
+            foam_density_kg_m3=wing.materials.foam_density, skin_areal_density_kg_m2=wing.materials.skin_areal_density
         ),
         "rods": [{"name": rod.name, **_rod(rod)} for rod in wing.rods],
         "driven_rods": list(wing.driven_rods),

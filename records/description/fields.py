@@ -25,19 +25,11 @@ Name = Annotated[
     ),
 ]
 GeneName = Annotated[
-    str,
-    Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'"),
+    str, Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'")
 ]
 _UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
 Title = Annotated[
-    str,
-    Text(
-        rf"[^{_UNPRINTABLE}]+",
-        200,
-        "title",
-        "a title is one line of printable text, not empty",
-        portable=False,
-    ),
+    str, Text(rf"[^{_UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False)
 ]
 Prose = Annotated[
     str,
@@ -54,8 +46,7 @@ Chord = Annotated[Decimal, limits("0.0001", "5", "m", "chord", METRES)]
 Thickness = Annotated[Decimal, limits("0", "0.5", "m", "thickness", "give metres: 0.012, not 12", above=True)]
 Frequency = Annotated[Decimal, limits("0.01", "1000", "Hz", "beats per second")]
 Pressure = Annotated[
-    Decimal,
-    limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325"),
+    Decimal, limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325")
 ]
 Temperature = Annotated[Decimal, limits("-100", "100", "°C", "air temperature", "give degrees Celsius: 20, not 293.15")]
 Estimates = Annotated[

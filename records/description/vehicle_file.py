@@ -30,8 +30,7 @@ RightAngle = Annotated[Decimal, limits("-90", "90", "deg", "angle", _DEGREES)]
 Beats = Annotated[Decimal, limits("0", "0.5", "beats", "part of a beat", "give beats: 0.17, not 17 %", above=True)]
 Mass = Annotated[Decimal, limits("0", "100", "kg", "mass", "give kilograms: 0.0174, not 17.4", above=True)]
 Deviation = Annotated[
-    Decimal,
-    limits("0", "100", "N", "standard deviation of the noise", "give newtons: 0.005, not 5", above=True),
+    Decimal, limits("0", "100", "N", "standard deviation of the noise", "give newtons: 0.005, not 5", above=True)
 ]
 
 
@@ -129,10 +128,7 @@ def _noise_kind(value: Any) -> str:
     return "per_axis" if isinstance(value, Mapping) else "one"
 
 
-Noise = Annotated[
-    Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")],
-    Discriminator(_noise_kind),
-]
+Noise = Annotated[Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")], Discriminator(_noise_kind)]
 
 
 class VehicleRecordingFile(Strict):
@@ -152,6 +148,5 @@ class VehicleRecordingFile(Strict):
     motion: MotionFile | None = Field(None, description="the wings' motion as measured in this recording")
     mass_kg: Mass | None = Field(None, description="the vehicle's mass in this recording, where it differs")
     standard_deviation_n: Noise | None = Field(
-        None,
-        description="known noise: one number, or {x: ..., z: ...} for the axes recorded; leave out if unknown",
+        None, description="known noise: one number, or {x: ..., z: ...} for the axes recorded; leave out if unknown"
     )

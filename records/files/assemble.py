@@ -145,9 +145,7 @@ def _check_shapes(recording: Recording, faults: Faults) -> None:
         if np.shape(array) != shape or np.asarray(array).dtype != np.float64:
             found = f"{np.asarray(array).dtype} {list(np.shape(array))}"
             faults.add(
-                f"{where}: {name}",
-                found,
-                f"is {found}; it must be float64 {list(shape)}: convert or transpose it",
+                f"{where}: {name}", found, f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
             )
 
 

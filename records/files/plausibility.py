@@ -34,9 +34,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not MIN_FRAMES <= frames <= MAX_ROWS:
         faults.add(
-            where,
-            frames,
-            f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or cut in parts",
+            where, frames, f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or cut in parts"
         )
     if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= MAX_MARKERS:
         faults.add(where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {MAX_MARKERS}")

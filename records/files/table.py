@@ -24,19 +24,7 @@ from wingfit.records.limits import MAX_ROWS, MAX_VALUES, MIN_FRAMES
 
 Array = npt.NDArray[np.float64]
 _SUSPICIOUS = re.compile(r"[^0-9eE+\-., \r\n]")
-_TIMES = {
-    "time",
-    "t",
-    "t_s",
-    "times",
-    "time_ms",
-    "time_us",
-    "seconds",
-    "frame",
-    "frames",
-    "timestamp",
-    "time_min",
-}
+_TIMES = {"time", "t", "t_s", "times", "time_ms", "time_us", "seconds", "frame", "frames", "timestamp", "time_min"}
 _MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/a"}
 
 
@@ -154,9 +142,7 @@ def _rows(
     matrix = np.frombuffer(numbers, dtype=np.float64).reshape(-1, width)
     for index, column in np.argwhere(np.isinf(matrix))[:10]:
         faults.add(
-            f"{file}, line {lines[index]}, column {header[column]!r}",
-            None,
-            "is too large for a number; check its unit",
+            f"{file}, line {lines[index]}, column {header[column]!r}", None, "is too large for a number; check its unit"
         )
     faults.raise_any()
     return matrix, np.array(lines, dtype=np.int64)

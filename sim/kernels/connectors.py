@@ -117,10 +117,7 @@ def relative_twist(
 @inlined
 def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Three, Three]:
     """Moment and force with which the damper resists (thesis Eq. 4)."""
-    return (
-        (do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]),
-        (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]),
-    )
+    return ((do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]), (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]))
 
 
 @inlined

@@ -222,11 +222,7 @@ def add_mass_terms(
         add_wrench(
             wrench,
             i,
-            (
-                a[0] + e[0] + f[0] - q[0] - r[0],
-                a[1] + e[1] + f[1] - q[1] - r[1],
-                a[2] + e[2] + f[2] - q[2] - r[2],
-            ),
+            (a[0] + e[0] + f[0] - q[0] - r[0], a[1] + e[1] + f[1] - q[1] - r[1], a[2] + e[2] + f[2] - q[2] - r[2]),
             (b[0] + g[0] - s[0], b[1] + g[1] - s[1], b[2] + g[2] - s[2]),
         )
     for k in range(weighing, len(pairs)):

@@ -75,12 +75,7 @@ def coupling_tangent(N: Nine, d: Three) -> Six:
 @inlined
 def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
     """B: g and ``turning`` are B's velocity and angular velocity, ``omega`` A's angular velocity, all in A's axes."""
-    return (
-        scaled(-1.0, skew(turning)),
-        scaled(0.0, skew(g)),
-        scaled(-1.0, skew(g)),
-        scaled(-1.0, skew(omega)),
-    )
+    return (scaled(-1.0, skew(turning)), scaled(0.0, skew(g)), scaled(-1.0, skew(g)), scaled(-1.0, skew(omega)))
 
 
 @inlined
@@ -112,12 +107,7 @@ def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
 def moved(e: Three, A: Six, g: Three) -> Six:
     """E(e) A E(g)^T: both sides taken to other points."""
     a, c = plus(A[0], skew_times(e, A[2])), plus(A[1], skew_times(e, A[3]))
-    return (
-        plus(a, scaled(-1.0, times_skew(c, g))),
-        c,
-        plus(A[2], scaled(-1.0, times_skew(A[3], g))),
-        A[3],
-    )
+    return (plus(a, scaled(-1.0, times_skew(c, g))), c, plus(A[2], scaled(-1.0, times_skew(A[3], g))), A[3])
 
 
 @inlined

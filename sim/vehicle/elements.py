@@ -150,15 +150,7 @@ def _element_forces(
             z6 -= (ax * ct - az * st) * mw
             ct, st = ct * step_ct - st * step_st, st * step_ct + ct * step_st
         projection = load(motion, PROJECTION, g) * (side.sign * dr)  # Eq. 15
-        for row, x, z in (
-            (0, x0, z0),
-            (1, x1, z1),
-            (2, x2, z2),
-            (3, x3, z3),
-            (4, x4, z4),
-            (5, x5, z5),
-            (6, x6, z6),
-        ):
+        for row, x, z in ((0, x0, z0), (1, x1, z1), (2, x2, z2), (3, x3, z3), (4, x4, z4), (5, x5, z5), (6, x6, z6)):
             store3(out, row, 0, g, load3(out, row, 0, g) + x * dr)
             store3(out, row, 1, g, load3(out, row, 1, g) + z * projection)
 

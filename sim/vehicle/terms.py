@@ -59,13 +59,7 @@ TERMS = {
             ARMANINI,
             "circulation of two wings that peel apart, instead of rotational circulation, until they stop pitching",
         ),
-        Term(
-            "added_mass",
-            (),
-            "Eqs. 9, 10",
-            ARMANINI,
-            "air accelerated with the wing",
-        ),
+        Term("added_mass", (), "Eqs. 9, 10", ARMANINI, "air accelerated with the wing"),
         Term(
             "effective_chord",
             (),

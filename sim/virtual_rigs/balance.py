@@ -182,10 +182,7 @@ def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator
 
 
 def campaign(
-    seed: int = 1,
-    balance: Balance | None = None,
-    trials: Sequence[Trial] = TRIALS,
-    held_out: tuple[str, ...] = (),
+    seed: int = 1, balance: Balance | None = None, trials: Sequence[Trial] = TRIALS, held_out: tuple[str, ...] = ()
 ) -> Dataset:
     """Record ``trials`` on the balance; the same seed gives the same noise."""
     vehicle = delfly()

@@ -367,12 +367,7 @@ def _named(structure: Structure, sums: _Sums) -> tuple[ConnectorLoad, ...]:
 def _strips(structure: Structure, sums: _Sums) -> tuple[Strip, ...]:
     edges = structure.planform.strips(structure.division)
     return tuple(
-        Strip(
-            f"strip {s + 1}",
-            (float(edges[s]), float(edges[s + 1])),
-            sums.strip_force[:, s],
-            sums.strip_power[:, s],
-        )
+        Strip(f"strip {s + 1}", (float(edges[s]), float(edges[s + 1])), sums.strip_force[:, s], sums.strip_power[:, s])
         for s in range(len(edges) - 1)
     )
 
