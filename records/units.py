@@ -51,11 +51,6 @@ def from_si(value: float, unit: Unit = SI) -> Decimal:
     return next((candidate for candidate in candidates if _same(to_si(candidate, unit), value)), exact)
 
 
-def decimals(**values: float) -> dict[str, Decimal]:
-    """Values that are SI in the file too, as exact decimals."""
-    return {key: from_si(value) for key, value in values.items()}
-
-
 def number_text(value: Decimal) -> str:
     """``value`` as text that YAML 1.1 and 1.2 readers alike take for a number."""
     text = repr(float(value))

@@ -14,7 +14,7 @@ from wingfit.cli.base.output import note, number, say, table
 from wingfit.cli.loads import COLOURS
 from wingfit.client.client import WingfitError
 from wingfit.records import Condition, DatasetError, Recording, WingMotion
-from wingfit.records.description.convert_vehicle import describe_recording
+from wingfit.records.description.convert import describe_recording
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.tracking.smoothing import PeriodicFit
 from wingfit.tracking.tables import Table, header_of, read_table, require

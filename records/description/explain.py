@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from collections.abc import Mapping
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wingfit.records.description.consistency import inconsistencies
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile, WingDatasetFile, model_of
+from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.quantity import FAULT, kind
 from wingfit.records.description.yaml_text import Document, Path
 from wingfit.records.errors import Faults, fail, nearest
@@ -81,7 +82,7 @@ class _Explainer:
         if what == "extra_forbidden":
             return self._unknown_key(location)
         if what == "union_tag_not_found":
-            kinds = " or ".join(str(_kind(model)) for model in _models(self.root, location))
+            kinds = " or ".join(str(tag_of(model)) for model in _models(self.root, location))
             return f"the key 'kind' is missing; it must be {kinds}"
         return _plain_message(error)
 
@@ -139,24 +140,10 @@ def _models(root: type[BaseModel], location: Location) -> list[type[BaseModel]]:
     for part in location:
         fields = [model.model_fields[str(part)] for model in models if str(part) in model.model_fields]
         if fields:
-            models = [model for field in fields for model in _inside(field.annotation)]
+            models = [model for field in fields for model in models_in(field.annotation)]
         else:
-            models = [model for model in models if _kind(model) == part] or models
+            models = [model for model in models if tag_of(model) == part] or models
     return models
-
-
-def _inside(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models within a type such as ``list[Model] | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for argument in get_args(annotation):
-        yield from _inside(argument)
-
-
-def _kind(model: type[BaseModel]) -> str | None:
-    """The tag of a model in a union."""
-    field = model.model_fields.get("kind")
-    return str(get_args(field.annotation)[0]) if field else None
 
 
 def _path(error: ErrorDetails, data: Any) -> Path:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from wingfit.records.description.quantity import Text, fault, limits
-from wingfit.records.drive import FourierDrive
 from wingfit.records.limits import MAX_ESTIMATES, MAX_HARMONICS
-from wingfit.records.units import DEG, from_si, to_si
-from wingfit.records.vehicle import FourierFlap, FourierPitch
 
 METRES = "give metres: 0.22, not 220 or 22"
 
@@ -76,20 +74,19 @@ class FourierFile(Strict):
             raise fault(f"cosine_deg has {cosines} entries and sine_deg {sines}; give as many of each: fill up with 0")
         return self
 
-    def radians(self) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-        """Mean, cosine and sine terms in rad."""
-        cosine, sine = (tuple(to_si(value, DEG) for value in terms) for terms in (self.cosine_deg, self.sine_deg))
-        return to_si(self.mean_deg, DEG), cosine, sine
+
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models within a type such as ``list[Model] | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from models_in(argument)
 
 
-def fourier_data(series: FourierDrive | FourierFlap | FourierPitch) -> dict[str, object]:
-    """``series`` as the plain data of ``dataset.yaml``."""
-    return {
-        "kind": series.kind,
-        "mean_deg": from_si(series.mean, DEG),
-        "cosine_deg": [from_si(value, DEG) for value in series.cosine],
-        "sine_deg": [from_si(value, DEG) for value in series.sine],
-    }
+def tag_of(model: type[BaseModel]) -> str | None:
+    """The value of the key ``kind`` that selects ``model`` in a union; None for a model without that key."""
+    field = model.model_fields.get("kind")
+    return str(get_args(field.annotation)[0]) if field else None
 
 
 def whole(value: Any) -> Any:

@@ -7,11 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from wingfit.records.dataset import Dataset, Recording
-from wingfit.records.description import convert_vehicle, convert_wing
-from wingfit.records.description.dataset_file import VehicleDatasetFile
+from wingfit.records.description.convert import RecordingFile, describe_recording, describe_rig, to_recording, to_rig
 from wingfit.records.description.explain import check_description
-from wingfit.records.description.vehicle_file import VehicleRecordingFile
-from wingfit.records.description.wing_file import WingRecordingFile
 from wingfit.records.description.yaml_text import Document
 from wingfit.records.errors import DatasetError, Faults, nearest
 from wingfit.records.files.forces import AXES
@@ -35,13 +32,9 @@ def assemble(
     collected.
     """
     checked = check_description(document)
-    rig: Wing | Vehicle
-    if isinstance(checked, VehicleDatasetFile):
-        rig = convert_vehicle.to_vehicle(checked.vehicle)
-    else:
-        rig = convert_wing.to_wing(checked.wing)
+    rig = to_rig(checked)
     faults, recordings = Faults(), list[Recording]()
-    entries: Sequence[WingRecordingFile | VehicleRecordingFile] = checked.recordings
+    entries: Sequence[RecordingFile] = checked.recordings
     for index, entry in enumerate(entries):
         try:
             samples = read(entry.name, room)
@@ -49,12 +42,7 @@ def assemble(
             faults.extend(error)
             continue
         room -= samples.values.size + samples.times.size
-        path = ("recordings", index)
-        recording = (
-            convert_wing.to_recording(entry, samples, document, path, faults)
-            if isinstance(entry, WingRecordingFile)
-            else convert_vehicle.to_recording(entry, samples, document, path, faults)
-        )
+        recording = to_recording(entry, samples, document, ("recordings", index), faults)
         check_numbers(
             recording,
             rig,
@@ -99,19 +87,12 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
 
 def describe(dataset: Dataset) -> dict[str, object]:
     """``dataset`` without its numbers, as the plain data of ``dataset.yaml``."""
-    rig: dict[str, object]
-    if isinstance(dataset.rig, Vehicle):
-        rig = {"vehicle": convert_vehicle.describe_vehicle(dataset.rig)}
-        recordings = [convert_vehicle.describe_recording(recording) for recording in dataset.recordings]
-    else:
-        rig = {"wing": convert_wing.describe_wing(dataset.rig)}
-        recordings = [convert_wing.describe_recording(recording) for recording in dataset.recordings]
     return {
         "format_version": FORMAT_VERSION,
         "name": dataset.name,
         **({"description": dataset.description} if dataset.description else {}),
-        **rig,
-        "recordings": recordings,
+        "vehicle" if isinstance(dataset.rig, Vehicle) else "wing": describe_rig(dataset.rig),
+        "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
     }
 
