@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.vehicle import Vehicle, WingMotion
 from wingfit.records.wing import Wing
 
@@ -68,17 +68,17 @@ class Recording:
     name: str
     rig: Rig
     condition: Condition
-    times: npt.NDArray[np.float64]
+    times: Array
     markers: tuple[str, ...]
-    values: npt.NDArray[np.float64]
-    standard_deviation: npt.NDArray[np.float64] | None = None
+    values: Array
+    standard_deviation: Array | None = None
     forces: tuple[ForceAxis, ...] = ()
     low_pass: LowPass | None = None
     motion: WingMotion | None = None
     mass: float | None = None
 
     @cached_property
-    def valid(self) -> npt.NDArray[np.bool_]:
+    def valid(self) -> Mask:
         """True where a channel was recorded, [T, C]."""
         return np.isfinite(self.values)
 
@@ -94,7 +94,7 @@ class Recording:
         return tracks + tuple(f"force_{axis}" for axis in self.forces)
 
     @property
-    def positions(self) -> npt.NDArray[np.float64]:
+    def positions(self) -> Array:
         """``values`` of a recording of tracks as [T, M, 3]."""
         return self.values.reshape(len(self.times), len(self.markers), 3)
 

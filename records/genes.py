@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from wingfit.records.array_types import Array, ArrayLike
 
 Scale = Literal["log", "linear"]
 
@@ -51,14 +52,14 @@ class Gene:
                 f"gene '{self.name}' is {value:g}{unit}; it must lie in [{self.lower:g}, {self.upper:g}]{unit}"
             )
 
-    def to_unit(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def to_unit(self, value: ArrayLike) -> Array:
         """Map values to [0, 1], logarithmically for a log-scaled gene."""
         v = np.asarray(value, float)
         if self.scale == "log":
             return np.log(v / self.lower) / math.log(self.upper / self.lower)
         return (v - self.lower) / (self.upper - self.lower)
 
-    def from_unit(self, u: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def from_unit(self, u: ArrayLike) -> Array:
         """Inverse of :meth:`to_unit`; the result never leaves the bounds."""
         x = np.asarray(u, float)
         if self.scale == "log":

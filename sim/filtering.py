@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt, sosfreqz
 
 from wingfit.records import LowPass, Recording
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.records.limits import UNEVEN_STEPS
-
-Array = npt.NDArray[np.float64]
 
 CUTOFF_HARMONIC = 3.2  # the seed's 40 Hz at 12.5 beats per second: just above the third harmonic
 ENDS = 2.0  # periods of the cutoff that a filter needs to settle, at either end
@@ -66,7 +64,7 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     return replace(recording, values=values, low_pass=low_pass)
 
 
-def gain(low_pass: LowPass, rate: float, frequency: npt.ArrayLike) -> Array:
+def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:
     """Gain (real: no phase) at ``frequency`` (Hz) of the filter as it works on samples taken at ``rate`` (Hz).
 
     Above half the rate there is nothing to filter: a model's harmonics there would be aliases, and get none.

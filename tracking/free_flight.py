@@ -12,17 +12,16 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 from scipy import interpolate
 
 from wingfit.records import Condition, LowPass, Recording
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import STANDARD_GRAVITY
 from wingfit.records.limits import UNEVEN_STEPS
 from wingfit.tracking.rigid_body import Poses, poses, quaternions, scale_remarks
 from wingfit.tracking.zero_phase import Kernels, kernels
 
-Array = npt.NDArray[np.float64]
 _CHUNK = 512
 _LAGS = 50
 _FASTEST = 100.0  # m/s, as in a dataset
@@ -202,11 +201,11 @@ class _Bridge:
     """A frame without a pose, put together from frames ``near`` with ``weights``."""
 
     frame: int
-    near: npt.NDArray[np.int64]
+    near: Index
     weights: Array
 
 
-def _bridges(known: npt.NDArray[np.bool_], longest: int) -> list[_Bridge]:
+def _bridges(known: Mask, longest: int) -> list[_Bridge]:
     """Cubic interpolation over gaps of at most ``longest`` frames."""
     rows, found = np.flatnonzero(known), []
     for before, after in pairwise(rows.tolist()):
@@ -219,7 +218,7 @@ def _bridges(known: npt.NDArray[np.bool_], longest: int) -> list[_Bridge]:
     return found
 
 
-def _spread_over(taps: Array, rows: npt.NDArray[np.int64], bridges: list[_Bridge]) -> Array:
+def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
     """Taps [rows, 2 n + 1] on frames that have a pose: those on bridged frames go to the frames behind them."""
     n, spread = len(taps) // 2, np.tile(taps, (len(rows), 1))
     for bridge in bridges:
@@ -356,7 +355,7 @@ def _deviation(
     return result * noise.deviation * noise.common
 
 
-def _chunks(rows: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
+def _chunks(rows: Index) -> Iterator[Index]:
     for start in range(0, len(rows), _CHUNK):
         yield rows[start : start + _CHUNK]
 

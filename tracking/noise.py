@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import optimize
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 BLOCK = 400
 BLOCKS = 4

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 _FLAT = 0.02
 """Markers whose second extent is below this share of their first lie on a line: no attitude about it."""
 _OUTLIER = 8.0

@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy import special, stats
 
+from wingfit.records.array_types import Array, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.noise import LinearFit, Noise, least_squares, products
-
-Array = npt.NDArray[np.float64]
 
 DERIVATIVES = 3
 MOST_HARMONICS = 30
@@ -178,7 +176,7 @@ def _most_harmonics(phase: Array) -> int:
     return most
 
 
-def _predictions(phase: Array, values: Array, groups: npt.NDArray[np.int64], most: int) -> tuple[float, ...]:
+def _predictions(phase: Array, values: Array, groups: Index, most: int) -> tuple[float, ...]:
     """RMS error of predicting each group from the others, for 1 to ``most`` harmonics."""
     X, y = basis(phase, most), values - values.mean()
     parts = [(X[groups == g], y[groups == g]) for g in np.unique(groups)]
@@ -199,9 +197,7 @@ def _predictions(phase: Array, values: Array, groups: npt.NDArray[np.int64], mos
     return tuple(scores)
 
 
-def _between_beats(
-    phase: Array, linear: LinearFit, group: npt.NDArray[np.int64], beats: int
-) -> tuple[Array, tuple[str, ...]]:
+def _between_beats(phase: Array, linear: LinearFit, group: Index, beats: int) -> tuple[Array, tuple[str, ...]]:
     """Covariance of the coefficients, raised per harmonic where beats differ by more than the noise explains.
 
     Wings that do not repeat themselves give scatter at the very harmonics, which stationary noise misses; the scatter
@@ -252,7 +248,7 @@ def _lost(wide: LinearFit, kept: int, frequency: float) -> Array:
     return lost
 
 
-def _fall_off(k: npt.NDArray[np.int64], amplitude: Array, error: Array) -> tuple[float, float] | None:
+def _fall_off(k: Index, amplitude: Array, error: Array) -> tuple[float, float] | None:
     """Envelope C k^-q of the harmonics seen beyond the first; None with fewer than three of them.
 
     q is at least 3: the rate of a wing with mass cannot jump, and a jump of the acceleration falls off as k^-3.

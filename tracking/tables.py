@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.errors import Faults, decode, fail, nearest, shown
 from wingfit.records.limits import MAX_ROWS
 
-Array = npt.NDArray[np.float64]
 _NAMED = 6
 
 

@@ -12,15 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy import optimize, stats
 
 from wingfit.records import FourierFlap, FourierPitch, PassivePitch, WingMotion
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.noise import least_squares, products
 from wingfit.tracking.smoothing import PeriodicFit, basis, fit_periodic
 
-Array = npt.NDArray[np.float64]
 PitchKind = Literal["fourier", "passive"]
 _FEWEST_BEATS = 1.5
 _STILL = 1e-6

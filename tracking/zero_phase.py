@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import signal
 
 from wingfit.records import LowPass
+from wingfit.records.array_types import Array
 
-Array = npt.NDArray[np.float64]
 _LENGTH = 8192
 _TAIL = 1e-4
 

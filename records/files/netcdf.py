@@ -21,8 +21,8 @@ from typing import Any, BinaryIO, NamedTuple
 import h5netcdf
 import h5py
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset, Recording
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
@@ -43,7 +43,6 @@ from wingfit.records.limits import (
 )
 
 FORMAT = "wingfit dataset"
-Array = npt.NDArray[np.float64]
 BLOCK = 2**20  # numbers
 # Filters that come with h5py, each of which may be in a variable's pipeline once.
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF}

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset
 from wingfit.records.description.yaml_text import read_yaml
 from wingfit.records.errors import DatasetError, fail
@@ -35,8 +35,6 @@ BLOCK = 2**17  # numbers that are packed at a time
 _END, _END_OF_LARGE = struct.Struct("<4s4H2LH"), b"PK\6\7"
 LONGEST_ENTRY = 1024  # bytes of an entry in the directory: its name, and 46
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

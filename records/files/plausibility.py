@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
 from wingfit.records.limits import (
@@ -22,7 +22,6 @@ from wingfit.records.limits import (
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
 
-Array = npt.NDArray[np.float64]
 Locate = Callable[[int], str]
 _SHOWN = 3
 ABSURD = 1e6  # weights: no unit makes a force of one weight so large a number

@@ -15,14 +15,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.records.dataset import ForceAxis
 from wingfit.records.description.yaml_text import NUMBER
 from wingfit.records.errors import DatasetError, Faults, decode, fail, shown
 from wingfit.records.limits import MAX_ROWS, MAX_VALUES, MIN_FRAMES
 
-Array = npt.NDArray[np.float64]
 _SUSPICIOUS = re.compile(r"[^0-9eE+\-., \r\n]")
 _TIMES = {"time", "t", "t_s", "times", "time_ms", "time_us", "seconds", "frame", "frames", "timestamp", "time_min"}
 _MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/a"}
@@ -37,7 +36,7 @@ class Samples:
 
     times: Array
     values: Array
-    lines: npt.NDArray[np.int64]
+    lines: Index
     markers: tuple[str, ...] = ()
     forces: tuple[ForceAxis, ...] = ()
 
@@ -118,7 +117,7 @@ def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
 
 def _rows(
     reader: Iterable[list[str]], header: Sequence[str], file: str, room: int, gap: str | None
-) -> tuple[Array, npt.NDArray[np.int64]]:
+) -> tuple[Array, Index]:
     """Read all rows as numbers [T, columns], and their lines. No ``gap``: the text holds no letters, no 'nan'."""
     convert: Callable[[list[str]], list[float]] = _fast if gap is None else _strict
     numbers, lines, width, faults = array("d"), array("q"), len(header), Faults()

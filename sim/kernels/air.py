@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import (
     ALPHA,
@@ -39,8 +39,6 @@ from wingfit.sim.kernels.jit import allocating, kernel
 from wingfit.sim.kernels.lanes.lanewise import angle
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 REVERSAL = math.sin(math.radians(15.0))
 STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 

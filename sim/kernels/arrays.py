@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.lanes.memory import aligned, several
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 STAGES = 6
 # Ports through which power enters the wing.

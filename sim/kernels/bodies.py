@@ -8,13 +8,11 @@ R = R0 exp(theta~), p = p0 + R0 d. Wrenches [N, 6, W] are (tau, F) in the body f
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import Three, cross
 from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel
@@ -115,7 +113,7 @@ def kinetic_and_height(
 
 
 @kernel
-def track(markers: Array, carrier: npt.NDArray[np.int64], R: Array, p: Array, out: Array) -> None:
+def track(markers: Array, carrier: Index, R: Array, p: Array, out: Array) -> None:
     """World positions [M, 3, W] of markers carried at ``markers`` [M, 3] in the frames of bodies ``carrier`` [M]."""
     for m in range(len(carrier)):
         n = carrier[m]

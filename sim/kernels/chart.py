@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import State
 from wingfit.sim.kernels.jit import inlined, kernel
-
-Array = npt.NDArray[np.float64]
 
 LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
 

@@ -9,9 +9,7 @@ minus their gradient; that on A balances it: force and moment vanish in sum, the
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
@@ -29,9 +27,6 @@ from wingfit.sim.kernels.lanes.matrices import (
     transposed,
 )
 from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 @kernel

@@ -10,8 +10,8 @@ step's start.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.air import strip_flow, strip_forces
 from wingfit.sim.kernels.arrays import (
@@ -42,8 +42,6 @@ from wingfit.sim.kernels.motor import give_way, rods_of
 from wingfit.sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
 from wingfit.sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
 from wingfit.sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
-
-Array = npt.NDArray[np.float64]
 
 GAMMA = 0.25
 NODES = np.array([0.0, 0.75, 0.321448134013046, 0.519745732277726, 1.0, 1.0])
@@ -271,7 +269,7 @@ def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
 
 
 @allocating
-def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
+def finish_step(work: Work, state: State, alive: Mask) -> None:
     """Take the step; a lane that turned too far or is no number any more is dead."""
     _to_stage(work, state, STAGES)
     state.R[:] = work.R
@@ -294,7 +292,7 @@ def advance(
     work: Work,
     state: State,
     trace: Trace,
-    alive: npt.NDArray[np.bool_],
+    alive: Mask,
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 

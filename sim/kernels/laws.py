@@ -14,17 +14,15 @@ import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CLOCK, FLOW, GEOMETRY, LOADS
 from wingfit.sim.kernels.jit import callback, inlined
 
-Array = npt.NDArray[np.float64]
 Law = Callable[[Any, int], None]
 
 BEFORE, AFTER = 0, 1

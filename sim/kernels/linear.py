@@ -10,14 +10,9 @@ subtract.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 @kernel

@@ -16,9 +16,7 @@ All of it enters as inertia: fed back as a force, air that outweighs the wing wo
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.connectors import add_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
@@ -37,8 +35,6 @@ from wingfit.sim.kernels.lanes.matrices import (
 )
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 Six = tuple[Nine, Nine, Nine, Nine]
 
 

@@ -12,14 +12,10 @@ last three.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import DECAY, Work
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
 
 DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 

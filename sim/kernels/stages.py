@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.bodies import body_rate
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.matrices import cross, load_vector
 from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel

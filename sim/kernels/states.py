@@ -9,15 +9,11 @@ little within a step: theirs is U_z = theta r_z.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
 from wingfit.sim.kernels.connectors import add_turned, push_apart, twists
 from wingfit.sim.kernels.jit import allocating, kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel

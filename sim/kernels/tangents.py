@@ -16,9 +16,7 @@ each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gam
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
@@ -50,8 +48,6 @@ from wingfit.sim.kernels.lanes.matrices import (
 )
 from wingfit.sim.kernels.lanes.vector import load, load1, store
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 Six = tuple[Nine, Nine, Nine, Nine]  # moment-rotation, moment-translation, force-rotation, force-translation
 
 

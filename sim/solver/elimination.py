@@ -9,10 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Index = npt.NDArray[np.int64]
-
+from wingfit.records.array_types import ArrayLike, Index
 
 _NONE: frozenset[tuple[int, int]] = frozenset()
 
@@ -90,5 +88,5 @@ def _minimum_degree(n: int, pairs: set[tuple[int, int]]) -> list[tuple[int, list
     return columns
 
 
-def _index(values: npt.ArrayLike) -> Index:
+def _index(values: ArrayLike) -> Index:
     return np.asarray(values, np.int64)

@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import State
 from wingfit.sim.kernels.chart import coordinates, displaced
-
-Array = npt.NDArray[np.float64]
 
 # A leap after which a beat changes this many times as much as before is taken back. Not less: a mode n times as fast as
 # the beat changes by up to n times as much where it is caught moving as where it is caught bent.

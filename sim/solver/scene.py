@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.atmosphere import density
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import PORTS, STAGES, Setting, State, Trace
@@ -16,8 +16,6 @@ from wingfit.sim.kernels.lanes.memory import aligned, zeros
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.wing.drive import RodDrive
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 
 def drive_table(

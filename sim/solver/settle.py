@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import State, Trace, new_work
@@ -19,8 +19,6 @@ from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.solver.periodic import Secants
 from wingfit.sim.solver.scene import at_rest, drive_table, new_trace
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 GROWING = 16  # beats after which the fastest growing part of what is left stands out
 ROUND_OFF = 1e-12  # m: what is left of a transient that has died, and neither grows nor falls

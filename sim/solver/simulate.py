@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import State, Trace
 from wingfit.sim.solver.numerics import LADDER, Numerics, estimated_error
 from wingfit.sim.solver.scene import new_trace
 from wingfit.sim.solver.settle import Course, Subject, beside, measure_growth, settle
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 FLUTTER = 1.02  # growth of a disturbance in a beat beyond which a periodic motion is none that a wing keeps
 MORE = 1.5  # times as many steps, for individuals that fail beside another and from rest

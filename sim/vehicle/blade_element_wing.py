@@ -14,9 +14,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import EstimateError, Gene, Recording, Vehicle
+from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects import registry
 from wingfit.sim.effects.apply import apply, observed
@@ -30,9 +30,6 @@ from wingfit.sim.vehicle.motion import motion_genes
 from wingfit.sim.vehicle.rows import mirrored
 from wingfit.sim.vehicle.sampling import passed, passing, phases, series_of, turns
 from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
-
-Array = npt.NDArray[np.float64]
-Places = npt.NDArray[np.intp]
 
 ADDED_MASS_POINT = 0.5  # d, chords: where the added mass's acceleration is taken (Armanini et al. 2016, below Eq. 19)
 _KEPT = 64  # motions whose elements are remembered, per recording
@@ -105,7 +102,7 @@ class BladeElementWing:
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
 
     @one_blas_thread
-    def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
+    def beat(self, genomes: ArrayLike, recording: Recording) -> Array:
         """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
         batch = genome_batch(self.genes, genomes)
         out = np.empty((len(batch), 2, self.instants))
@@ -121,7 +118,7 @@ class BladeElementWing:
                     out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
         return out.transpose(0, 2, 1)
 
-    def term_forces(self, genome: npt.ArrayLike, recording: Recording) -> dict[str, Array]:
+    def term_forces(self, genome: ArrayLike, recording: Recording) -> dict[str, Array]:
         """Forces [n, 2] of each term (N), and of the effects beside them; together they are :meth:`beat`."""
         batch = genome_batch(self.genes, np.asarray(genome, float)[None])
         ((effects, _),) = self._alike(batch)
@@ -137,7 +134,7 @@ class BladeElementWing:
         return parts
 
     @one_blas_thread
-    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+    def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
         """Forces [B, T, C] of ``genomes`` [B, G] at the recording's instants and along its axes, low-passed like it."""
         if recording.kind != "forces":
             raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
@@ -160,7 +157,7 @@ class BladeElementWing:
 
     # -- effects -----------------------------------------------------------------------------------------------
 
-    def _alike(self, batch: Array) -> list[tuple[tuple[Effect, ...], Places]]:
+    def _alike(self, batch: Array) -> list[tuple[tuple[Effect, ...], Index]]:
         """Individuals in groups for which the same effects on the vehicle are on."""
         acting = [effect for effect in self.chosen if effect.vehicle]
         on = [~effect.off(effect.values(self.genes, batch)) for effect in acting]
@@ -179,7 +176,7 @@ class BladeElementWing:
         scene.settle()
         return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
 
-    def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Places, Sampling]:
+    def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
         """Individuals for whom an effect on the observation is on, and what the balance makes of their ``beat``."""
         effects = observed(self.chosen, self.genes, batch, "forces")
         on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
@@ -301,7 +298,7 @@ class BladeElementWing:
     def _harmonics(self) -> int:
         return (self.instants - 1) // 2
 
-    def _basis(self, recording: Recording) -> tuple[Array, npt.NDArray[np.int64]]:
+    def _basis(self, recording: Recording) -> tuple[Array, Index]:
         """Cosines and sines [K, T] at the recording's instants, and their places in a series: only what passes."""
         wanted = passing(recording, self._harmonics)
         if self._last_basis.get("recording") is not recording:

@@ -10,13 +10,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import Vector, load, load3, root, store3
-
-Array = npt.NDArray[np.float64]
 
 ROWS = ("inertial", "translation", "rotation", "added_mass", "viscous_0", "viscous_90", "wing_acceleration")
 CURVE_ROWS = ("lift_curve", "drag_curve")

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import FORWARD, Side
 from wingfit.sim.vehicle.stations import (
@@ -18,8 +18,6 @@ from wingfit.sim.vehicle.stations import (
     station_turns,
     station_velocities,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass

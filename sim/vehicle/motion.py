@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Flap, FourierFlap, FourierPitch, Gene, PassivePitch, Pitch, SplitCycleFlap, WingMotion
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+from wingfit.records.array_types import Array, Complex
 
 HARMONICS = 100  # of the split cycle, before its smoothing
 SPLITS = (-12.0, 2.5)  # rad per beat: the wings open for 17 to 83 % of it

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Vehicle
+from wingfit.records.array_types import Array
 from wingfit.sim.vehicle.elements import (
     COSINE,
     DIHEDRAL,
@@ -24,8 +24,6 @@ from wingfit.sim.vehicle.elements import (
     Side,
 )
 from wingfit.sim.vehicle.motion import Angles
-
-Array = npt.NDArray[np.float64]
 
 ROW_COUNT = 14
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.filtering import gain, low_passed, sampling_rate
-
-Array = npt.NDArray[np.float64]
-Places = npt.NDArray[np.int64]
 
 _NEGLIGIBLE = 1e-9  # of the largest: harmonics below are left out
 
@@ -29,8 +26,8 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
     return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
 
 
-def passing(recording: Recording, harmonics: int) -> Places:
-    """Places in such a series of the harmonics up to the last that the recording's low-pass lets through."""
+def passing(recording: Recording, harmonics: int) -> Index:
+    """Index in such a series of the harmonics up to the last that the recording's low-pass lets through."""
     k = np.arange(harmonics + 1)
     if recording.low_pass:
         rate = sampling_rate(recording)
@@ -44,7 +41,7 @@ def phases(recording: Recording, times: Array) -> Array:
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
-def turns(places: Places, harmonics: int, recording: Recording) -> Array:
+def turns(places: Index, harmonics: int, recording: Recording) -> Array:
     """Cosines, then sines [K, T] at ``places`` of a series, at the recording's instants."""
     psi = phases(recording, recording.times)
     cosines, sines = places[places <= harmonics], places[places > harmonics] - harmonics

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import Vector, greatest, least, load0, load1, magnitude, root, store0, store1
 from wingfit.sim.vehicle.elements import STILL
-
-Array = npt.NDArray[np.float64]
 
 _SLOWEST = 1e-9  # least decay of a state in a step: in still air it keeps the mean of what it follows
 _ROUNDS = 60  # for the mean inflow without its correlation with the force

@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Vehicle, WingMotion
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import load0, load1, root, store1
@@ -33,8 +33,6 @@ from wingfit.sim.vehicle.elements import (
     curve_lift,
     velocities,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 class Stations(NamedTuple):

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from wingfit.records import (
@@ -27,10 +26,9 @@ from wingfit.records import (
     WingMotion,
     save_dataset,
 )
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
-
-Array = npt.NDArray[np.float64]
 
 AIR = (101_325.0, 293.15)  # Pa, K: of the tunnel; the source does not say
 DRAG = {"C_D0": 0.0, "C_Dpi2": 2.0}

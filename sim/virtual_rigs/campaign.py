@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import (
     Condition,
@@ -30,12 +29,11 @@ from wingfit.records import (
     Wing,
     save_dataset,
 )
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import Rig
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-
-Array = npt.NDArray[np.float64]
 
 # How the true wing is simulated: far better than a calibration asks for, periodic to 2 micrometres.
 REFERENCE = Numerics(steps=480, max_beats=60, periodic=2e-6)
@@ -220,7 +218,7 @@ def _noise(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator)
     return np.asarray(noise * per_marker * np.array(tracking.noise))
 
 
-def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> Mask:
     """True where a marker is hidden: bursts of geometrically distributed length."""
     lost = np.zeros(shape, bool)
     for t, m in zip(*np.nonzero(rng.uniform(size=shape) < tracking.gap_rate), strict=True):

@@ -10,13 +10,10 @@ from __future__ import annotations
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording, Wing
+from wingfit.records.array_types import Array, Complex
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 REFERENCE_HARMONICS = 4
 _NEWTON_STEPS = 30

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Drive, FourBarDrive, FourierDrive
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, ArrayLike, Complex
 
 _SAMPLES = 512
 _HARMONICS = 40
@@ -23,7 +21,7 @@ class RodDrive:
     ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi); the rear rod's lag is in it.
     """
 
-    series: npt.NDArray[np.complex128]
+    series: Complex
 
     @classmethod
     def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
@@ -65,12 +63,12 @@ def _angles(phases: bytes, both: bytes) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _turns(phases: bytes, terms: int) -> npt.NDArray[np.complex128]:
+def _turns(phases: bytes, terms: int) -> Complex:
     """exp(i k psi) [T, terms]."""
     return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
 
 
-def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
+def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
     """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
     phase = np.asarray(psi, float)
     series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
@@ -84,7 +82,7 @@ def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
     return np.stack([angle, first, second, third], axis=-1)
 
 
-def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:
+def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
     """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
 
     The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is where the circles of the coupler

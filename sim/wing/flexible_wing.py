@@ -10,9 +10,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition, Gene, Recording, Wing
+from wingfit.records.array_types import Array, ArrayLike, Complex, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects.apply import apply, observed
 from wingfit.sim.effects.contract import Effect
@@ -30,9 +30,6 @@ from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import FACTOR, lanes, wing_genes
 from wingfit.sim.wing.structure import Structure, build
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Places = npt.NDArray[np.intp]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
@@ -89,7 +86,7 @@ class FlexibleWing:
         """The same wing with more effects; their genes are appended, switched off."""
         return self._cut_alike(replace(self, effects=(*self.effects, *names)))
 
-    def beside(self, genome: npt.ArrayLike) -> FlexibleWing:
+    def beside(self, genome: ArrayLike) -> FlexibleWing:
         """The same wing, which begins its search for a periodic motion at that of ``genome`` [G], without effects."""
         own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
         return self._cut_alike(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
@@ -136,7 +133,7 @@ class FlexibleWing:
         return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
 
     @one_blas_thread
-    def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
+    def beats(self, genomes: ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
         """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
 
         Individuals with the same effects on are simulated together: one that is off costs nothing and changes nothing.
@@ -145,7 +142,7 @@ class FlexibleWing:
         beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion)
         return tuple(beats[k] for k in wing)
 
-    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Places]:
+    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
         """A beat of each wing that is unlike the others, and which of them [B] an individual is."""
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings = batch[first]
@@ -203,13 +200,13 @@ class FlexibleWing:
                 plain[on, column] = batch[on, column]
         return plain
 
-    def beat(self, genome: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
+    def beat(self, genome: ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
         """The same for a single genome [G]."""
         (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
         return found
 
     @one_blas_thread
-    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+    def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
         """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
 
         Beats are aligned by the upstroke crossing; what tracking noise leaves of a phase error is then fitted, the
@@ -235,7 +232,7 @@ class FlexibleWing:
         return Observation(channels[same], tuple(reasons[k] for k in same), tuple(solutions[k] for k in same))
 
     def _seen(
-        self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Places
+        self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Index
     ) -> tuple[Complex, Array, Array]:
         """What the cameras make of the beats: series [B, K + 1, C], instants [B, T] (s), what is added [B, T, C].
 
@@ -261,7 +258,7 @@ class FlexibleWing:
         return series, times, added
 
 
-def _distinct(rows: Array) -> tuple[Places, Places]:
+def _distinct(rows: Array) -> tuple[Index, Index]:
     """Numbers of the first of each kind of row, and for every row which kind it is; alike is equal bit for bit."""
     first = dict[bytes, int]()
     kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]

@@ -6,15 +6,14 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import EstimateError, Gene
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes, Laws
 from wingfit.sim.kernels.lanes.memory import aligned
 from wingfit.sim.wing.structure import QUARTERS, Structure, spring_constants
 
-Array = npt.NDArray[np.float64]
 Group = Literal["structure", "aerodynamics"]
 
 UNIT_SLIP = 1e4  # an estimate further than this from the typical value is taken for a wrong unit

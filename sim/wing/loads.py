@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.solver.numerics import LADDER
@@ -16,8 +16,6 @@ from wingfit.sim.solver.simulate import Beat
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.outputs import Outputs, from_motion
-
-Array = npt.NDArray[np.float64]
 
 LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
 CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro

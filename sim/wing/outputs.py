@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.air import strip_forces
@@ -26,8 +26,6 @@ from wingfit.sim.kernels.masses import add_energies
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.structure import Structure
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 Kind = Literal["root", "spanwise", "chordwise"]
 _ACROSS = [0, 1, 5]  # of a twist: what moves air along a plate's normal
 RODS = ("front rod", "rear rod")

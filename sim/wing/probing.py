@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.sim.atmosphere import density
 from wingfit.sim.effects.probe import Probe, strip_middles
 from wingfit.sim.kernels.arrays import State
@@ -15,8 +15,6 @@ from wingfit.sim.model import Observation, genome_batch
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.loads import crossing
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 MOVES = 2e-3  # of the span: how far a load should move the marker that it moves most
 FAR = 4.0  # times that, or a part of it as small, which is still taken
@@ -71,9 +69,7 @@ class Probed:
     motion: StationMotion
 
 
-def probed(
-    model: FlexibleWing, genome: npt.ArrayLike, recording: Recording, probe: Probe, instants: int = 72
-) -> Probed:
+def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: Probe, instants: int = 72) -> Probed:
     """Responses and motion about ``genome`` [G]; ValueError with the reason where that cannot be simulated.
 
     One-sided differences, all with the steps of the wing without loads, so that the integrator's errors cancel. A load
@@ -124,7 +120,7 @@ def _sizes(model: FlexibleWing, probe: Probe) -> Array:
 
 
 def _changes(
-    model: FlexibleWing, genome: Array, recording: Recording, which: npt.NDArray[np.int64], sizes: Array
+    model: FlexibleWing, genome: Array, recording: Recording, which: Index, sizes: Array
 ) -> tuple[Array, tuple[str | None, ...]]:
     """What loads of ``sizes`` [B] change in the channels [B, T, C], and why one failed."""
     batch = np.zeros((len(which) + 1, len(model.genes)))

@@ -7,16 +7,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Rod, Wing
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import Wiring
 from wingfit.sim.solver.elimination import eliminate
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.planform import Body, Panel, Planform, bodies, marker_carriers
 from wingfit.sim.wing.sections import Rectangle, round_area, round_second_moment
-
-Array = npt.NDArray[np.float64]
 
 # Rows of Connector.foam and .rods: rotation about x, y, z, then translation along x, y, z, each a rigidity per modulus.
 # Which foam modulus governs each row, for a connection along the span (y) and along the chord (x): thesis Eqs. 15-17.

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.sim.kernels import LANES
-
-Array = npt.NDArray[np.float64]
 
 _LINE = 8 * LANES
 
@@ -22,7 +20,7 @@ def zeros(shape: tuple[int, ...]) -> Array:
     return whole[start : start + count].reshape(shape)
 
 
-def aligned(array: npt.ArrayLike) -> Array:
+def aligned(array: ArrayLike) -> Array:
     """A copy of an array [..., LANES] that starts on a cache line."""
     values = np.asarray(array, float)
     out = zeros(values.shape)
