@@ -6,23 +6,8 @@ import numpy as np
 
 from wingfit.records import Vehicle
 from wingfit.records.array_types import Array
-from wingfit.sim.vehicle.elements import (
-    COSINE,
-    DIHEDRAL,
-    DIHEDRAL_RATE,
-    DOWNWARD,
-    FLAP_ACCELERATION,
-    FLAP_RATE,
-    FORWARD,
-    PEELED,
-    PITCH_ACCELERATION,
-    PITCH_RATE,
-    PROJECTION,
-    SINE,
-    STEP_COSINE,
-    STEP_SINE,
-    Side,
-)
+from wingfit.sim.vehicle import elements
+from wingfit.sim.vehicle.elements import Side
 from wingfit.sim.vehicle.motion import Angles
 
 ROW_COUNT = 14
@@ -46,10 +31,10 @@ def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: floa
     """
     flap, pitch = prescribed.flap, prescribed.pitch
     rows = np.empty((len(flap), ROW_COUNT, flap.shape[2]))
-    rows[:, [FLAP_RATE, FLAP_ACCELERATION]] = flap[:, 1:]
-    rows[:, [PITCH_RATE, PITCH_ACCELERATION]] = pitch[:, 1:]
-    rows[:, PEELED] = prescribed.peeled
-    rows[:, FORWARD] = forward
+    rows[:, [elements.FLAP_RATE, elements.FLAP_ACCELERATION]] = flap[:, 1:]
+    rows[:, [elements.PITCH_RATE, elements.PITCH_ACCELERATION]] = pitch[:, 1:]
+    rows[:, elements.PEELED] = prescribed.peeled
+    rows[:, elements.FORWARD] = forward
     set_twist(rows, pitch[:, 0], root, half_step)
     return rows
 
@@ -58,8 +43,11 @@ def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
     """Set the turns of the first element and from one to the next; ``pitch`` [B, n] at the pitch station."""
     half = half_step * (pitch - root)
     c, s = np.cos(half), np.sin(half)
-    rows[:, COSINE], rows[:, SINE] = np.cos(root) * c - np.sin(root) * s, np.sin(root) * c + np.cos(root) * s
-    rows[:, STEP_COSINE], rows[:, STEP_SINE] = c * c - s * s, 2 * c * s
+    rows[:, elements.COSINE], rows[:, elements.SINE] = (
+        np.cos(root) * c - np.sin(root) * s,
+        np.sin(root) * c + np.cos(root) * s,
+    )
+    rows[:, elements.STEP_COSINE], rows[:, elements.STEP_SINE] = c * c - s * s, 2 * c * s
 
 
 def set_side(rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], below: Array, upper: bool) -> Side:
@@ -73,8 +61,8 @@ def set_side(rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], be
     cosine, sine, rate = flap
     sign, printed = -1.0 if upper else 1.0, vehicle.velocities == "printed"
     c, s = np.cos(vehicle.dihedral), np.sin(vehicle.dihedral)  # of the angle zeta_0 - sign zeta:
-    rows[:, DIHEDRAL] = c * cosine + sign * s * sine
-    rows[:, DIHEDRAL_RATE] = (sign * s * cosine - c * sine) * rate
-    rows[:, PROJECTION] = cosine if printed else rows[:, DIHEDRAL]
-    rows[:, DOWNWARD] = (sign * below)[:, None]
+    rows[:, elements.DIHEDRAL] = c * cosine + sign * s * sine
+    rows[:, elements.DIHEDRAL_RATE] = (sign * s * cosine - c * sine) * rate
+    rows[:, elements.PROJECTION] = cosine if printed else rows[:, elements.DIHEDRAL]
+    rows[:, elements.DOWNWARD] = (sign * below)[:, None]
     return Side(-1.0 if printed and upper else 1.0, float(printed), sign)

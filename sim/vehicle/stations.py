@@ -16,23 +16,8 @@ from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import load0, load1, root, store1
-from wingfit.sim.vehicle.elements import (
-    COSINE,
-    DEGREE,
-    DIHEDRAL,
-    DOWNWARD,
-    FLAP_RATE,
-    FORWARD,
-    PROJECTION,
-    SINE,
-    STEP_COSINE,
-    STEP_SINE,
-    STILL,
-    Side,
-    curve_drag,
-    curve_lift,
-    velocities,
-)
+from wingfit.sim.vehicle import elements
+from wingfit.sim.vehicle.elements import DEGREE, STILL, Side, curve_drag, curve_lift, velocities
 
 
 class Stations(NamedTuple):
@@ -88,8 +73,8 @@ def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
     """Cosine and sine [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
-            c, s = motion[b, COSINE, t], motion[b, SINE, t]
-            dc, ds = motion[b, STEP_COSINE, t], motion[b, STEP_SINE, t]
+            c, s = motion[b, elements.COSINE, t], motion[b, elements.SINE, t]
+            dc, ds = motion[b, elements.STEP_COSINE, t], motion[b, elements.STEP_SINE, t]
             for e in range(cosine.shape[2]):
                 cosine[b, t, e], sine[b, t, e] = c, s
                 c, s = c * dc - s * ds, s * dc + c * ds
@@ -103,13 +88,13 @@ def station_velocities(
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             ct, st = load1(cosine[b], t), load1(sine[b], t)
-            lam, w = motion[b, DIHEDRAL, t], motion[b, DOWNWARD, t]
+            lam, w = motion[b, elements.DIHEDRAL, t], motion[b, elements.DOWNWARD, t]
             whole = lam * side.printed + (1.0 - side.printed)
             w *= lam * (1.0 - side.printed) + side.printed
             nothing = ct * 0.0
-            swing = load0(r) * motion[b, FLAP_RATE, t]
+            swing = load0(r) * motion[b, elements.FLAP_RATE, t]
             vx, vz = velocities(
-                ct, st, swing, nothing + motion[b, FORWARD, t], nothing + w, nothing + whole, side.stream
+                ct, st, swing, nothing + motion[b, elements.FORWARD, t], nothing + w, nothing + whole, side.stream
             )
             store1(along[b], t, vx)
             store1(normal[b], t, vz)
@@ -215,4 +200,4 @@ def station_forces(
                 x += part[0, e]
                 z += part[1, e]
             out[b, 0, t] += x
-            out[b, 1, t] += z * motion[b, PROJECTION, t] * side.sign
+            out[b, 1, t] += z * motion[b, elements.PROJECTION, t] * side.sign

@@ -70,16 +70,10 @@ def _turns(phases: bytes, terms: int) -> Complex:
 
 def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
     """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
-    phase = np.asarray(psi, float)
-    series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
-    k = np.arange(1, max(len(series.cosine), len(series.sine)) + 1)
-    a, b = _padded(series.cosine, len(k)), _padded(series.sine, len(k))
-    c, s = np.cos(phase[..., None] * k), np.sin(phase[..., None] * k)
-    angle = series.mean + c @ a + s @ b
-    first = c @ (k * b) - s @ (k * a)
-    second = -(c @ (k**2 * a) + s @ (k**2 * b))
-    third = s @ (k**3 * a) - c @ (k**3 * b)
-    return np.stack([angle, first, second, third], axis=-1)
+    series = RodDrive.of(drive, 0.0, 1).series[:, 0, 0]
+    order = 1j * np.arange(len(series))
+    wave = series * np.exp(order * np.asarray(psi, float)[..., None])
+    return np.stack([(order**d * wave).sum(axis=-1).real for d in range(4)], axis=-1)
 
 
 def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:

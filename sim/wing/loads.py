@@ -15,7 +15,8 @@ from wingfit.sim.solver.numerics import LADDER
 from wingfit.sim.solver.simulate import Beat
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-from wingfit.sim.wing.outputs import Outputs, from_motion
+from wingfit.sim.wing.load_recovery import from_motion
+from wingfit.sim.wing.outputs import Outputs
 
 LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
 CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro

@@ -22,7 +22,8 @@ from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.drive import RodDrive, flap_angle
 from wingfit.sim.wing.genes import lanes, wing_genes
-from wingfit.sim.wing.outputs import Outputs, from_motion
+from wingfit.sim.wing.load_recovery import from_motion
+from wingfit.sim.wing.outputs import Outputs
 from wingfit.sim.wing.structure import build
 
 Array = npt.NDArray[np.float64]
