@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from wingfit.records.array_types import Array, Mask
+from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.records.vehicle import Vehicle, WingMotion
 from wingfit.records.wing import Wing
 
@@ -68,17 +68,17 @@ class Recording:
     name: str
     rig: Rig
     condition: Condition
-    times: Array
+    times: Float[Array, " T"]
     markers: tuple[str, ...]
-    values: Array
-    standard_deviation: Array | None = None
+    values: Float[Array, "T C"]
+    standard_deviation: Float[Array, " C"] | None = None
     forces: tuple[ForceAxis, ...] = ()
     low_pass: LowPass | None = None
     motion: WingMotion | None = None
     mass: float | None = None
 
     @cached_property
-    def valid(self) -> Mask:
+    def valid(self) -> Bool[Mask, "T C"]:
         """True where a channel was recorded, [T, C]."""
         return np.isfinite(self.values)
 
@@ -94,7 +94,7 @@ class Recording:
         return tracks + tuple(f"force_{axis}" for axis in self.forces)
 
     @property
-    def positions(self) -> Array:
+    def positions(self) -> Float[Array, "T M 3"]:
         """``values`` of a recording of tracks as [T, M, 3]."""
         return self.values.reshape(len(self.times), len(self.markers), 3)
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from wingfit.records.array_types import Array, ArrayLike
+from wingfit.records.array_types import Array, ArrayLike, Float
 
 Scale = Literal["log", "linear"]
 
@@ -52,14 +52,14 @@ class Gene:
                 f"gene '{self.name}' is {value:g}{unit}; it must lie in [{self.lower:g}, {self.upper:g}]{unit}"
             )
 
-    def to_unit(self, value: ArrayLike) -> Array:
+    def to_unit(self, value: ArrayLike) -> Float[Array, "*B"]:
         """Map values to [0, 1], logarithmically for a log-scaled gene."""
         v = np.asarray(value, float)
         if self.scale == "log":
             return np.log(v / self.lower) / math.log(self.upper / self.lower)
         return (v - self.lower) / (self.upper - self.lower)
 
-    def from_unit(self, u: ArrayLike) -> Array:
+    def from_unit(self, u: ArrayLike) -> Float[Array, "*B"]:
         """Inverse of :meth:`to_unit`; the result never leaves the bounds."""
         x = np.asarray(u, float)
         if self.scale == "log":

@@ -7,7 +7,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
 from wingfit.records.description.fields import FourierFile
 from wingfit.records.description.vehicle_file import MotionFile
@@ -129,14 +129,14 @@ def _markers(wing: WingFile) -> Iterator[Inconsistency]:
             yield ("wing", "markers", index), marker.name, message
 
 
-def planform_outline(stations: Sequence[StationFile]) -> Array:
+def planform_outline(stations: Sequence[StationFile]) -> Float[Array, "N 2"]:
     """Corners of the planform [N, 2] as (x, y): leading edge from root to tip, then trailing edge back."""
     leading = [(float(s.leading_edge_m), float(s.y_m)) for s in stations]
     trailing = [(float(s.leading_edge_m + s.chord_m), float(s.y_m)) for s in stations]
     return np.array(leading + trailing[::-1])
 
 
-def distance_outside(outline: Array, x: float, y: float) -> float:
+def distance_outside(outline: Float[Array, "N 2"], x: float, y: float) -> float:
     """Distance from (x, y) to the planform, m; 0 inside."""
     start, end = outline, np.roll(outline, -1, axis=0)
     point, edge = np.array([x, y]), end - start

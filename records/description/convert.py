@@ -16,7 +16,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import numpy as np
 from pydantic import BaseModel
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import Condition, Recording
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
 from wingfit.records.description.fields import models_in, tag_of
@@ -140,7 +140,7 @@ def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
 
 def _to_deviations(
     entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults
-) -> Array | None:
+) -> Float[Array, " C"] | None:
     """Standard deviation of each channel [C], or None; markers or axes that are missing or unknown are faults."""
     names: Sequence[str]
     if isinstance(entry, WingRecordingFile):

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
 from wingfit.records.limits import (
@@ -54,7 +54,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         _check_clock(recording, where, at, faults)
 
 
-def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
+def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
     """Whether times are finite and increase; notes where not."""
     bad = np.flatnonzero(~np.isfinite(times))
     for row in bad[:_SHOWN]:
@@ -70,7 +70,9 @@ def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
     return not back.size
 
 
-def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where: str, faults: Faults) -> None:
+def _check_positions(
+    values: Float[Array, "T C"], markers: tuple[str, ...], wing: Wing, where: str, faults: Faults
+) -> None:
     """Markers stay within about a span of the hinge; those further out are in another unit or frame."""
     hinge = (0.0, wing.hinge.y, wing.hinge.z)
     distance = _typical(values, hinge)
@@ -96,7 +98,7 @@ def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where:
         faults.add(where, f"{each[k]:.4g}", message)
 
 
-def _typical(values: Array, hinge: tuple[float, float, float]) -> float:
+def _typical(values: Float[Array, "T C"], hinge: tuple[float, float, float]) -> float:
     """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 where none is known.
 
     One axis after the other: a large recording is not copied whole.
@@ -104,7 +106,7 @@ def _typical(values: Array, hinge: tuple[float, float, float]) -> float:
     return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
 
 
-def _median_distance(places: Array, origin: float) -> float:
+def _median_distance(places: Float[Array, "T M"], origin: float) -> float:
     distances = np.abs(places - origin)
     known = distances[np.isfinite(distances)]
     return float(np.median(known, overwrite_input=True)) if known.size else 0.0

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array, Index
+from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.records.dataset import ForceAxis
 from wingfit.records.description.yaml_text import NUMBER
 from wingfit.records.errors import DatasetError, Faults, decode, fail, shown
@@ -34,9 +34,9 @@ class Samples:
     ``lines`` [T] is the line of the file that each instant came from.
     """
 
-    times: Array
-    values: Array
-    lines: Index
+    times: Float[Array, " T"]
+    values: Float[Array, "T C"]
+    lines: Int[Index, " T"]
     markers: tuple[str, ...] = ()
     forces: tuple[ForceAxis, ...] = ()
 
@@ -51,7 +51,7 @@ class Layout:
     forces: tuple[ForceAxis, ...] = ()
 
 
-def write_table(columns: Sequence[str], times: Array, values: Array) -> str:
+def write_table(columns: Sequence[str], times: Float[Array, " T"], values: Float[Array, "T C"]) -> str:
     """CSV text of ``values`` [T, C] under the names ``columns``; NaN is an empty cell."""
     rows = zip(times.tolist(), values.tolist(), strict=True)
     lines = (",".join([repr(time), *(repr(v) if v == v else "" for v in row)]) for time, row in rows)

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import jaxtyping
 import numpy as np
 import pytest
 
 from tests.records.samples import falcon_dataset
 from wingfit.records import Dataset, DatasetError, Recording, save_dataset
+
+
+@pytest.fixture(autouse=True)
+def _shapes_unchecked() -> Iterator[None]:
+    """As in production, where a recording of wrong shapes can be made."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def _first(dataset: Dataset, recording: Recording) -> Dataset:
