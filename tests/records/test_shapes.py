@@ -25,7 +25,7 @@ from wingfit.records.files.table import write_table
 def test_a_field_of_a_wrong_shape_is_caught(wrong: dict[str, np.ndarray]) -> None:
     recording = falcon_dataset(12).recordings[0]
     recording = replace(recording, standard_deviation=np.ones(36))
-    with pytest.raises(TypeCheckError, match="standard_deviation|times|values"):
+    with pytest.raises(TypeCheckError, match=r"standard_deviation|times|values"):
         replace(recording, **wrong)  # type: ignore[arg-type]
 
 
