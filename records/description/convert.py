@@ -73,9 +73,15 @@ def to_dataclass(cls: type[T], model: BaseModel, **given: object) -> T:
     return cls(**values)
 
 
+def to_data(instance: object, model: type[BaseModel]) -> dict[str, object]:
+    """The attributes of a dataclass as the plain data of ``model``, by its keys; None and empty values are omitted."""
+    axes = dict(zip("xyz", instance.position, strict=True)) if isinstance(instance, Marker) else {}
+    return _data(vars(instance) | axes, model)
+
+
 def describe_rig(rig: Wing | Vehicle) -> dict[str, object]:
     """``rig`` as the plain data under the key ``wing`` or ``vehicle`` of ``dataset.yaml``."""
-    return _data(vars(rig), VehicleFile if isinstance(rig, Vehicle) else WingFile)
+    return to_data(rig, VehicleFile if isinstance(rig, Vehicle) else WingFile)
 
 
 def describe_recording(recording: Recording) -> dict[str, object]:
@@ -127,8 +133,7 @@ def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
     """An attribute as plain data, in ``unit``; a dataclass as the keys of that of ``models`` which has its kind."""
     if is_dataclass(value):
         kind = getattr(value, "kind", None)
-        axes = dict(zip("xyz", value.position, strict=True)) if isinstance(value, Marker) else {}
-        return _data(vars(value) | axes, next(model for model in models if tag_of(model) == kind))
+        return to_data(value, next(model for model in models if tag_of(model) == kind))
     if isinstance(value, Mapping):
         return {name: _plain(item, models, unit) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -182,7 +182,7 @@ def test_wrong_use_of_forces_is_told(
         ("time_s;flap_angle_deg\n0;1\n", (), ("separate columns by commas",)),
     ],
 )
-def test_wrong_tables_are_told(
+def test_errors_in_tables_are_reported(
     wingfit: Wingfit, tmp_path: Path, text: str, words: tuple[str, ...], expected: tuple[str, ...]
 ) -> None:
     path = tmp_path / "table.csv"
