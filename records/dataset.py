@@ -47,7 +47,7 @@ class Condition:
 class LowPass:
     """Zero-phase low-pass: a Butterworth filter run forwards and backwards.
 
-    ``cutoff`` in Hz is where one pass has lost half its power; ``order`` is that of one pass.
+    ``cutoff`` (Hz) is the half-power frequency of one pass; ``order`` is that of one pass.
     """
 
     cutoff: float
@@ -56,13 +56,13 @@ class LowPass:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was recorded under one condition: tracks of markers, or forces of a vehicle.
+    """Measurements under one condition: tracks of markers, or forces of a vehicle.
 
-    ``values`` has shape [T, C]: at each of the ``times`` (T, in s, increasing) the channels: three per marker in the
-    order x, y, z (m, wing frame), or one per force axis (N, body axes: what the wings exert on the body).
-    ``standard_deviation`` [C] is the noise where the user knows it, else None. Times of forces count from the start of
-    a beat. ``low_pass`` says that the values have been filtered; a model filters alike. ``motion`` is the wings' motion
-    as measured in this recording, and ``mass`` (kg) the vehicle's, where they differ from the vehicle's own.
+    ``values`` [T, C] are the channels at the increasing ``times`` [T] (s): three per marker in the order x, y, z (m,
+    wing frame), or one per force axis (N, body axes, force of the wings on the body). ``standard_deviation`` [C] is the
+    known noise of the channels, or None. Times of forces count from the start of a beat. ``low_pass`` is the filter
+    that was applied to the values, and which a model applies too. ``motion`` of the wings and ``mass`` (kg) of the
+    vehicle replace those of the vehicle's description in this recording.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Recording:
 
     @property
     def kind(self) -> Kind:
-        """Whether it holds tracks or forces."""
+        """Whether the recording holds tracks or forces."""
         return "forces" if self.forces else "tracks"
 
     @property
@@ -101,9 +101,9 @@ class Recording:
 
 @dataclass(frozen=True)
 class Dataset:
-    """A wing or a vehicle with its recordings; those named in ``held_out`` are never fitted, only predicted.
+    """A wing with recordings of tracks, or a vehicle with recordings of forces.
 
-    A wing is recorded as tracks, a vehicle as forces.
+    Recordings named in ``held_out`` are used for validation only, never for fitting.
     """
 
     name: str

@@ -15,7 +15,7 @@ Scale = Literal["log", "linear"]
 
 
 class EstimateError(ValueError):
-    """An estimate of the dataset that the model cannot take: for a gene it lacks, or outside the gene's bounds."""
+    """An estimate of the dataset that the model refuses: of an unknown gene, or outside the gene's bounds."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Gene:
         return (v - self.lower) / (self.upper - self.lower)
 
     def from_unit(self, u: ArrayLike) -> Float[Array, "*B"]:
-        """Inverse of :meth:`to_unit`; the result never leaves the bounds."""
+        """Inverse of :meth:`to_unit`, clipped to the bounds."""
         x = np.asarray(u, float)
         if self.scale == "log":
             value = self.lower * np.exp(x * math.log(self.upper / self.lower))
@@ -104,7 +104,7 @@ class Genome:
         return Genome(self.genes, tuple(merged[gene.name] for gene in self.genes))
 
     def normalised(self) -> dict[str, float]:
-        """Values by name with every share group divided by its sum: what the model uses and what people compare."""
+        """Values by name, with every share group divided by its sum: the values that the model uses."""
         sums: dict[str, float] = {}
         for gene, value in zip(self.genes, self.values, strict=True):
             if gene.share_of:

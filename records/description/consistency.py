@@ -1,4 +1,4 @@
-"""What takes several values to judge: references between names, order, markers on the planform, masses, motion."""
+"""Checks that involve several values: references between names, order, markers on the planform, masses, motion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Inconsistency = tuple[Path, object, str]
 
 
 def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
-    """Everything that does not fit together: path, value, message."""
+    """All inconsistencies between the values of a description, each as path, value and message."""
     yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
@@ -61,7 +61,7 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
-    """Wings that clap must be about closed at the start of the beat; a split cycle is so by its law."""
+    """Wings that clap must be nearly closed at the start of the beat; a split cycle always is."""
     flap = motion.flap
     if not isinstance(flap, FourierFile):
         return
@@ -93,9 +93,9 @@ def _unique(
         folded = name.lower() if ignore_case else name
         here = (*path, index, key) if key else (*path, index)
         if seen.get(folded) == name:
-            yield here, name, f"{name!r} stands here a second time; every name must be unique: rename one"
+            yield here, name, f"{name!r} is used a second time here; every name must be unique: rename one"
         elif folded in seen:
-            message = f"{name!r} differs from {seen[folded]!r} only by case, which files may not keep: rename one"
+            message = f"{name!r} differs from {seen[folded]!r} only by case, which some file systems ignore: rename one"
             yield here, name, message
         seen.setdefault(folded, name)
 

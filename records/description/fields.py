@@ -1,4 +1,4 @@
-"""Types of single keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
+"""Types of the keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ Estimates = Annotated[
 
 
 class Strict(BaseModel):
-    """Base of all models of the file: a key that is not known is an error."""
+    """Base of all models of the file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -90,7 +90,7 @@ def tag_of(model: type[BaseModel]) -> str | None:
 
 
 def whole(value: Any) -> Any:
-    """``value`` as an int where it is a whole number, for types that admit only ints."""
+    """``value`` as an int if it is a whole number, for fields that admit only ints."""
     if isinstance(value, Decimal) and abs(value) < 10**6 and value == value.to_integral_value():
         return int(value)
     return value

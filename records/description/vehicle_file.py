@@ -83,7 +83,7 @@ class MotionFile(Strict):
     pitch_station: Annotated[
         Decimal, limits("0", "1", "spans", "where the pitch holds", "give a fraction of the span", above=True)
     ] = Decimal("0.7")
-    # No default: the source says "zero at the root", but its pitch is pi/2 where the chord lies along the body.
+    # No default: the source says "zero at the root", although its pitch is pi/2 where the chord lies along the body.
     root_pitch_deg: Annotated[
         Decimal, limits("-180", "180", "deg", "wing pitch at the flapping axis; 90: chord along the body", _DEGREES)
     ]
@@ -91,7 +91,7 @@ class MotionFile(Strict):
 
 
 class VehicleFile(Strict):
-    """The vehicle as built."""
+    """The vehicle."""
 
     name: Title
     layout: Literal["x4", "pair", "single"]
@@ -111,7 +111,7 @@ class VehicleFile(Strict):
 
 
 class LowPassFile(Strict):
-    """The zero-phase Butterworth filter that the values have been through."""
+    """The zero-phase Butterworth filter that was applied to the values."""
 
     cutoff_hz: Annotated[Decimal, limits("0", "1000000", "Hz", "half-power frequency of one pass", above=True)]
     order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(whole)] = 4

@@ -41,7 +41,7 @@ class StationFile(Strict):
 
 
 class MaterialsFile(Strict):
-    """Masses that are no genes."""
+    """Densities, which are not genes."""
 
     foam_density_kg_m3: Annotated[Decimal, limits("0", "2000", "kg/m^3", "density of the foam", above=True)]
     skin_areal_density_kg_m2: Annotated[
@@ -111,7 +111,7 @@ class FourBarFile(Strict):
 
 
 class WingFile(Strict):
-    """The wing as built."""
+    """The wing."""
 
     name: Title
     stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)

@@ -1,4 +1,4 @@
-"""From a description and numbers, however stored, to a dataset; and the same checks before writing."""
+"""Builds a dataset from a description and samples, from any kind of file; the same checks are made before writing."""
 
 from __future__ import annotations
 
@@ -25,11 +25,10 @@ At = Callable[[str, Samples, int], str]
 def assemble(
     document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
 ) -> Dataset:
-    """Build the dataset described by ``document``, of at most ``room`` numbers.
+    """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists all faults.
 
-    ``read(name, room)`` gives the samples of a recording of at most ``room`` numbers, ``where(name)``
-    says where they are stored, ``at(name, samples, row)`` where one instant is. Faults of all recordings are
-    collected.
+    ``read(name, room)`` returns the samples of a recording of at most ``room`` numbers. For messages, ``where(name)``
+    names the place where they are stored and ``at(name, samples, row)`` that of one instant.
     """
     checked = check_description(document)
     rig = to_rig(checked)
@@ -58,7 +57,7 @@ def assemble(
 
 
 def checked_description(dataset: Dataset) -> dict[str, object]:
-    """Describe ``dataset``, after the checks that reading makes: what is written can be read."""
+    """Plain data of ``dataset.yaml``, after the checks that reading makes, so that a written dataset can be read."""
     faults = Faults()
     for recording in dataset.recordings:
         _check_kind(recording, dataset, faults)
@@ -98,7 +97,7 @@ def describe(dataset: Dataset) -> dict[str, object]:
 
 
 def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
-    """Note what the file of this kind of dataset has no place for, rather than lose it."""
+    """Add a fault for every attribute that files of this kind of dataset cannot store."""
     where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
     lost: list[tuple[str, object]] = [
         ("markers", recording.markers),
@@ -136,4 +135,4 @@ def _check_markers(recording: Recording, wing: Wing, where: str, faults: Faults)
         if name not in known:
             faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")
         if name in recording.markers[:index]:
-            faults.add(where, name, f"marker {name!r} stands twice; keep one")
+            faults.add(where, name, f"marker {name!r} appears twice; keep one")
