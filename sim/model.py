@@ -1,4 +1,4 @@
-"""The protocol that every simulated rig meets; calibration and diagnosis know nothing else about physics."""
+"""The interface of a simulated rig; calibration and diagnosis use nothing else of the simulators."""
 
 from __future__ import annotations
 

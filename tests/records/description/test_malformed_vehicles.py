@@ -124,7 +124,7 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "marker": (lambda: vehicle_csv("force_z_n", "m1_x_m"), ["column 3"], ["remove"]),
     "twice": (lambda: vehicle_csv("force_z_n", "force_x_n"), ["column 3"], ["column 2", "keep one"]),
     "time": (lambda: vehicle_csv("time_s", "time_ms"), ["column 1"], ["'time_s'", "seconds"]),
-    "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["there is no column of forces"]),
+    "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["no column of forces"]),
     "decimal commas": (lambda: vehicle_csv("0.0,0.1", "0,0,0,1"), ["line 2"], ["5 cells", "decimal commas"]),
     "semicolons": (lambda: vehicle_csv(",", ";"), ["line 1"], ["semicolons"]),
     "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 1.706] N", "convert"]),

@@ -46,7 +46,7 @@ def scene_of(droop: Array | float, condition: Condition) -> WingScene:
 
 def two_beats(scene: WingScene, steps: int) -> Trace:
     """From rest, the second at full amplitude."""
-    table = driven(STRUCTURE, scene.condition, steps, 2, giving_way=len(scene.motor) > 0)
+    table = driven(STRUCTURE, scene.condition, steps, 2, compliant=len(scene.motor) > 0)
     group = scene.frozen()
     return march(STRUCTURE, group, scene.setting(steps), at_rest(STRUCTURE, len(group.laws.size)), 2 * steps, table)
 
