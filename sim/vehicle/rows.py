@@ -1,4 +1,4 @@
-"""What the elements of all wings are told: rows of their motion, and how the stream meets each side."""
+"""Inputs of the elements of all wings: rows of their motion, and the stream relative to each side."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ ROW_COUNT = 14
 
 
 def uppers(vehicle: Vehicle) -> tuple[bool, ...]:
-    """Sides of ``vehicle`` that are computed: the lower wings, then the upper ones where they cross like an X."""
+    """Whether each computed side is the upper one: the lower wings, and the upper ones for the layout "x4"."""
     return (False, True) if vehicle.layout == "x4" else (False,)
 
 
 def mirrored(vehicle: Vehicle) -> float:
-    """Wings per computed side: left and right move alike."""
+    """Number of wings per computed side; left and right wings have the same motion."""
     return 1.0 if vehicle.layout == "single" else 2.0
 
 
 def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: float) -> Array:
-    """Motion [B, 14, n] for the kernels, but for what depends on the side; ``forward`` is [B, n].
+    """Motion [B, 14, n] for the kernels, without the rows that depend on the side; ``forward`` is [B, n].
 
-    ``half_step`` is the share of the twist at the pitch station that the first element has. It lies half a step from
-    the root, so one pair of sine and cosine gives both of its turns.
+    ``half_step`` is the twist of the first element as a fraction of that at the pitch station: half a step of the
+    elements.
     """
     flap, pitch = prescribed.flap, prescribed.pitch
     rows = np.empty((len(flap), ROW_COUNT, flap.shape[2]))
@@ -40,7 +40,7 @@ def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: floa
 
 
 def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
-    """Set the turns of the first element and from one to the next; ``pitch`` [B, n] at the pitch station."""
+    """Set the pitch of the first element and the steps between elements; ``pitch`` [B, n] is at the pitch station."""
     half = half_step * (pitch - root)
     c, s = np.cos(half), np.sin(half)
     rows[:, elements.COSINE], rows[:, elements.SINE] = (
@@ -53,9 +53,9 @@ def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
 def set_side(rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], below: Array, upper: bool) -> Side:
     """Set the rows of the dihedral and of the stream for the lower wings, or for the upper ones.
 
-    In axes mirrored at the body's plane the upper wing moves like the lower one, in a stream from the other side. As
-    printed, Eq. 18 has the stream along the upper wing's chord from behind (docs/decisions/0005). Wings that are no X
-    move like lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate, [B, n] each; ``below``
+    In axes mirrored at the body's plane the upper wing moves like the lower one, in a mirrored stream. As printed, Eq.
+    18 reverses the stream along the upper wing's chord (docs/decisions/0005). Wings of other layouts than "x4" are
+    computed as lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate, [B, n] each; ``below``
     [B] is the speed of the stream along body z, m/s.
     """
     cosine, sine, rate = flap

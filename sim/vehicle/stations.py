@@ -1,7 +1,7 @@
-"""The flow at a few stations along each wing over the beat, for effects that act on it, and the forces it makes.
+"""The flow at eight stations along each wing over the beat, for effects that act on it, and the resulting forces.
 
-Eight stations fill a vector of the processor, so that states which follow the flow are swept through the beat for all
-stations at once. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
+Eight stations fill a vector register of the processor, so that states which depend on the flow are integrated for all
+stations at the same time. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from wingfit.sim.vehicle.elements import DEGREE, STILL, Side, curve_drag, curve_
 
 
 class Stations(NamedTuple):
-    """Eight places at the middles of equal parts of the span.
+    """Eight stations at the middles of equal parts of the span.
 
     Attributes:
         r: [8] distances from the flapping axis, m.
         chord: [8], m.
-        weight: [8], m: what a value per length is multiplied by to integrate it along the span.
-        twist: [8] shares of the twist at the pitch station.
-        mass: [8] of the wing per length, as a part of its whole mass, 1/m.
+        weight: [8], m: quadrature weights along the span.
+        twist: [8] as fractions of that at the pitch station.
+        mass: [8] of the wing per length, as a fraction of its mass, 1/m.
     """
 
     r: Array
@@ -39,10 +39,10 @@ class Stations(NamedTuple):
 
 
 def _weights() -> Array:
-    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly, as near to equal as can be."""
+    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly; the most equal ones."""
     powers = _MIDDLES ** np.arange(4)[:, None]
-    lacking = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
-    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, lacking)
+    defect = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
+    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, defect)
 
 
 _MIDDLES: Array = (np.arange(LANES) + 0.5) / LANES
@@ -133,11 +133,11 @@ def station_circulation(
     Args:
         along: [B, n, 8], m/s.
         normal: [B, n, 8], m/s.
-        turning: [B, n], C_R theta_w' at the pitch station or what takes its place in Eq. 2, rad/s.
+        turning: [B, n], C_R theta_w' at the pitch station, or what replaces it in Eq. 2, rad/s.
         coefficient: [B, 2], C_l of the sine law and the factor on the measured curve.
-        twist: [8], shares of that turning.
+        twist: [8], fractions of that value.
         chord: [8], m.
-        loading: [B, 8], what circulation is multiplied by.
+        loading: [B, 8], factor on the circulation.
         speed: is set.
         circulation: is set.
     """
@@ -175,7 +175,8 @@ def station_forces(
 ) -> None:
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
-    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; else as above.
+    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; others as in the
+    functions above.
     """
     part = np.empty((2, LANES))
     curve = np.empty(LANES)

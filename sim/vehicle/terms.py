@@ -1,4 +1,4 @@
-"""The physical terms of the quasi-steady force, each of which can be left out, and named models made of them."""
+"""The physical terms of the quasi-steady force, each of which can be omitted, and published models composed of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SANE = "Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002)"
 
 @dataclass(frozen=True)
 class Term:
-    """One term: the genes that scale it, where it stands in print, and what it is."""
+    """One term: the genes that scale it, its equation and source, and a description."""
 
     name: str
     genes: tuple[Gene, ...]

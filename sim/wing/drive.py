@@ -1,4 +1,4 @@
-"""Flap angle of the driving rods over the beat, with its first three derivatives."""
+"""Flap angle of the driving rods over the beat, with its derivatives."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _HARMONICS = 40
 class RodDrive:
     """Flap angles of the front and the rear rod for W individuals, as series of the drive phase.
 
-    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi); the rear rod's lag is in it.
+    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi), with the lag of the rear rod included.
     """
 
     series: Complex
 
     @classmethod
     def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
-        """The drive of a wing, its rear rod ``lag`` (rad) late, the same for all ``lanes``."""
+        """The drive of a wing whose rear rod lags by ``lag`` (rad); the same for all ``lanes``."""
         own = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
         k = max(len(own.cosine), len(own.sine))
         series = np.array([own.mean, *(_padded(own.cosine, k) - 1j * _padded(own.sine, k))], np.complex128)
@@ -33,14 +33,14 @@ class RodDrive:
         return cls(np.repeat(both[:, :, None], lanes, axis=2))
 
     def lengthened(self, harmonics: int) -> None:
-        """Make room for ``harmonics`` of the flap frequency."""
-        lacking = max(harmonics + 1 - len(self.series), 0)
-        self.series = np.concatenate([self.series, np.zeros((lacking, *self.series.shape[1:]))])
+        """Extend the series with zeros to at least ``harmonics`` harmonics."""
+        added = max(harmonics + 1 - len(self.series), 0)
+        self.series = np.concatenate([self.series, np.zeros((added, *self.series.shape[1:]))])
 
     def angles(self, psi: Array) -> Array:
         """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad).
 
-        One individual at a time, and those that are driven alike once: nobody's numbers depend on his neighbours.
+        Each distinct series is evaluated once and separately, so that results do not depend on the other individuals.
         """
         phases = np.asarray(psi, float).tobytes()
         lanes = [self.series[:, :, w].tobytes() for w in range(self.series.shape[2])]
@@ -50,12 +50,12 @@ class RodDrive:
 
 @lru_cache(maxsize=64)
 def _angles(phases: bytes, both: bytes) -> Array:
-    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Remembered: a batch asks for few, many times."""
+    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Cached, since batches use few of them."""
     series = np.frombuffer(both, np.complex128).reshape(-1, 2)
     turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
     derived = (series[:, :, None] * order.T[:, None]).reshape(len(series), -1)
-    # sums and not matrix products, whose threads would cost more than they do
+    # not matrix products, for which starting the threads takes longer than the sums
     found = np.einsum("tk,kc->tc", turn.real, derived.real) - np.einsum("tk,kc->tc", turn.imag, derived.imag)
     angles = np.asarray(found.reshape(len(turn), 2, 5))
     angles.setflags(write=False)
@@ -79,14 +79,14 @@ def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
 def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
     """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
 
-    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is where the circles of the coupler
-    about the crank pin and of the rocker about its pivot meet, on the side that the open linkage keeps.
+    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is an intersection of the
+    circles of the coupler about the crank pin and of the rocker about its pivot, that of the open linkage.
     """
     phase = np.asarray(psi, float)
     px, py = linkage.crank * np.cos(phase), linkage.crank * np.sin(phase)
     dx, dy = px - linkage.ground, py
     diagonal2 = dx**2 + dy**2
-    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # the crank stays on the far side of the rocker's pivot
+    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # continuous, since the crank stays on one side of the rocker's pivot
     cosine = (linkage.rocker**2 + diagonal2 - linkage.coupler**2) / (2 * linkage.rocker * np.sqrt(diagonal2))
     if np.any(np.abs(cosine) > 1):
         raise ValueError(
@@ -98,7 +98,7 @@ def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _four_bar_series(linkage: FourBarDrive) -> FourierDrive:
-    """The rocker angle as a Fourier series, exact to round-off for the linkages at hand (coefficients fall fast)."""
+    """The rocker angle as a Fourier series, exact to round-off for usual linkages (coefficients decrease fast)."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     angle = four_bar_angle(linkage, psi)
     coefficients = np.fft.rfft(angle) / _SAMPLES

@@ -30,9 +30,9 @@ RODS = ("front rod", "rear rod")
 
 
 def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outputs:
-    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6], z [n, Z]) of the one individual in ``scene``.
+    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6], z [n, Z]) of the individual in ``scene``.
 
-    The scene's lanes must all be that individual, its effects included: they are taken for instants.
+    All lanes of the scene must be that individual with its effects, since lanes are used for instants.
     """
     structure, n = scene.structure, len(motion.V)
     sums = _Sums(structure, n)
@@ -41,7 +41,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
     for c in range(len(structure.connectors)):
         _connector(parts, c, groups, sums)
     _air_and_energies(parts, groups, sums)
-    _moved_air(parts, scene, motion, sums)
+    _added_mass_loads(parts, scene, motion, sums)
     incidence = _incidence(scene.condition)
     return Outputs(
         phase=np.arange(n) / n,
@@ -60,7 +60,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
 
 
 class _Sums:
-    """What is collected over the groups of instants."""
+    """Results collected over the groups of instants."""
 
     def __init__(self, structure: Structure, n: int) -> None:
         bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.division.bodies)
@@ -73,14 +73,14 @@ class _Sums:
 
 
 class _Parts(NamedTuple):
-    """What the kernels are given for the wing."""
+    """Inputs of the kernels for the wing."""
 
     wiring: Wiring
     here: Setting
     lanes: Lanes
 
     def alone(self, c: int) -> tuple[_Parts, Index]:
-        """The wing with nothing but connector ``c`` and its laws, and which of the states are its own."""
+        """The wing with connector ``c`` and its laws only, and the indices of its states."""
         w, group, none = self.wiring, self.lanes, np.zeros(0, np.int64)
         one, count = slice(c, c + 1), len(w.first)
         wiring = w._replace(
@@ -104,7 +104,7 @@ class _Parts(NamedTuple):
 
 
 def _groups(motion: State) -> Iterator[tuple[Index, State]]:
-    """Instants by LANES: their numbers, and their state with the instant as the last axis, spare lanes filled."""
+    """Groups of LANES instants: their indices, and their state with the instant as last axis, spare lanes filled."""
     n = len(motion.V)
     for start in range(0, n, LANES):
         rows = np.arange(start, min(start + LANES, n))
@@ -118,20 +118,20 @@ def _put(work: Work, state: State) -> None:
 
 
 def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """One connector, by the integrator's own forces of a wing that has no other: what they add up is its own."""
+    """Loads of one connector: the integrator's forces of a wing that has no other connector."""
     alone, own = parts.alone(c)
     work, w, twist = new_work(*alone), alone.wiring, np.zeros((1, 6, LANES))
     first = int(w.first[0])
     for rows, state in groups:
-        kept = len(rows)
+        count = len(rows)
         _put(work, state._replace(z=state.z[own]))
         forces(*alone, work)
         twists(w.first, w.second, w.a, w.b, work.Q, work.d, work.V, twist)
-        on_first, e = work.wrench[first].T[:kept], (w.a[0] + work.d[0].T)[:kept]
+        on_first, e = work.wrench[first].T[:count], (w.a[0] + work.d[0].T)[:count]
         sums.wrench[rows, c, 3:] = -on_first[:, 3:]
         sums.wrench[rows, c, :3] = -on_first[:, :3] + np.cross(e, on_first[:, 3:])
-        sums.twist[rows, c] = twist[0].T[:kept]
-        sums.lost[rows, c], sums.stored[rows, c] = work.lost[:kept], work.stored[:kept]
+        sums.twist[rows, c] = twist[0].T[:count]
+        sums.lost[rows, c], sums.stored[rows, c] = work.lost[:count], work.stored[:count]
         if first >= len(w.mass):
             sums.on_rods[rows, first - len(w.mass)] += on_first
 
@@ -142,9 +142,9 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
     work, n = new_work(*parts), len(w.mass)
     kinetic, height = np.zeros(LANES), np.zeros(LANES)
     for rows, state in groups:
-        kept = len(rows)
+        count = len(rows)
         _put(work, state)
-        work.clock[NOW, :kept] = 2 * np.pi * rows / len(sums.kinetic)
+        work.clock[NOW, :count] = 2 * np.pi * rows / len(sums.kinetic)
         airflow(w, here, group, work)
         work.wrench[:] = 0.0
         for s in range(len(w.geometry)):
@@ -156,20 +156,20 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
                 work.flow[one], work.loads[one], len(group.laws.strip) > 0,
                 work.R, work.V, work.wrench, work.normal_damping, power, force,
             )  # fmt: skip
-            sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:kept], power[:kept]
-        sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:kept, :n]
+            sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:count], power[:count]
+        sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:count, :n]
         kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
         add_energies(
             group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,
             work.R, work.p, work.V, kinetic, height,
         )  # fmt: skip
-        sums.kinetic[rows], sums.gravitational[rows] = kinetic[:kept], height[:kept]
+        sums.kinetic[rows], sums.gravitational[rows] = kinetic[:count], height[:count]
 
 
-def _moved_air(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> None:
-    """Add the reaction -N q' of air that the bodies move along (`sim.kernels.masses`), q' by the beat's series.
+def _added_mass_loads(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> None:
+    """Add the reaction -N q' of the added mass (`sim.kernels.masses`), with q' from the Fourier series of the beat.
 
-    To the integrator it is inertia; to the wing it is a load of the air.
+    It is inertia in the integrator, but a load of the air on the wing.
     """
     group, structure = parts.lanes, scene.structure
     if len(group.pairs) == group.weighing:
@@ -193,7 +193,7 @@ def _moved_air(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> N
 
 
 def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
-    """The rods have no mass: the motor holds what the connectors exert, about the hinge where it truly is."""
+    """Motor loads: the rods have no mass, so the motor balances the connectors, about the true axis of the hinge."""
     hinge, row = parts.lanes.hinge[:, 0], len(parts.wiring.mass) + rod
     axis, off = hinge[:3], hinge[3:6]
     R, rate = motion.R[:, row].reshape(-1, 3, 3), motion.V[:, row, :3] @ axis
@@ -205,7 +205,7 @@ def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
 
 
 def body_names(structure: Structure) -> list[str]:
-    """``strip.place``, strips from the root, places from the leading edge; then the two driving rods."""
+    """Names ``strip.body``, strips from the root, bodies from the leading edge; then those of the two driving rods."""
     counts = structure.division.bodies
     return [f"{s}.{k}" for s, count in enumerate(counts, 1) for k in range(1, count + 1)] + list(RODS)
 
@@ -231,7 +231,7 @@ def _strips(structure: Structure, sums: _Sums) -> tuple[Strip, ...]:
 
 
 def _sections(structure: Structure, motion: State, sums: _Sums) -> tuple[Section, ...]:
-    """The root and every border between strips."""
+    """Loads at the root and at every boundary between strips."""
     w, starts = structure.wiring, structure.wiring.strip_start
     edges = structure.planform.strips(structure.division)
     R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
@@ -261,5 +261,5 @@ def _nearest_rotation(mean: Array) -> Array:
 
 
 def _incidence(condition: Condition) -> float:
-    """Of the stream, rad; without wind the axes are those of the world."""
+    """Angle of the stream, rad; 0 without wind."""
     return condition.angle_of_attack if condition.airspeed > 0 else 0.0

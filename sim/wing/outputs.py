@@ -32,10 +32,10 @@ class ConnectorLoad:
     """One connector over n instants. It joins ``between`` = (first, second); second is the outer or rear one.
 
     ``wrench`` [n, 6]: moment (N m) and force (N) on the second body, ``twist`` [n, 6]: its angular velocity (rad/s) and
-    velocity (m/s) relative to the first; both in the axes of the first body, at the point where the connector holds the
-    second (frame B of :mod:`wingfit.sim.kernels.connectors`). Effort times flow is what the connector gives back:
+    velocity (m/s) relative to the first; both in the axes of the first body, at the connector's point on the second
+    (frame B of :mod:`wingfit.sim.kernels.connectors`). The power that the connector returns is
     wrench . twist = -dissipated - d stored / dt (thesis Eqs. 4-7). ``dissipated`` [n] in its damper, W, ``stored`` [n]
-    in its spring, J. ``point``: where it is at rest, wing frame, m.
+    in its spring, J. ``point``: its position at rest, wing frame, m.
     """
 
     name: str
@@ -50,7 +50,7 @@ class ConnectorLoad:
 
 @dataclass(frozen=True)
 class Section:
-    """Load through a cut across the span: all that the part inboard of ``span`` (m) exerts on the part outboard.
+    """Load through a section of the span at ``span`` (m): that of the inboard part on the outboard part.
 
     ``wrench`` [n, 6]: moment (N m) and force (N) in the mean axes of the outboard strip (x aft, y along the span, z
     normal), at the mean of the connectors' points: bending is about x, torsion about y, bending in the plane about z.
@@ -77,16 +77,16 @@ class Outputs:
 
     Attributes:
         phase: [n] of the drive, beats, from 0.
-        crossing: drive phase (beats) of the upstroke crossing, where the phase of a comparison is 0.
+        crossing: drive phase (beats) of the upstroke crossing, where the phase of recordings is 0.
         motors: front and rear.
         connectors: wrench, relative twist, loss and energy of each.
-        sections: loads through the cuts between strips, root first.
+        sections: loads through the sections between strips, root first.
         strips: air loads, root first.
         air_wrench: [n, N, 6] of the air on each body, in its frame at its centre of mass.
         lift_axis, thrust_axis: unit vectors in the world. In wind: perpendicular to the stream (in the plane of flow
             and vertical), and against it; without wind: up, and forward (-x). The side force is along y, outboard.
         kinetic, elastic, gravitational: [n] energies, J; gravitational is zero at z = 0.
-        solution: how the beat was solved; None for a motion that came from elsewhere.
+        solution: how the beat was solved; None for a given motion.
     """
 
     phase: Array
@@ -141,11 +141,11 @@ class Balance:
 
     @property
     def closing(self) -> float:
-        """Supplied less dissipated less given to the air, W; zero but for the integrator and the last transients."""
+        """Supplied minus dissipated minus given to the air, W; zero except for integration errors and transients."""
         return self.supplied - self.dissipated - self.to_air
 
     @property
     def relative_closing(self) -> float:
-        """The closing error relative to what passes through: all that enters on the mean; 0 where nothing does."""
+        """The closing error relative to the mean power that enters the wing; 0 if none does."""
         entering = max(self.supplied, 0.0) + max(-self.to_air, 0.0)
         return self.closing / entering if entering > 0 else 0.0

@@ -1,4 +1,4 @@
-"""Geometry and mass of the wing and of the panels it is cut into."""
+"""Geometry and mass properties of the wing and of its panels."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ class Planform:
 
 
 def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> Index:
-    """Numbers of the panels under many points; edges belong to the outer and rear neighbour."""
+    """Indices of the panels that contain the points (``x``, ``y``) [N]; edges belong to the outer and rear panel."""
     edges = np.unique([panel.y0 for panel in panels])
     strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(edges) - 1)
     first = np.searchsorted([panel.y0 for panel in panels], edges)
@@ -135,7 +135,7 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
     inertia = np.eye(3) * (masses @ (r**2).sum(axis=1)) - (r * masses[:, None]).T @ r
     # thickness: foam through it, skin half on each face
     through = float((foam * h**2 / 12 + skin * h**2 / 4).sum())
-    # extent of the cells themselves in the plane
+    # the cells' own moments of inertia in the plane
     deep, wide = np.repeat(chord, _CELLS) * (panel.s1 - panel.s0) / _CELLS, (panel.y1 - panel.y0) / _CELLS
     along_x, along_y = float((foam + skin) @ deep**2) / 12, float((foam + skin).sum()) * wide**2 / 12
     inertia += np.diag([through + along_y, through + along_x, along_x + along_y])
@@ -144,6 +144,6 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
 
 
 def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> Index:
-    """Which body carries each marker."""
+    """Indices of the bodies that carry the markers."""
     places = np.array([marker.position for marker in markers])
     return carriers(planform, panels, places[:, 0], places[:, 1])
