@@ -1,10 +1,10 @@
 """Strip aerodynamics (thesis III-E, Eqs. 8-13), lane by lane.
 
-A strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
-shared among them. Beyond what is printed: alpha lies in [-pi/2, pi/2], drag grows with |alpha| (as printed it would
-push the wing at negative angles), and in reversed flow the lift keeps the sign of the normal flow; the change of sign
-is smoothed within 15 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law is good
-to about 15 degrees and is used as printed beyond.
+Each strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
+distributed to these. Differences from the printed equations: alpha lies in [-pi/2, pi/2]; drag grows with |alpha| (as
+printed, it would accelerate the wing at negative angles); in reversed flow the lift has the sign of the normal flow,
+with the change of sign smoothed within 15 degrees of 90 so that the force is continuous. The affine law is valid to
+about 15 degrees and is used as printed beyond.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from wingfit.sim.kernels.lanes.lanewise import angle
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
 REVERSAL = math.sin(math.radians(15.0))
-STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
+STILL = 1e-9  # m/s, avoids division by zero without flow
 
 
 @allocating
@@ -37,11 +37,11 @@ def strip_flow(
     flow: Array,
     loads: Array,
 ) -> None:
-    """The airflow of every strip, ``flow`` [S, FLOW, W], and what the affine laws make of it, ``loads`` [S, LOADS, W].
+    """The airflow of every strip, ``flow`` [S, FLOW, W], and ``loads`` [S, LOADS, W] by the affine laws.
 
     ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
     centroid in the body frame; ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b; ``induced`` [S, 3, W]: velocity of the
-    air on top of the wind, or empty, and then the strip's place and pitch rate are not asked for either.
+    air in addition to the wind; if it is empty, position and pitch rate of the strips are not computed either.
     """
     mean = np.empty((9, LANES))
     for s in range(len(start) - 1):
@@ -67,7 +67,7 @@ def strip_flow(
         ux, uy, uz = load1(wind, 0) - load1(mean, 0), load1(wind, 1) - load1(mean, 1), load1(wind, 2) - load1(mean, 2)
         if len(induced):
             ux, uy, uz = ux + load(induced, s, 0), uy + load(induced, s, 1), uz + load(induced, s, 2)
-            _whereabouts(s, start, weight, centroid, R, p, V, flow)
+            _position_and_pitch_rate(s, start, weight, centroid, R, p, V, flow)
         uc = ux * cx + uy * cy + uz * cz
         un = ux * nx + uy * ny + uz * nz
         q = root(uc * uc + un * un + STILL * STILL)
@@ -94,10 +94,10 @@ def strip_flow(
 
 
 @kernel
-def _whereabouts(
+def _position_and_pitch_rate(
     s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
 ) -> None:
-    """Where the strip's area is in the world, and how fast it pitches."""
+    """Set the position of the strip's centroid in the world, and its pitch rate."""
     for i in (arrays.PLACE_X, arrays.PLACE_X + 1, arrays.PLACE_X + 2, arrays.PITCH_RATE):
         store(flow, s, i, 0.0)
     for n in range(start[s], start[s + 1]):
@@ -131,9 +131,9 @@ def strip_forces(
 ) -> None:
     """Add the air's wrench to every body, from the ``loads`` of its strip.
 
-    ``lift_x``, ``drag_x`` [N, W]: where the shares act along the chord, in the body frame; ``spread``: whether
-    there are loads that are spread evenly. Also out: ``damping`` [N, W], force per normal speed of the body (for the
-    linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
+    ``lift_x``, ``drag_x`` [N, W]: points of action of the shares along the chord, in the body frame; ``spread``:
+    whether there are uniformly distributed loads. Also set: ``damping`` [N, W], force per normal speed of the body (for
+    the linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
     """
     lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
     push = np.empty((5, LANES))

@@ -1,4 +1,4 @@
-"""Arrays whose groups of lanes each fill one cache line: a group that straddles two costs twice as much to load."""
+"""Arrays in which every group of lanes fills one cache line; loading one that spans two lines takes twice as long."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def aligned(array: ArrayLike) -> Array:
 
 
 def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
-    """Zeros [..., LANES] of many shapes [...] by name, cut from one piece: a group of lanes asks for dozens."""
+    """Zeros [..., LANES] of many shapes [...] by name, as parts of one array, since a group of lanes needs dozens."""
     sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
     whole, start, found = zeros((sum(sizes.values()),)), 0, {}
     for name, size in sizes.items():

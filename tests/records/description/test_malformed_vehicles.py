@@ -80,7 +80,7 @@ DESCRIPTIONS = {
         "cutoff_hz: 40.0",
         "cutoff_hz: 12",
         ["recordings/slow.csv"],
-        ["is 12 Hz, below the flap frequency, 12.5 Hz", "leave low_pass out"],
+        ["is 12 Hz, below the flap frequency, 12.5 Hz", "omit low_pass"],
     ),
     "cutoff": ("cutoff_hz: 40.0", "cutoff_hz: 125", ["recordings/slow.csv"], ["is 125 Hz", "sampling rate, 125 Hz"]),
     "rig": ("rig: free_flight", "rig: bath", ["recordings[2].rig"], ["'free_flight'"]),
