@@ -1,8 +1,8 @@
-"""Linear algebra on one thread, so that results do not depend on the number of threads a machine offers.
+"""Linear algebra on one thread, so that results do not depend on the number of threads of the machine.
 
-BLAS splits a product among its threads, and each split rounds differently: in the last bit, which a search or a test of
-significance can turn into another answer. What computes the numbers of a result therefore runs with one BLAS thread
-(docs/decisions/0012-threads.md), whatever the environment says, and its caller gets the former setting back.
+BLAS divides a product among its threads, and the rounding depends on the division. A difference in the last bit can
+change the outcome of a search or of a significance test. All code that computes numbers of a result therefore runs with
+one BLAS thread (docs/decisions/0012-threads.md), whatever the environment says; afterwards the setting is restored.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from threadpoolctl import LibController, ThreadpoolController
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-# Of OpenBLAS's functions: what builds put before and after their names.
-_BEFORE, _AFTER = ("scipy_", ""), ("64_", "_64", "")
+# Prefixes and suffixes that builds of OpenBLAS add to the names of its functions.
+_PREFIXES, _SUFFIXES = ("scipy_", ""), ("64_", "_64", "")
 
 
 class _Library(NamedTuple):
-    """How the threads of a BLAS library are read and set."""
+    """Functions that read and set the number of threads of a BLAS library."""
 
     get: Callable[[], int]
     set: Callable[[int], object]
 
 
 def _library(found: LibController) -> _Library:
-    """The functions of OpenBLAS itself: threadpoolctl 3.8 ignores all threads but the first that sets it."""
+    """Thread functions of a library; OpenBLAS's own, since threadpoolctl 3.8 sets it only from the first thread."""
     if found.internal_api == "openblas" and found.threading_layer != "openmp":
         handle = ctypes.CDLL(found.filepath)
-        for before, after in itertools.product(_BEFORE, _AFTER):
-            name = f"{before}openblas_{{}}_num_threads{after}".format
+        for prefix, suffix in itertools.product(_PREFIXES, _SUFFIXES):
+            name = f"{prefix}openblas_{{}}_num_threads{suffix}".format
             if hasattr(handle, name("set")):
                 return _Library(getattr(handle, name("get")), getattr(handle, name("set")))
     return _Library(found.get_num_threads, found.set_num_threads)
@@ -46,19 +46,19 @@ def _library(found: LibController) -> _Library:
 class OneBlasThread:
     """Limits every loaded BLAS library to one thread; a context manager and a decorator.
 
-    The setting belongs to the process. It holds while any thread is inside, and the last one to leave restores what
-    the first one found. Entering and leaving takes a few microseconds, and may be nested. A decorated generator is
-    inside only while it computes its next item: between items, and when abandoned, it holds nothing.
+    The setting belongs to the process. It holds while any thread is inside; the last thread to leave restores the
+    setting from before the first one entered. It takes a few microseconds and may be nested. A decorated generator is
+    inside only while it computes its next item, not between items.
     """
 
     def __init__(self) -> None:
-        # Re-entrant: garbage collection may leave another block while this thread enters one.
+        # Re-entrant: while this thread enters, garbage collection may close a generator and so leave another block.
         self._lock = threading.RLock()
         self._inside = 0
         self._modules = 0
         self._libraries: dict[str, _Library] = {}
         self._former: dict[str, int] = {}
-        # A forked process has only the thread that forked: nobody else could release the lock in it.
+        # A forked process has only the thread that forked; a lock held by another thread would never be released in it.
         os.register_at_fork(
             before=self._lock.acquire, after_in_parent=self._lock.release, after_in_child=self._lock.release
         )
@@ -71,7 +71,7 @@ class OneBlasThread:
             for path, library in self._libraries.items():
                 if path not in self._former:
                     self._former[path] = library.get()
-                # Always: somebody else may have raised it, and MKL has a setting for each thread.
+                # Every time: other code may have raised it, and MKL has a separate setting for each thread.
                 library.set(1)
 
     def __exit__(self, *_: object) -> None:
@@ -83,7 +83,7 @@ class OneBlasThread:
                     self._libraries[path].set(threads)
 
     def __call__(self, function: F) -> F:
-        """``function``, or each step of the generator that it makes, with one BLAS thread."""
+        """``function``, or each step of the generator it returns, with one BLAS thread."""
 
         @wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.records.vehicle import Vehicle, WingMotion
 from wingfit.records.wing import Wing
 
@@ -47,7 +47,7 @@ class Condition:
 class LowPass:
     """Zero-phase low-pass: a Butterworth filter run forwards and backwards.
 
-    ``cutoff`` in Hz is where one pass has lost half its power; ``order`` is that of one pass.
+    ``cutoff`` (Hz) is the half-power frequency of one pass; ``order`` is that of one pass.
     """
 
     cutoff: float
@@ -56,35 +56,35 @@ class LowPass:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What was recorded under one condition: tracks of markers, or forces of a vehicle.
+    """Measurements under one condition: tracks of markers, or forces of a vehicle.
 
-    ``values`` has shape [T, C]: at each of the ``times`` (T, in s, increasing) the channels: three per marker in the
-    order x, y, z (m, wing frame), or one per force axis (N, body axes: what the wings exert on the body).
-    ``standard_deviation`` [C] is the noise where the user knows it, else None. Times of forces count from the start of
-    a beat. ``low_pass`` says that the values have been filtered; a model filters alike. ``motion`` is the wings' motion
-    as measured in this recording, and ``mass`` (kg) the vehicle's, where they differ from the vehicle's own.
+    ``values`` [T, C] are the channels at the increasing ``times`` [T] (s): three per marker in the order x, y, z (m,
+    wing frame), or one per force axis (N, body axes, force of the wings on the body). ``standard_deviation`` [C] is the
+    known noise of the channels, or None. Times of forces count from the start of a beat. ``low_pass`` is the filter
+    that was applied to the values, and which a model applies too. ``motion`` of the wings and ``mass`` (kg) of the
+    vehicle replace those of the vehicle's description in this recording.
     """
 
     name: str
     rig: Rig
     condition: Condition
-    times: npt.NDArray[np.float64]
+    times: Float[Array, " T"]
     markers: tuple[str, ...]
-    values: npt.NDArray[np.float64]
-    standard_deviation: npt.NDArray[np.float64] | None = None
+    values: Float[Array, "T C"]
+    standard_deviation: Float[Array, " C"] | None = None
     forces: tuple[ForceAxis, ...] = ()
     low_pass: LowPass | None = None
     motion: WingMotion | None = None
     mass: float | None = None
 
     @cached_property
-    def valid(self) -> npt.NDArray[np.bool_]:
+    def valid(self) -> Bool[Mask, "T C"]:
         """True where a channel was recorded, [T, C]."""
         return np.isfinite(self.values)
 
     @property
     def kind(self) -> Kind:
-        """Whether it holds tracks or forces."""
+        """Whether the recording holds tracks or forces."""
         return "forces" if self.forces else "tracks"
 
     @property
@@ -94,16 +94,16 @@ class Recording:
         return tracks + tuple(f"force_{axis}" for axis in self.forces)
 
     @property
-    def positions(self) -> npt.NDArray[np.float64]:
+    def positions(self) -> Float[Array, "T M 3"]:
         """``values`` of a recording of tracks as [T, M, 3]."""
         return self.values.reshape(len(self.times), len(self.markers), 3)
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """A wing or a vehicle with its recordings; those named in ``held_out`` are never fitted, only predicted.
+    """A wing with recordings of tracks, or a vehicle with recordings of forces.
 
-    A wing is recorded as tracks, a vehicle as forces.
+    Recordings named in ``held_out`` are used for validation only, never for fitting.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The motion of the driving rods, as data: how the flap angle follows the phase of the beat."""
+"""Description of the drive: the flap angle of the driving rods as a function of the phase of the beat."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class FourierDrive:
 class FourBarDrive:
     """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod (thesis III-F).
 
-    Lengths in m; ``ground`` joins the two fixed pivots. The crank angle equals the drive phase psi.
+    Lengths in m; ``ground`` is the distance of the two fixed pivots. The crank angle equals the drive phase psi.
     ``offset`` is added to the rocker angle so that zero flap angle is the horizontal wing (rad).
     """
 

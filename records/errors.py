@@ -1,4 +1,4 @@
-"""The one exception of the file formats: what is wrong, where, and what to do about it."""
+"""The exception of the file formats, a list of faults: what is wrong, where, and what to do about it."""
 
 from __future__ import annotations
 
@@ -26,54 +26,54 @@ class Fault:
 class DatasetError(ValueError):
     """A dataset that cannot be read or written.
 
-    ``errors`` lists what was found, at most ``MAX_ERRORS``; ``found`` counts all. ``where``, ``value`` and
+    ``errors`` lists the first faults, at most ``MAX_ERRORS``; ``count`` is the number of all. ``where``, ``value`` and
     ``message`` are those of the first.
     """
 
-    def __init__(self, errors: Sequence[Fault], found: int | None = None) -> None:
+    def __init__(self, errors: Sequence[Fault], count: int | None = None) -> None:
         if not errors:
             raise ValueError("a DatasetError needs at least one fault")
         self.errors = list(errors[:MAX_ERRORS])
-        self.found = max(len(errors), found or 0)
+        self.count = max(len(errors), count or 0)
         self.where = self.errors[0].where
         self.value = self.errors[0].value
         self.message = self.errors[0].message
         lines = [str(fault) for fault in self.errors]
-        if self.found > len(self.errors):
-            lines.append(f"and {self.found - len(self.errors)} more")
+        if self.count > len(self.errors):
+            lines.append(f"and {self.count - len(self.errors)} more")
         super().__init__("\n".join(lines))
 
     def __reduce__(self) -> tuple[type[DatasetError], tuple[list[Fault], int]]:
-        return type(self), (self.errors, self.found)
+        return type(self), (self.errors, self.count)
 
 
 class Faults:
-    """Collects faults so that a user sees several at once; counts all, keeps the first ``MAX_ERRORS``."""
+    """Collects faults, so that an error reports several at once; counts all, stores the first ``MAX_ERRORS``."""
 
     def __init__(self) -> None:
-        self.kept: list[Fault] = []
-        self.found = 0
+        self.faults: list[Fault] = []
+        self.count = 0
 
     def add(self, where: str, value: object, message: str) -> None:
-        """Note one fault."""
-        self.found += 1
-        if len(self.kept) < MAX_ERRORS:
-            self.kept.append(Fault(where, shown(value), message))
+        """Add one fault."""
+        self.count += 1
+        if len(self.faults) < MAX_ERRORS:
+            self.faults.append(Fault(where, shown(value), message))
 
     def extend(self, error: DatasetError) -> None:
-        """Take over the faults of another error."""
-        self.kept.extend(error.errors[: MAX_ERRORS - len(self.kept)])
-        self.found += error.found
+        """Add the faults of another error."""
+        self.faults.extend(error.errors[: MAX_ERRORS - len(self.faults)])
+        self.count += error.count
 
     @property
     def full(self) -> bool:
-        """True once looking for more is no help to anybody."""
-        return self.found >= MAX_ERRORS
+        """Whether no more faults will be reported, so that the search for them can stop."""
+        return self.count >= MAX_ERRORS
 
     def raise_any(self) -> None:
-        """Raise DatasetError when there is anything to report."""
-        if self.kept:
-            raise DatasetError(self.kept, self.found)
+        """Raise DatasetError if there is a fault."""
+        if self.faults:
+            raise DatasetError(self.faults, self.count)
 
 
 def fail(where: str, value: object, message: str) -> DatasetError:
@@ -92,7 +92,7 @@ def shown(value: object) -> str | None:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Hint at the name that was meant: the nearest known one, or the known ones."""
+    """Hint for an unknown name: the most similar known name, or the list of known names."""
     names = list(known)
     close = difflib.get_close_matches(name, names, 1, 0.6)
     if close:

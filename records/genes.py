@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
+
+from wingfit.records.array_types import Array, ArrayLike, Float
 
 Scale = Literal["log", "linear"]
 
 
 class EstimateError(ValueError):
-    """An estimate of the dataset that the model cannot take: for a gene it lacks, or outside the gene's bounds."""
+    """An estimate of the dataset that the model refuses: of an unknown gene, or outside the gene's bounds."""
 
 
 @dataclass(frozen=True)
@@ -51,15 +52,15 @@ class Gene:
                 f"gene '{self.name}' is {value:g}{unit}; it must lie in [{self.lower:g}, {self.upper:g}]{unit}"
             )
 
-    def to_unit(self, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def to_unit(self, value: ArrayLike) -> Float[Array, "*B"]:
         """Map values to [0, 1], logarithmically for a log-scaled gene."""
         v = np.asarray(value, float)
         if self.scale == "log":
-            return np.log(v / self.lower) / math.log(self.upper / self.lower)
-        return (v - self.lower) / (self.upper - self.lower)
+            return np.asarray(np.log(v / self.lower) / math.log(self.upper / self.lower))
+        return np.asarray((v - self.lower) / (self.upper - self.lower))
 
-    def from_unit(self, u: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Inverse of :meth:`to_unit`; the result never leaves the bounds."""
+    def from_unit(self, u: ArrayLike) -> Float[Array, "*B"]:
+        """Inverse of :meth:`to_unit`, clipped to the bounds."""
         x = np.asarray(u, float)
         if self.scale == "log":
             value = self.lower * np.exp(x * math.log(self.upper / self.lower))
@@ -103,7 +104,7 @@ class Genome:
         return Genome(self.genes, tuple(merged[gene.name] for gene in self.genes))
 
     def normalised(self) -> dict[str, float]:
-        """Values by name with every share group divided by its sum: what the model uses and what people compare."""
+        """Values by name, with every share group divided by its sum: the values that the model uses."""
         sums: dict[str, float] = {}
         for gene, value in zip(self.genes, self.values, strict=True):
             if gene.share_of:

@@ -1,4 +1,4 @@
-"""How large a dataset may be. Uploads come from strangers; sizes are checked before memory is spent."""
+"""Limits of a dataset. Uploads are not trusted: sizes are checked before memory is allocated."""
 
 MIB = 2**20
 
@@ -6,16 +6,16 @@ FORMAT_VERSION = 1
 """Version of the format that this code reads and writes."""
 
 MAX_ARCHIVE_BYTES = 512 * MIB
-"""Size of a zip or NetCDF file as it is stored."""
+"""Size of a zip or NetCDF file."""
 
 MAX_EXPANDED_BYTES = 512 * MIB
 """Sum of the sizes of all files of a dataset, unpacked."""
 
 MAX_COMPRESSION_RATIO = 200
-"""Unpacked size over packed size; recordings reach about 4, sparse ones about 50."""
+"""Unpacked size over packed size; recordings have about 4, those with few values about 50."""
 
 RATIO_FREE_BYTES = 16 * MIB
-"""Below this unpacked size the ratio does not matter."""
+"""Below this unpacked size the ratio is not limited."""
 
 MAX_ENTRIES = 5000
 """Entries in a zip, folders and unrelated files included."""
@@ -24,7 +24,7 @@ MAX_DESCRIPTION_BYTES = 16 * MIB
 """Size of dataset.yaml."""
 
 MAX_ITEMS = 250_000
-"""Keys, items of lists and values in dataset.yaml: each takes hundreds of bytes in memory, however short it is."""
+"""Keys, items of lists and values in dataset.yaml; each takes hundreds of bytes of memory."""
 
 MAX_DEPTH = 12
 """Nesting of dataset.yaml; the format itself needs 6."""
@@ -37,19 +37,19 @@ MAX_HARMONICS = 50
 MAX_ESTIMATES = 1000
 
 MIN_FRAMES = 8
-"""Fewer instants cannot show one beat."""
+"""Instants in one recording, at least; fewer cannot resolve a beat."""
 
 MAX_ROWS = 200_000
-"""Instants in one recording."""
+"""Instants in one recording, at most."""
 
 MAX_VALUES = 64_000_000
 """Numbers in one dataset, 8 bytes each in memory."""
 
 MAX_UPLOADED_NETCDF_VALUES = 8_000_000
-"""Numbers in a NetCDF file from a stranger, which is read within limits of memory (`records/files/confined.py`)."""
+"""Numbers in an uploaded NetCDF file, which is read within a limit of memory (`records/files/confined.py`)."""
 
 MAX_NAME_BYTES = 1024
-"""Length of a text of fixed length in NetCDF: each one takes it in memory, however short the text is."""
+"""Length of the type of fixed-length texts in NetCDF, which every text occupies in memory."""
 
 MAX_CHUNK_BYTES = 64 * MIB
 """Size of one chunk of a NetCDF variable, unpacked."""
@@ -58,22 +58,22 @@ MAX_ERRORS = 20
 """Errors reported at once."""
 
 PLANFORM_MARGIN = 0.01
-"""How far outside the planform a marker may sit at rest, m."""
+"""Largest distance of a marker at rest from the planform, m."""
 
 IMPLAUSIBLE_SPANS = 1.5
-"""Markers further than this many spans from the hinge (median) were not recorded in metres."""
+"""Largest plausible median distance of markers from the hinge, in spans; beyond, the unit is not metres."""
 
 MAX_OPEN_AT_START = 0.1
-"""How far wings that clap may be open where the beat starts, as a part of the range of their flap angle."""
+"""Largest opening of wings that clap at the start of the beat, as a fraction of the range of the flap angle."""
 
 IMPLAUSIBLE_WEIGHTS = 10
-"""Forces along an axis above this many weights of the vehicle (root mean square) were not recorded in newtons."""
+"""Largest plausible RMS force along an axis, in weights of the vehicle; beyond, the unit is not newtons."""
 
 NEGLIGIBLE_WEIGHTS = 1e-6
-"""Nor those below this."""
+"""Smallest plausible RMS force, in weights of the vehicle."""
 
 MIN_SAMPLES_PER_BEAT = 4
-"""Forces sampled more slowly than this show no beat: the times are in another unit, or the flap frequency is wrong."""
+"""Fewer samples per beat mean that the times are in another unit or the flap frequency is wrong."""
 
 UNEVEN_STEPS = 0.01
-"""How far the time steps of forces may differ from their median, relative: a filter needs an even clock."""
+"""Largest relative difference of the time steps of forces from their median: filters need even sampling."""

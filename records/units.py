@@ -1,9 +1,8 @@
-"""Exact conversion between the units people write (deg, mbar, Celsius) and SI inside.
+"""Exact conversion between the units of the files (deg, mbar, Celsius) and SI.
 
-Doubles in degrees do not reach every double in radians: where the mantissa of the degree value is the coarser
-one, two neighbours straddle the wanted radian. So a number in a file is read as a decimal, converted in long
-arithmetic and rounded once; and it is written with as few digits as bring back the same double (18 now and
-then, where 17 would do without a change of unit). Reading what was written is therefore exact.
+Not every double in radians is the conversion of a double in degrees. A number in a file is therefore read as a decimal,
+converted in long arithmetic and rounded once, and it is written with the fewest digits (up to 18) that convert back to
+the same double. So writing and reading is exact.
 """
 
 from __future__ import annotations
@@ -47,17 +46,12 @@ def from_si(value: float, unit: Unit = SI) -> Decimal:
         return Decimal(repr(value))
     exact = _LONG.divide(_LONG.subtract(Decimal(value), unit.offset), unit.factor)
     candidates = (Decimal(0), Decimal("-0"), *(Context(prec=n).plus(exact) for n in range(1, 40)))
-    # Only temperatures within a hair of absolute zero find no candidate; the format refuses them.
+    # Without a candidate only for temperatures next to absolute zero, which the format refuses.
     return next((candidate for candidate in candidates if _same(to_si(candidate, unit), value)), exact)
 
 
-def decimals(**values: float) -> dict[str, Decimal]:
-    """Values that are SI in the file too, as exact decimals."""
-    return {key: from_si(value) for key, value in values.items()}
-
-
 def number_text(value: Decimal) -> str:
-    """``value`` as text that YAML 1.1 and 1.2 readers alike take for a number."""
+    """``value`` as text that is a number in YAML 1.1 and in YAML 1.2."""
     text = repr(float(value))
     if Decimal(text) != value:
         text = str(value).lower()

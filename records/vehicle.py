@@ -28,7 +28,7 @@ class SplitCycleFlap:
     With omega = 2 pi, zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens and
     bias - amplitude cos((omega + sigma) t* + xi) while it closes, sigma = split omega / (omega - 2 split) and
     xi = -2 pi split / (omega - 2 split): a positive split (rad per beat, below pi) opens slowly and closes fast.
-    ``smoothing`` is the standard deviation, in beats, of the Gaussian that rounds the law off.
+    ``smoothing`` is the standard deviation, in beats, of the Gaussian that smooths the flap angle.
     """
 
     amplitude: float
@@ -64,7 +64,7 @@ class PassivePitch:
 
 @dataclass(frozen=True)
 class FourierPitch:
-    """Wing pitch theta_w (rad) as such a series."""
+    """Wing pitch theta_w (rad) as a Fourier series like that of :class:`FourierFlap`."""
 
     mean: float
     cosine: tuple[float, ...]
@@ -80,8 +80,9 @@ Pitch = PassivePitch | FourierPitch
 class WingMotion:
     """Prescribed motion of the wings over a beat, which starts (t* = 0) where the wings are closest and begin to open.
 
-    ``pitch`` holds at the span fraction ``pitch_station``; from there the twist is linear in span to ``root_pitch`` at
-    the flapping axis (pi/2 is a chord along the body). ``peel_end`` is the t* at which the whole chord has come apart.
+    ``pitch`` is the wing pitch at the span fraction ``pitch_station``. The pitch is linear along the span, with the
+    value ``root_pitch`` at the flapping axis (pi/2: chord along the body). ``peel_end`` is the t* at which the chords
+    have come apart entirely.
     """
 
     flap: Flap
@@ -93,7 +94,7 @@ class WingMotion:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A flapping vehicle or animal as built: everything a blade-element model needs that is not a gene.
+    """A flapping vehicle or animal: all inputs of a blade-element model that are not genes.
 
     Attributes:
         layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair"; "single" one wing.
@@ -101,11 +102,11 @@ class Vehicle:
         stations: chord from the flapping axis (r = 0) to the tip.
         wing_mass: of one wing, kg.
         thickness: of the wing, m.
-        pitch_axis: place of the axis of wing pitch, in chords behind the leading edge (x0 of Eq. 4).
+        pitch_axis: position of the axis of wing pitch, in chords behind the leading edge (x0 of Eq. 4).
         dihedral: zeta_0, rad, flap angle at which the wings of a pair are closed.
         mass: of the whole vehicle, kg.
-        motion: of the wings where a recording brings none of its own.
-        velocities: "mirrored" (upper wing the mirror image of the lower) or "printed" (Eq. 18 as it stands in print).
+        motion: of the wings in recordings without a motion of their own.
+        velocities: "mirrored" (upper wing the mirror image of the lower) or "printed" (Eq. 18 as printed).
         estimates: the user's estimates of genes by name, overriding the model's defaults.
     """
 

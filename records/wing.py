@@ -22,7 +22,7 @@ class Station:
 class Rod:
     """Carbon rod that slides in a straw glued into the foam, straight from (x_root, y_root) to (x_tip, y_tip), in m.
 
-    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod goes on into the driving rod of its name.
+    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod continues as the driving rod of its name.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Rod:
 
 @dataclass(frozen=True)
 class Materials:
-    """Masses that are no genes: foam (kg/m^3), skin with its glue (kg/m^2, both faces together)."""
+    """Densities, which are not genes: foam (kg/m^3), skin with its glue (kg/m^2, both faces together)."""
 
     foam_density: float
     skin_areal_density: float
@@ -62,9 +62,9 @@ class Hinge:
 
 @dataclass(frozen=True)
 class Wing:
-    """A wing as built: everything a model needs that is not a gene.
+    """A wing: all inputs of a model that are not genes.
 
-    ``driven_rods`` are the names of the front and the rear rod; the rear one follows by the condition's phase lag.
+    ``driven_rods`` are the names of the front and the rear rod; the rear one lags by the condition's phase lag.
     ``reference_markers`` define the start of the beat: where their mean height crosses that of the hinge on the
     upstroke (thesis IV-A). ``estimates`` are the user's estimates of genes by name, overriding the model's defaults.
     """

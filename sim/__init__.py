@@ -1,1 +1,1 @@
-"""Wing + genome + condition -> observation."""
+"""Simulators: rig, genome, condition and effects -> simulated observation."""

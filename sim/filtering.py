@@ -1,30 +1,28 @@
-"""Zero-phase low-pass, alike for what was recorded and what a model predicts (Armanini et al. 2016, section 3.4)."""
+"""Zero-phase low-pass of recordings and predictions alike (Armanini et al. 2016, section 3.4)."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt, sosfreqz
 
 from wingfit.records import LowPass, Recording
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.records.limits import UNEVEN_STEPS
 
-Array = npt.NDArray[np.float64]
-
-CUTOFF_HARMONIC = 3.2  # the seed's 40 Hz at 12.5 beats per second: just above the third harmonic
-ENDS = 2.0  # periods of the cutoff that a filter needs to settle, at either end
-FEW_BEATS = 4
+CUTOFF_HARMONIC = 3.2  # 40 Hz at 12.5 beats per second (Armanini et al. 2016): just above the third harmonic
+END_PERIODS = 2.0  # of the cutoff: length of the transient of the filter at either end
+MIN_BEATS_TO_TRIM = 4
 
 
 def default_cutoff(flap_frequency: float) -> float:
-    """Cutoff (Hz) just above the third harmonic, as the seed's 40 Hz is."""
+    """Cutoff (Hz) just above the third harmonic."""
     return CUTOFF_HARMONIC * flap_frequency
 
 
 def sampling_rate(recording: Recording) -> float:
-    """Samples per second; ValueError where the sampling is not even."""
+    """Samples per second; ValueError if the sampling is not even."""
     steps = np.diff(recording.times)
     mean = float(steps.mean())
     worst = float(np.abs(steps - mean).max())
@@ -38,11 +36,10 @@ def sampling_rate(recording: Recording) -> float:
 
 
 def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
-    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filter before this one.
+    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filtered recording.
 
-    What lies outside the recording is not known to the filter: the values near both ends would be wrong by a good part
-    of the force, and are missing (NaN) instead, for ENDS periods of the cutoff or one beat. A recording of fewer than
-    FEW_BEATS beats has nothing to spare and keeps them.
+    Near both ends the filtered values have large errors. They are replaced by NaN, for END_PERIODS periods of the
+    cutoff but at most one beat, unless the recording has fewer than MIN_BEATS_TO_TRIM beats.
     """
     if recording.low_pass is not None:
         raise ValueError(
@@ -52,21 +49,21 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     gaps = int(np.count_nonzero(~recording.valid))
     if gaps:
         raise ValueError(
-            f"recording {recording.name!r} lacks {gaps} values, and a filter needs all; "
+            f"recording {recording.name!r} has {gaps} missing values, but a filter needs all; "
             "fill the gaps, cut the recording, or calibrate without low-pass filter"
         )
     sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
-    # The pad must outlast the filter's memory, of the order of its cutoff's period.
+    # The padding must be longer than the impulse response of the filter.
     pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
     values = np.ascontiguousarray(sosfiltfilt(sections, recording.values, axis=0, padlen=pad))
     frequency, rate = recording.condition.flap_frequency, sampling_rate(recording)
-    if len(values) * frequency >= FEW_BEATS * rate:
-        lost = round(min(ENDS / low_pass.cutoff, 1.0 / frequency) * rate)
+    if len(values) * frequency >= MIN_BEATS_TO_TRIM * rate:
+        lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate)
         values[:lost] = values[len(values) - lost :] = np.nan
     return replace(recording, values=values, low_pass=low_pass)
 
 
-def gain(low_pass: LowPass, rate: float, frequency: npt.ArrayLike) -> Array:
+def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:
     """Gain (real: no phase) at ``frequency`` (Hz) of the filter as it works on samples taken at ``rate`` (Hz).
 
     Above half the rate there is nothing to filter: a model's harmonics there would be aliases, and get none.

@@ -1,4 +1,4 @@
-"""The protocol that every simulated rig meets; calibration and diagnosis know nothing else about physics."""
+"""The interface of a simulated rig; calibration and diagnosis use nothing else of the simulators."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Gene, Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array as Array
+from wingfit.records.array_types import ArrayLike
 
 
 class Solution(NamedTuple):
@@ -53,7 +52,7 @@ class Model(Protocol):
         ...
 
 
-def genome_batch(genes: Sequence[Gene], genomes: npt.ArrayLike) -> Array:
+def genome_batch(genes: Sequence[Gene], genomes: ArrayLike) -> Array:
     """Return ``genomes`` as a contiguous [B, G] float array; ValueError when the shape does not fit the genes."""
     batch = np.ascontiguousarray(np.atleast_2d(np.asarray(genomes, float)))
     if batch.ndim != 2 or batch.shape[1] != len(genes):

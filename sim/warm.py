@@ -1,4 +1,4 @@
-"""Compile the kernels into the on-disk cache, so that the first run starts at once: ``python -m wingfit.sim.warm``."""
+"""Compile the kernels into the on-disk cache, to save the first run the time: ``python -m wingfit.sim.warm``."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from wingfit.sim.virtual_rigs.balance import blank_recording as blank_forces
 from wingfit.sim.virtual_rigs.campaign import WIND_TUNNEL, blank_recording, robird_wing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
-WITH_MEMORY = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture")
+WITH_STATES = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture")
 
 
 def main() -> None:
-    """Simulate two beats of the coarsest wing, and a beat of the vehicle, once without effects and once with memory."""
+    """Simulate two beats of the coarsest wing, and a beat of the vehicle without and with effects that have states."""
     start = time.perf_counter()
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=8, max_beats=2))
     model.beat([gene.nominal for gene in model.genes], blank_recording(model.wing, WIND_TUNNEL[0]))
-    vehicle = BladeElementWing(delfly()).with_effects(*WITH_MEMORY)
+    vehicle = BladeElementWing(delfly()).with_effects(*WITH_STATES)
     genome = Genome.nominal(vehicle.genes)
     switched_on = {name: value for one in vehicle.chosen for name, value in one.typical(vehicle.vehicle).items()}
     for one in (genome, genome.replace(switched_on)):

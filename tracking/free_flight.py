@@ -1,31 +1,29 @@
-"""Forces on a freely flying body from its tracked markers: F = m (a - g), with the noise carried through exactly.
+"""Forces on a freely flying body from its tracked markers, F = m (a - g), with their standard deviations.
 
-The tracking frame stands still with z up; body axes are x forward, y right, z down. The vehicle counts as one rigid
-body (single rigid body kinematics, as in Armanini et al. 2016, Fig. 10a), so the forces hold what the wings' own
-inertia and the tail add.
+The tracking frame is inertial with z up; body axes are x forward, y right, z down. The vehicle is treated as one rigid
+body (single rigid body kinematics, as in Armanini et al. 2016, Fig. 10a), so the forces include those of the tail and
+of the inertia of the wings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
-from scipy import interpolate
+from scipy import interpolate, linalg
 
 from wingfit.records import Condition, LowPass, Recording
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import STANDARD_GRAVITY
 from wingfit.records.limits import UNEVEN_STEPS
-from wingfit.tracking.rigid_body import Poses, poses, quaternions, scale_remarks
+from wingfit.tracking.rigid_body import Poses, cross_matrices, poses, quaternions, scale_remarks
 from wingfit.tracking.zero_phase import Kernels, kernels
 
-Array = npt.NDArray[np.float64]
 _CHUNK = 512
 _LAGS = 50
-_FASTEST = 100.0  # m/s, as in a dataset
+_MAX_SPEED = 100.0  # m/s, as in a dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +41,10 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class MarkerNoise:
-    """Noise of one coordinate of one marker, m, found in how far the markers are from rigid.
+    """Noise of one coordinate of one marker, m, estimated from the residuals of the rigid-body fit.
 
-    ``correlation`` [L] is that of samples 0, 1, ... frames apart. ``common`` is the factor by which the centre of mass
-    scatters more above the cut-off than independent markers explain, at least 1; it is in the standard deviations.
+    ``correlation`` [L] is the autocorrelation at lags of 0, 1, ... frames. ``common``, at least 1, is the ratio of the
+    scatter of the centre of mass above the cut-off to that of independent markers; it scales the standard deviations.
     """
 
     deviation: float
@@ -56,11 +54,11 @@ class MarkerNoise:
 
 @dataclass(frozen=True, eq=False)
 class FreeFlight:
-    """What the body did and what acted on it, [T] frames; NaN near ends and gaps.
+    """Motion of the body and the loads on it at T frames; NaN near ends and gaps.
 
-    ``force`` and ``moment`` [T, 3] in body axes (N, N m; moment None without inertia), with their standard deviations
-    from marker noise at every instant; ``position``, ``velocity`` [T, 3] of the centre of mass in tracking axes;
-    ``rotation`` [T, 3, 3] body to tracking axes, smoothed; ``rate`` [T, 3] turn rate in body axes, rad/s.
+    ``force`` and ``moment`` [T, 3] in body axes (N, N m; moment None without inertia), with the standard deviations
+    at every instant that result from marker noise; ``position``, ``velocity`` [T, 3] of the centre of mass in tracking
+    axes; ``rotation`` [T, 3, 3] body to tracking axes, smoothed; ``rate`` [T, 3] angular velocity in body axes, rad/s.
     """
 
     times: Array
@@ -80,7 +78,7 @@ class FreeFlight:
 
     @property
     def pitch(self) -> Array:
-        """Body pitch theta_b [T], rad: the nose above the horizontal."""
+        """Body pitch theta_b [T], rad: angle of the nose above the horizontal."""
         return np.asarray(np.arcsin(np.clip(self.rotation[:, 2, 0], -1, 1)))
 
 
@@ -88,10 +86,10 @@ class FreeFlight:
 def free_flight(
     times: Array, tracks: Array, body: Body, low_pass: LowPass, gravity: float = STANDARD_GRAVITY
 ) -> FreeFlight:
-    """Forces on ``body`` from ``tracks`` [T, M, 3] (m, tracking axes, NaN where not seen) at even ``times`` [T] in s.
+    """Forces on ``body`` from ``tracks`` [T, M, 3] (m, tracking axes, NaN where not seen) at even ``times`` [T] (s).
 
-    Gaps of the pose no longer than a quarter period of the cut-off are bridged by cubics; longer ones, and the ends,
-    cost the reach of the filter on either side. ValueError where nothing is left.
+    Gaps up to a quarter period of the cut-off are interpolated by cubics. On either side of longer gaps, and at the
+    ends, the results are NaN for half the length of the filter. ValueError if no frame remains.
     """
     step = _even_step(times)
     windows = kernels(low_pass, 1 / step)
@@ -107,18 +105,18 @@ def free_flight(
     for bridge in bridges:
         filled[bridge.frame] = bridge.weights @ state[bridge.near]
     if bridges:
-        remarks.append(f"{len(bridges)} frames without a pose were bridged (gaps of at most {longest} frames)")
+        remarks.append(f"{len(bridges)} frames without a pose were interpolated (gaps of at most {longest} frames)")
     smooth = [windows.apply(filled, d) for d in range(3)]
     if not np.isfinite(smooth[2]).any():
         needed = 2 * windows.reach + 1
         raise ValueError(
-            f"{len(times)} frames hold no stretch of {needed} in which a pose is known throughout; "
-            "a cut-off higher than this, a longer recording or markers seen more often would help"
+            f"{len(times)} frames hold no {needed} in a row with a pose, which the filter needs: raise the cut-off, "
+            "record longer, or keep the markers in view"
         )
     speed = float(np.linalg.norm(np.nanmean(smooth[1][:, :3], axis=0)))
-    if speed > _FASTEST:
+    if speed > _MAX_SPEED:
         raise ValueError(
-            f"the body flies at {speed:.4g} m/s; it must be at most {_FASTEST:g} m/s: give the markers of both "
+            f"the body flies at {speed:.4g} m/s; it must be at most {_MAX_SPEED:g} m/s: give the markers of both "
             "files in metres and time_s in seconds"
         )
     R, rate, turning = _attitude(smooth)
@@ -148,9 +146,9 @@ def recording(
 ) -> Recording:
     """Forces x and z of ``flight`` as a recording in level flight.
 
-    ``beat_start`` is a time (s, clock of the tracks) at which a beat starts; times count from the last start before the
-    first force. Airspeed and body pitch are the means over the flight, in still air. The standard deviation is the RMS
-    over the instants.
+    ``beat_start`` is a time (s, clock of the tracks) at which a beat starts; the recording's times count from the last
+    start of a beat before the first force. Airspeed (in still air) and body pitch are means over the flight. The
+    standard deviation is the RMS over the instants.
     """
     known = np.isfinite(flight.force).all(axis=1)
     first, last = np.flatnonzero(known)[[0, -1]]
@@ -176,7 +174,9 @@ def recording(
 
 def _even_step(times: Array) -> float:
     if len(times) < 3:
-        raise ValueError(f"{len(times)} frames; forces need at least 3, and the reach of the filter beyond")
+        raise ValueError(
+            f"{len(times)} frames; forces need at least 3, and as many more as the filter spans: record longer"
+        )
     step = float(np.median(np.diff(times)))
     worst = float(np.max(np.abs(np.diff(times) - step)))
     if worst > UNEVEN_STEPS * step:
@@ -191,22 +191,26 @@ def _about(found: Poses) -> list[str]:
     """Remarks on frames without a pose and on outliers."""
     remarks, missing = [], int(np.isnan(found.position[:, 0]).sum())
     if missing:
-        remarks.append(f"{missing} of {len(found.position)} frames show fewer than 3 markers off a line: no pose there")
+        remarks.append(
+            f"{missing} of {len(found.position)} frames have no pose: fewer than 3 markers, or markers on one line"
+        )
     if found.rejected:
-        remarks.append(f"{found.rejected} samples were left out: far off the rigid body (swapped or loose markers?)")
+        remarks.append(
+            f"{found.rejected} samples were excluded: they lie far from the rigid body (swapped or loose markers?)"
+        )
     return remarks
 
 
 @dataclass(frozen=True, eq=False)
 class _Bridge:
-    """A frame without a pose, put together from frames ``near`` with ``weights``."""
+    """A frame without a pose, interpolated from the frames ``near`` with ``weights``."""
 
     frame: int
-    near: npt.NDArray[np.int64]
+    near: Index
     weights: Array
 
 
-def _bridges(known: npt.NDArray[np.bool_], longest: int) -> list[_Bridge]:
+def _bridges(known: Mask, longest: int) -> list[_Bridge]:
     """Cubic interpolation over gaps of at most ``longest`` frames."""
     rows, found = np.flatnonzero(known), []
     for before, after in pairwise(rows.tolist()):
@@ -219,8 +223,8 @@ def _bridges(known: npt.NDArray[np.bool_], longest: int) -> list[_Bridge]:
     return found
 
 
-def _spread_over(taps: Array, rows: npt.NDArray[np.int64], bridges: list[_Bridge]) -> Array:
-    """Taps [rows, 2 n + 1] on frames that have a pose: those on bridged frames go to the frames behind them."""
+def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
+    """Filter weights [rows, 2 n + 1], with those of interpolated frames moved to the frames they come from."""
     n, spread = len(taps) // 2, np.tile(taps, (len(rows), 1))
     for bridge in bridges:
         place = bridge.frame - rows + n
@@ -233,7 +237,7 @@ def _spread_over(taps: Array, rows: npt.NDArray[np.int64], bridges: list[_Bridge
 
 
 def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
-    """Rotation [T, 3, 3], turn rate and its derivative [T, 3] in body axes from smoothed quaternions."""
+    """Rotation [T, 3, 3], angular velocity and acceleration [T, 3] in body axes from smoothed quaternions."""
     size = np.linalg.norm(smooth[0][:, 3:], axis=1, keepdims=True)
     q, dq, ddq = (s[:, 3:] / size for s in smooth)
     w, v = q[:, :1], q[:, 1:]
@@ -253,12 +257,12 @@ def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
 
 
 def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPass) -> MarkerNoise:
-    """Noise per marker from the rigidity residuals; the common part from the centre of mass above the cut-off."""
+    """Noise per marker from the rigid-body residuals; common factor from the centre of mass above the cut-off."""
     used = np.isfinite(found.position[:, 0])
     free = 3 * found.seen[used].sum() - 6 * used.sum()
     deviation = float(np.sqrt(np.nansum(found.residuals[used] ** 2) / free))
     correlation = _correlation(found.residuals, min(_LAGS, len(centre) // 4))
-    # Between cut-off and Nyquist the body hardly moves: what is there is noise.
+    # Between the cut-off and the Nyquist frequency the body hardly moves, so the signal there is noise.
     high = kernels(LowPass(min(1.6 * low_pass.cutoff, 0.45 / step), 8), 1 / step)
     rest = centre - high.apply(centre, 0)
     taps = -high.taps[0]
@@ -271,23 +275,21 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
 
 
 def _centre_gain(found: Poses, body: Body) -> float:
-    """Variance of a coordinate of the centre of mass per variance of a marker's, mean over axes and frames."""
+    """Variance of a coordinate of the centre of mass over that of a marker, mean over axes and frames."""
     G = _of_centre(found, body)[np.isfinite(found.position[:, 0])]
     return float(np.mean(np.sum(G[:, :3] ** 2, axis=2)))
 
 
 def _of_centre(found: Poses, body: Body) -> Array:
-    """Sensitivity [T, 6, 3 M] of displacement of the centre of mass, and of rotation, in body axes."""
+    """Sensitivity [T, 6, 3 M] of displacement of the centre of mass, and of rotation, to the markers, in body axes."""
     G = found.sensitivity
     moved = G.copy()
-    c = body.centre
-    cross = np.array([[0, -c[2], c[1]], [c[2], 0, -c[0]], [-c[1], c[0], 0]])
-    moved[:, :3] -= cross @ G[:, 3:]
+    moved[:, :3] -= cross_matrices(body.centre) @ G[:, 3:]
     return moved
 
 
 def _correlation(residuals: Array, lags: int) -> Array:
-    """Correlation [lags] of the residuals in time, cut at its first value within chance of zero."""
+    """Autocorrelation [lags] of the residuals in time, cut at the first value that is not significant."""
     r = residuals.reshape(len(residuals), -1)
     r = r - np.nanmean(r, axis=0)
     variance = float(np.nanmean(r**2))
@@ -302,7 +304,7 @@ def _correlation(residuals: Array, lags: int) -> Array:
 
 
 def _admissible(values: Array) -> Array:
-    """The nearest sequence that is a correlation: its spectrum must not be negative."""
+    """The nearest valid autocorrelation: that with negative values of the spectrum set to zero."""
     size = 4 * len(values) + 4
     wrapped = np.zeros(size)
     wrapped[: len(values)] = values
@@ -313,10 +315,10 @@ def _admissible(values: Array) -> Array:
 
 
 def _toeplitz(correlation: Array, size: int) -> Array:
-    lags = np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
+    """Correlation matrix [size, size]."""
     padded = np.zeros(max(size, len(correlation)))
     padded[: len(correlation)] = correlation
-    return np.asarray(padded[lags])
+    return np.asarray(linalg.toeplitz(padded[:size]))
 
 
 def _deviation(
@@ -331,8 +333,8 @@ def _deviation(
 ) -> Array:
     """Standard deviation [T, 3] of force (or of moment, with ``inertia``) from the noise of the markers.
 
-    To first order in the noise, exact in the filter: the error is a weighted sum over the window's frames and all
-    markers, whose variance follows from the weights and the noise's correlation in time.
+    The error is, to first order in the noise, a weighted sum over all markers and the frames of the filter window; its
+    variance follows from the weights and from the autocorrelation of the noise.
     """
     n, result = windows.reach, np.full(force.shape, np.nan)
     fitted = np.isfinite(found.position[:, 0])
@@ -340,29 +342,19 @@ def _deviation(
     turns = np.where(fitted[:, None, None], found.rotation, 0.0)
     correlation = _toeplitz(noise.correlation, 2 * n + 1)
     known = np.flatnonzero(np.isfinite(force[:, 0]))
-    for rows in _chunks(known):
+    for rows in (known[start : start + _CHUNK] for start in range(0, len(known), _CHUNK)):
         frames = rows[:, None] + np.arange(-n, n + 1)
-        back = np.einsum("tji,tkjl->tkil", R[rows], turns[frames])  # from body axes then to body axes now
+        back = np.einsum(
+            "tji,tkjl->tkil", R[rows], turns[frames]
+        )  # from body axes of the window's frames to those of this frame
         rotated = back @ G[frames][:, :, 3:]
         value, _, bend = (_spread_over(taps, rows, bridges)[..., None, None] for taps in windows.taps)
         if inertia is None:
             moved = body.mass * bend * (back @ G[frames][:, :, :3])
-            turned = value * (_crosses(force[rows])[:, None] @ rotated)
+            turned = value * (cross_matrices(force[rows])[:, None] @ rotated)
             weights = moved + turned
         else:
             weights = bend * (inertia @ rotated)
         spread = np.einsum("tkic,kl->tlic", weights, correlation, optimize=True)
         result[rows] = np.sqrt(np.maximum(np.sum(spread * weights, axis=(1, 3)), 0))
     return result * noise.deviation * noise.common
-
-
-def _chunks(rows: npt.NDArray[np.int64]) -> Iterator[npt.NDArray[np.int64]]:
-    for start in range(0, len(rows), _CHUNK):
-        yield rows[start : start + _CHUNK]
-
-
-def _crosses(v: Array) -> Array:
-    """[T, 3, 3] with ``_crosses(f) @ phi`` equal to f x phi."""
-    o = np.zeros(len(v))
-    x, y, z = v.T
-    return np.stack([np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=-2)

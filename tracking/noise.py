@@ -1,6 +1,6 @@
-"""Noise of tracked quantities, white and coloured, and least squares that accounts for it.
+"""Noise of tracked quantities, white and coloured, and least squares with it.
 
-Estimates are ordinary least squares; their covariance is that under the noise found in the residuals.
+Estimates are ordinary least squares; their covariance is computed for the noise estimated from the residuals.
 """
 
 from __future__ import annotations
@@ -8,21 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import optimize
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
-BLOCK = 400
+BLOCK = 400  # samples: the noise is estimated from at most BLOCKS blocks of that length, to save time
 BLOCKS = 4
-"""The noise is estimated from so many stretches of so many samples at most: enough, and quick."""
 _TINY = 1e-12
 _SHARES = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99)
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Stationary noise: covariance white^2 at lag 0 plus coloured^2 exp(-|lag| / time), lags in s."""
+    """Stationary noise with covariance white^2 at lag 0 plus coloured^2 exp(-|lag| / time); lag and ``time`` in s."""
 
     white: float
     coloured: float
@@ -36,7 +34,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class LinearFit:
-    """Least squares: ``coefficients`` [p], their ``covariance`` [p, p], ``residuals`` [N] and the noise in them."""
+    """Least squares: ``coefficients`` [p], their ``covariance`` [p, p], ``residuals`` [N], ``noise`` of these."""
 
     coefficients: Array
     covariance: Array
@@ -45,9 +43,9 @@ class LinearFit:
 
 
 def least_squares(times: Array, design: Array, values: Array, noise: Noise | None = None) -> LinearFit:
-    """Fit ``values`` [N] at increasing ``times`` [N] by the columns of ``design`` [N, p]; nothing may be missing.
+    """Fit ``values`` [N] at increasing ``times`` [N] by the columns of ``design`` [N, p]; no value may be NaN.
 
-    Without ``noise`` it is found in the residuals.
+    If ``noise`` is None, it is estimated from the residuals.
     """
     size = np.maximum(np.sqrt(np.sum(design**2, axis=0)), _TINY)
     X = design / size
@@ -62,14 +60,13 @@ def least_squares(times: Array, design: Array, values: Array, noise: Noise | Non
 def products(a: Array, b: Array) -> Array:
     """a^T b of tall matrices [N, p], [N, q].
 
-    Not by BLAS: its threads wait for each other a hundred times longer than so small a product takes where the cores
-    are busy.
+    Not by BLAS: on busy cores, synchronising its threads takes a hundred times longer than so small a product.
     """
     return np.asarray(np.einsum("ni,nj->ij", a, b))
 
 
 def correlated(noise: Noise, times: Array, columns: Array) -> Array:
-    """Covariance matrix of the noise at ``times`` times ``columns`` [N, p], in a time proportional to N."""
+    """The covariance matrix of the noise at ``times``, multiplied by ``columns`` [N, p]; linear in N."""
     decay = np.exp(-np.diff(times) / noise.time)
     total = columns.copy()
     for order in (slice(None), slice(None, None, -1)):
@@ -83,10 +80,10 @@ def correlated(noise: Noise, times: Array, columns: Array) -> Array:
 
 
 def estimate(times: Array, design: Array, values: Array) -> Noise:
-    """Noise of ``values`` about any combination of the columns of ``design``, by restricted maximum likelihood.
+    """Noise of ``values`` in a linear model with the columns of ``design``, by restricted maximum likelihood.
 
-    Patterson and Thompson (1971, Biometrika 58): unlike the residuals' own scatter it is not too small by what the fit
-    has taken up. At most ``BLOCKS`` stretches of ``BLOCK`` samples are used.
+    Patterson and Thompson (1971, Biometrika 58): unlike the variance of the residuals it is not biased by the degrees
+    of freedom of the fit. At most ``BLOCKS`` blocks of ``BLOCK`` samples are used.
     """
     blocks = _blocks(times, design, values)
     step = float(np.median(np.diff(times)))
@@ -118,7 +115,7 @@ def _blocks(times: Array, design: Array, values: Array) -> list[Block]:
 
 
 def _restricted(blocks: list[Block], share: float, time: float, scale: float) -> tuple[float, float]:
-    """Twice the negative restricted log-likelihood without constants, variance profiled out, and that variance."""
+    """Minus twice the restricted log-likelihood up to a constant, at the best variance, and that variance."""
     shape = Noise(float(np.sqrt(1 - share)), float(np.sqrt(share)), time)
     columns = blocks[0][1].shape[1]
     total, logarithm, count = np.zeros((columns + 1, columns + 1)), 0.0, 0
@@ -130,13 +127,13 @@ def _restricted(blocks: list[Block], share: float, time: float, scale: float) ->
     L = np.linalg.cholesky(total[:-1, :-1] + _TINY * np.eye(columns))
     fitted = np.linalg.solve(L, total[:-1, -1])
     free = max(count - columns, 1)
-    left = max(float(total[-1, -1] - fitted @ fitted), _TINY)
+    squares = max(float(total[-1, -1] - fitted @ fitted), _TINY)
     logarithm += 2 * float(np.log(np.diag(L)).sum())
-    return float(free * np.log(left / free) + logarithm), left / free * scale**2
+    return float(free * np.log(squares / free) + logarithm), squares / free * scale**2
 
 
 def _whitened(noise: Noise, times: Array, columns: Array) -> tuple[Array, float]:
-    """``columns`` [N, p] made white under ``noise``, and the logarithm of the determinant of its covariance.
+    """``columns`` [N, p] whitened for ``noise``, and the logarithm of the determinant of its covariance.
 
     Kalman filter of the exponentially correlated part (Jones 1981): exact, and linear in N.
     """

@@ -1,22 +1,20 @@
-"""Pose of a rigid body from its markers, frame by frame, with the pose's sensitivity to every marker."""
+"""Pose of a rigid body from its markers in each frame, and the sensitivity of the pose to every marker."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 _FLAT = 0.02
-"""Markers whose second extent is below this share of their first lie on a line: no attitude about it."""
+"""Markers whose second principal extent is below this fraction of the first count as collinear: no attitude."""
 _OUTLIER = 8.0
 _PASSES = 3
 _WRONG_SCALE = 1.3
-"""Markers seen this many times too far apart, or too close, are in another unit or are not those of the body file."""
+"""Beyond this ratio of distances between tracks and body file, the units or the markers must differ."""
 _OFF_SCALE = 1.05
 _LARGEST = 10.0
 
@@ -28,10 +26,10 @@ class Poses:
     Attributes:
         rotation: [T, 3, 3] from body to tracking axes.
         position: [T, 3] of the body's origin in tracking axes, m.
-        seen: [T, M] markers used.
-        residuals: [T, M, 3] measured minus fitted place of each marker in body axes, m; NaN where not used.
-        shape: [M, 3] places of the markers in body axes, m, refined from the tracks.
-        rejected: number of samples left out as outliers.
+        seen: [T, M] whether a marker was used.
+        residuals: [T, M, 3] measured minus fitted position of each marker in body axes, m; NaN where not used.
+        shape: [M, 3] positions of the markers in body axes, m, refined from the tracks.
+        rejected: number of samples excluded as outliers.
     """
 
     rotation: Array
@@ -43,14 +41,14 @@ class Poses:
 
     @property
     def sensitivity(self) -> Array:
-        """[T, 6, 3 M] change of the pose by each marker's displacement, all in body axes.
+        """[T, 6, 3 M] derivative of the pose by the markers' displacements (m), all in body axes.
 
-        Rows: displacement of the body's origin (m), then small rotation (rad). The linearised least-squares fit.
+        Rows: displacement of the body's origin (m), then small rotation (rad), of the linearised least-squares fit.
         """
         M = len(self.shape)
         J = np.zeros((M, 3, 6))
         J[:, :, :3] = np.eye(3)
-        J[:, :, 3:] = -_cross(self.shape)
+        J[:, :, 3:] = -cross_matrices(self.shape)
         weighted = np.where(self.seen[:, :, None, None], J, 0.0).reshape(len(self.seen), 3 * M, 6)
         normal = np.swapaxes(weighted, 1, 2) @ weighted
         fitted = np.isfinite(self.position[:, 0])
@@ -60,9 +58,9 @@ class Poses:
 
 
 def scale_remarks(tracks: Array, shape: Array) -> list[str]:
-    """Refuse ``tracks`` [T, M, 3] and ``shape`` [M, 3] in different units, or both in a wrong one.
+    """Check that ``tracks`` [T, M, 3] and ``shape`` [M, 3] have the same scale; returns remarks on a small difference.
 
-    A remark where they differ a little.
+    ValueError if they are in different units, or both in a wrong one.
     """
     size = float(np.linalg.norm(np.ptp(shape, axis=0)))
     if size > _LARGEST:
@@ -80,34 +78,36 @@ def scale_remarks(tracks: Array, shape: Array) -> list[str]:
             f"that looks like {near[0]} in the {which}" if near else f"the {which} or the {other} are in another unit"
         )
         raise ValueError(
-            f"the markers are seen {ratio:.4g} times as far apart as the body file says; it must be 1 within "
-            f"{100 * (_WRONG_SCALE - 1):.0f} %: {cause}, or the names are not those of the same "
-            "markers: give metres in both"
+            f"distances between markers in the tracks are {ratio:.4g} times those in the body file; the ratio must "
+            f"be 1 within {100 * (_WRONG_SCALE - 1):.0f} %: {cause}, or the names belong to different markers: give "
+            "metres in both"
         )
     if off > _OFF_SCALE:
-        return [f"the markers are seen {ratio:.3g} times as far apart as the body file says; check the cameras' scale"]
+        return [
+            f"distances between markers in the tracks are {ratio:.3g} times those in the body file; check the scale"
+        ]
     return []
 
 
 def _scale(tracks: Array, shape: Array) -> float:
-    """How many times further apart the markers are seen than ``shape`` says; the median, so that swaps do no harm.
+    """Ratio of the distances between markers in the tracks to those in ``shape``; NaN if no two are seen together.
 
-    NaN where no two markers are seen together.
+    The median over pairs and frames, which is robust to swapped markers.
     """
     first, second = np.triu_indices(len(shape), 1)
-    told = np.linalg.norm(shape[first] - shape[second], axis=-1)
-    apart = told > 0
-    seen = np.linalg.norm(tracks[:, first[apart]] - tracks[:, second[apart]], axis=-1) / told[apart]
+    expected = np.linalg.norm(shape[first] - shape[second], axis=-1)
+    apart = expected > 0
+    seen = np.linalg.norm(tracks[:, first[apart]] - tracks[:, second[apart]], axis=-1) / expected[apart]
     return float(np.median(seen[np.isfinite(seen)])) if np.isfinite(seen).any() else float("nan")
 
 
 @one_blas_thread
 def poses(tracks: Array, shape: Array) -> Poses:
-    """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3] in m, NaN for not seen.
+    """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3], m, NaN where not seen.
 
-    ``shape`` [M, 3] are the markers' places in body axes, m. It is refined to the mean place seen, keeping the body
-    axes where they are in least squares, so that a measuring error of the shape does not make the pose jump when a
-    marker vanishes. Samples far off the rigid body (swapped markers) are left out.
+    ``shape`` [M, 3] are the markers' positions in body axes, m. It is refined to the mean measured positions, aligned
+    with the given ones by least squares; so an error of the shape does not make the pose jump when a marker vanishes.
+    Samples far from the rigid body (swapped markers) are excluded.
     """
     if np.linalg.matrix_rank(shape - shape.mean(axis=0), tol=_FLAT * float(np.ptp(shape, axis=0).max())) < 2:
         raise ValueError(f"the {len(shape)} markers lie on one line; a pose needs 3 that do not")
@@ -140,7 +140,7 @@ def _fit(tracks: Array, shape: Array, seen: Mask) -> Poses:
 
 
 def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
-    """Rotation [T, 3, 3] and origin [T, 3] that carry ``body`` to ``world`` [T, M, 3] best over the markers seen."""
+    """Rotation [T, 3, 3] and origin [T, 3] of the least-squares map from ``body`` to ``world`` [T, M, 3]."""
     w = seen[..., None].astype(np.float64)
     count = np.maximum(w.sum(axis=1), 1.0)
     world = np.where(seen[..., None], world, 0.0)
@@ -157,7 +157,7 @@ def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
 
 
 def _outlying(found: Poses) -> Mask:
-    """The worst marker of each frame where it is far beyond the common scatter; a fourth marker must remain."""
+    """[T, M] the worst marker of each frame if its residual is far above the median; at least four must remain."""
     size = np.linalg.norm(found.residuals, axis=-1)
     usual = float(np.nanmedian(size)) if np.isfinite(size).any() else 0.0
     worst = np.where(np.isfinite(size), size, -1.0)
@@ -165,8 +165,8 @@ def _outlying(found: Poses) -> Mask:
     return np.asarray(far & (found.seen.sum(axis=1) > 4)[:, None])
 
 
-def _cross(v: Array) -> Array:
-    """Matrices [..., 3, 3] with ``_cross(a) @ b`` equal to a x b."""
+def cross_matrices(v: Array) -> Array:
+    """Matrices [..., 3, 3] with ``cross_matrices(a) @ b`` equal to a x b."""
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     o = np.zeros_like(x)
     rows = [np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))]
@@ -174,7 +174,7 @@ def _cross(v: Array) -> Array:
 
 
 def quaternions(rotation: Array) -> Array:
-    """Unit quaternions [T, 4] (w, x, y, z) of ``rotation`` [T, 3, 3], of one sign along the time; NaN kept."""
+    """Unit quaternions [T, 4] (w, x, y, z) of ``rotation`` [T, 3, 3], continuous in time; NaN without a pose."""
     from scipy.spatial.transform import Rotation
 
     q = np.full((len(rotation), 4), np.nan)

@@ -1,7 +1,7 @@
-"""A periodic motion as a Fourier series, with the error of its value and of its derivatives.
+"""A periodic motion as a Fourier series, with the errors of its value and of its derivatives.
 
-Two errors are kept apart: the noise that the series lets through, and the motion that it cuts off. More harmonics trade
-the second for the first, the more so the higher the derivative (noise of the d-th derivative grows as k^d).
+There are two errors: the noise that the series passes, and the motion beyond its last harmonic. More harmonics reduce
+the second and increase the first, the more so the higher the derivative (its noise grows as k^d).
 """
 
 from __future__ import annotations
@@ -9,21 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy import special, stats
 
+from wingfit.records.array_types import Array, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.noise import LinearFit, Noise, least_squares, products
 
-Array = npt.NDArray[np.float64]
-
 DERIVATIVES = 3
-MOST_HARMONICS = 30
+MAX_HARMONICS = 30
 _GRID = 360
-_SEEN = 3.0
-"""An amplitude this many standard errors large is taken for motion."""
-_UNLIKELY = 0.01
-_SLOWEST = 3.0
+_SIGNIFICANT = 3.0  # standard errors, from which on an amplitude counts as motion
+_UNLIKELY = 0.01  # p value below which beats differ by more than the noise
+_LEAST_EXPONENT = 3.0
 _FOLDS = 10
 _UNDETERMINED = 1e8
 
@@ -34,11 +31,12 @@ class PeriodicFit:
 
     Attributes:
         frequency: of the beat, Hz; ``start``: a time at which t* = 0, s.
-        coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance`` theirs, of coloured noise.
+        coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance``: theirs under coloured noise.
         noise: of one sample.
-        lost: [4] RMS over the beat of what harmonics beyond K may hold, of value and derivatives (unit / s^d); infinite
-            where the harmonics fall off too slowly for the derivative to exist in the mean square.
-        scores: [K_max] RMS of prediction of samples left out, by number of harmonics from 1; empty where K was given.
+        lost: [4] bound on the RMS over the beat of the harmonics beyond K, for the value and its derivatives (unit /
+            s^d);
+            infinite if the amplitudes decrease too slowly for the derivative to be square integrable.
+        scores: [K_max] RMS error of cross-validation for 1, 2, ... harmonics; empty if K was given.
         beats: number of beats with samples; ``samples`` their number.
     """
 
@@ -55,7 +53,7 @@ class PeriodicFit:
 
     @property
     def harmonics(self) -> int:
-        """Number K of harmonics; the series passes up to K times the frequency and nothing beyond."""
+        """Number K of harmonics."""
         return len(self.coefficients) // 2
 
     @one_blas_thread
@@ -65,7 +63,7 @@ class PeriodicFit:
 
     @one_blas_thread
     def error_at(self, phase: Array, derivative: int = 0) -> Array:
-        """Standard error of :meth:`at` from noise alone; see ``lost`` for what is cut off."""
+        """Standard error of :meth:`at` from noise alone, without the truncation error ``lost``."""
         B = basis(phase, self.harmonics, derivative, self.frequency)
         return np.asarray(np.sqrt(np.einsum("...i,ij,...j->...", B, self.covariance, B)))
 
@@ -76,12 +74,12 @@ class PeriodicFit:
 
     @property
     def error(self) -> Array:
-        """[4] RMS over the beat of noise and cut-off together."""
+        """[4] RMS over the beat of noise and truncation error together."""
         return np.hypot(self.passed, self.lost)
 
     @property
     def amplitude(self) -> Array:
-        """[4] RMS over the beat of the signal itself about its mean."""
+        """[4] RMS over the beat of the signal about its mean, and of its derivatives."""
         return np.array([float(np.std(self.at(_phases(), d))) for d in range(DERIVATIVES + 1)])
 
     @property
@@ -91,7 +89,7 @@ class PeriodicFit:
         return float(c[0]), tuple(c[1::2].tolist()), tuple(c[2::2].tolist())
 
     def shifted(self, phase: float) -> PeriodicFit:
-        """The same motion with t* = 0 moved to the present ``phase``."""
+        """The same motion with the phase ``phase`` as the new origin t* = 0."""
         turn = _turn(self.harmonics, phase)
         return replace(
             self,
@@ -108,9 +106,8 @@ def fit_periodic(
     """Fit a periodic series to samples of several beats.
 
     ``times`` [N] in s increase, evenly or not; NaN in ``values`` [N] is a gap. Without ``harmonics`` their number is
-    that which best predicts beats left out of the fit (Stone 1974, cross-validation); with fewer than three beats
-    single samples are left out instead, and correlated noise may then pass for motion. ValueError where the samples
-    cannot carry a series.
+    chosen by cross-validation over beats (Stone 1974); with fewer than three beats over samples, where correlated noise
+    may be mistaken for motion. ValueError if the samples are too few for a series.
     """
     seen = np.isfinite(values)
     times, values = times[seen], values[seen]
@@ -118,19 +115,21 @@ def fit_periodic(
     most = _most_harmonics(phase)
     if harmonics is not None and not 1 <= harmonics <= most:
         raise ValueError(
-            f"{harmonics} harmonics; {len(values)} samples with these gaps in phase carry 1 to {most}: "
-            "ask for fewer, or give more samples"
+            f"{harmonics} harmonics; {len(values)} samples with these gaps in phase determine 1 to {most}: "
+            "request fewer, or give more samples"
         )
     beats, group = np.unique(np.floor(phase - phase[0]), return_inverse=True)
     groups = group if len(beats) >= 3 else np.arange(len(values)) % _FOLDS
     scores = () if harmonics else _predictions(phase, values, groups, most)
     chosen = harmonics or 1 + int(np.argmin(scores))
-    # The noise is that about a wider series, so that motion which is cut off does not count as noise.
+    # The noise is estimated about a longer series, so that truncated motion does not count as noise.
     wide = least_squares(times, basis(phase, min(2 * chosen + 2, most)), values)
     linear = least_squares(times, basis(phase, chosen), values, wide.noise)
     covariance, remarks = _between_beats(phase, linear, group, len(beats))
     if len(beats) < 3 and not harmonics:
-        remarks += (f"{len(beats)} beat(s) only: slow noise cannot be told from motion; record three beats or more",)
+        remarks += (
+            f"{len(beats)} beat(s) only: slow noise cannot be distinguished from motion; record three beats or more",
+        )
     return PeriodicFit(
         frequency,
         start,
@@ -166,10 +165,10 @@ def _turn(harmonics: int, phase: float) -> Array:
 
 
 def _most_harmonics(phase: Array) -> int:
-    """What the samples carry: three samples a coefficient, and no gap in phase longer than half a wavelength."""
+    """Largest number of harmonics: three samples per coefficient, no gap in phase above half a wavelength."""
     folded = np.sort(phase % 1.0)
     gap = float(np.max(np.diff(np.append(folded, folded[0] + 1)))) if len(folded) else 1.0
-    most = min(MOST_HARMONICS, (len(folded) // 3 - 1) // 2, int(0.5 / gap - 1e-6))
+    most = min(MAX_HARMONICS, (len(folded) // 3 - 1) // 2, int(0.5 / gap - 1e-6))
     if most < 1:
         raise ValueError(
             f"{len(folded)} samples with the largest gap {gap:.2f} of a beat; a series needs at least 9 samples and "
@@ -178,8 +177,8 @@ def _most_harmonics(phase: Array) -> int:
     return most
 
 
-def _predictions(phase: Array, values: Array, groups: npt.NDArray[np.int64], most: int) -> tuple[float, ...]:
-    """RMS error of predicting each group from the others, for 1 to ``most`` harmonics."""
+def _predictions(phase: Array, values: Array, groups: Index, most: int) -> tuple[float, ...]:
+    """RMS error of predicting each group of samples from the others, for 1 to ``most`` harmonics."""
     X, y = basis(phase, most), values - values.mean()
     parts = [(X[groups == g], y[groups == g]) for g in np.unique(groups)]
     squares = np.stack([products(x, x) for x, _ in parts])
@@ -199,13 +198,11 @@ def _predictions(phase: Array, values: Array, groups: npt.NDArray[np.int64], mos
     return tuple(scores)
 
 
-def _between_beats(
-    phase: Array, linear: LinearFit, group: npt.NDArray[np.int64], beats: int
-) -> tuple[Array, tuple[str, ...]]:
-    """Covariance of the coefficients, raised per harmonic where beats differ by more than the noise explains.
+def _between_beats(phase: Array, linear: LinearFit, group: Index, beats: int) -> tuple[Array, tuple[str, ...]]:
+    """Covariance of the coefficients, raised for harmonics that vary between beats more than the noise, and remarks.
 
-    Wings that do not repeat themselves give scatter at the very harmonics, which stationary noise misses; the scatter
-    between beats (the clustered covariance of Liang and Zeger 1986) shows it.
+    A motion that varies from beat to beat scatters at the harmonics themselves, which stationary noise does not
+    describe; the clustered covariance of Liang and Zeger (1986) does.
     """
     covariance = linear.covariance
     if beats < 4:
@@ -228,11 +225,11 @@ def _between_beats(
     return covariance * np.outer(scale, scale), (remark,)
 
 
-def _lost(wide: LinearFit, kept: int, frequency: float) -> Array:
-    """RMS over the beat of what lies beyond ``kept`` harmonics, for value and derivatives.
+def _lost(wide: LinearFit, used: int, frequency: float) -> Array:
+    """[4] RMS over the beat of the harmonics beyond the first ``used``, for the value and its derivatives.
 
-    Each harmonic beyond holds what a wider series finds in it, and at least what the fall-off k^-q of the harmonics
-    seen lets expect (their envelope); beyond the wider series the envelope alone counts.
+    The amplitude of each such harmonic is its estimate in the longer series ``wide``, but at least the envelope C k^-q
+    of the significant harmonics; beyond the longer series it is the envelope.
     """
     c, variance = wide.coefficients, np.diag(wide.covariance)
     k = np.arange(1, len(c) // 2 + 1)
@@ -240,7 +237,7 @@ def _lost(wide: LinearFit, kept: int, frequency: float) -> Array:
     beyond = np.sqrt(np.maximum(amplitude**2 - 2 * error**2, 0))
     law = _fall_off(k, amplitude, error)
     expected = 2 * error if law is None else law[0] * k ** -law[1]
-    bound = np.where(k > kept, np.maximum(beyond, expected), 0.0)
+    bound = np.where(k > used, np.maximum(beyond, expected), 0.0)
     lost = np.zeros(DERIVATIVES + 1)
     for d in range(DERIVATIVES + 1):
         rate = (2 * np.pi * frequency) ** d
@@ -252,16 +249,16 @@ def _lost(wide: LinearFit, kept: int, frequency: float) -> Array:
     return lost
 
 
-def _fall_off(k: npt.NDArray[np.int64], amplitude: Array, error: Array) -> tuple[float, float] | None:
-    """Envelope C k^-q of the harmonics seen beyond the first; None with fewer than three of them.
+def _fall_off(k: Index, amplitude: Array, error: Array) -> tuple[float, float] | None:
+    """C and q of the envelope C k^-q of the significant harmonics beyond the first; None with fewer than three.
 
-    q is at least 3: the rate of a wing with mass cannot jump, and a jump of the acceleration falls off as k^-3.
+    q is at least 3: the rate of a wing with mass cannot jump, and a jump of the acceleration decreases as k^-3.
     """
-    seen = (k > 1) & (amplitude > _SEEN * error)
+    seen = (k > 1) & (amplitude > _SIGNIFICANT * error)
     if seen.sum() < 3:
         return None
     slope = float(np.polyfit(np.log(k[seen]), np.log(amplitude[seen]), 1)[0])
-    q = max(-slope, _SLOWEST)
+    q = max(-slope, _LEAST_EXPONENT)
     return float(np.max(amplitude[seen] * k[seen] ** q)), q
 
 

@@ -9,18 +9,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.errors import Faults, decode, fail, nearest, shown
 from wingfit.records.limits import MAX_ROWS
 
-Array = npt.NDArray[np.float64]
 _NAMED = 6
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns [N] by name; ``file`` is what messages call it; ``labels`` [N] are the names in the first column."""
+    """Columns [N] by name; ``file`` names the table in messages; ``labels`` [N] are the names in the first column."""
 
     file: str
     columns: dict[str, Array]
@@ -38,7 +37,7 @@ class Table:
         return np.stack([self.column(f"{marker}_{axis}_m") for axis in "xyz"], axis=-1)
 
     def times(self, name: str = "time_s") -> Array:
-        """A column of times, which must be complete and increase."""
+        """A column of times [N]; DatasetError unless it is complete and increases."""
         times = self.column(name)
         wrong = np.flatnonzero(~(np.diff(times) > 0))
         if len(wrong) or not np.isfinite(times[:1]).all():
@@ -49,13 +48,13 @@ class Table:
 
 
 def header_of(raw: bytes, file: str) -> list[str]:
-    """Names of the columns, before any number is looked at; empty of an empty file."""
+    """Names of the columns, without reading the numbers; empty for an empty file."""
     rows = csv.reader(io.StringIO(decode(raw, file), newline=""))
     return [name.strip() for name in next((row for row in rows if row), [])]
 
 
 def require(header: Sequence[str], names: Sequence[str], file: str) -> None:
-    """Raise DatasetError that names every one of ``names`` that ``header`` lacks."""
+    """Raise DatasetError that lists all ``names`` missing in ``header``."""
     missing = [name for name in names if name not in header]
     if missing:
         which = ", no ".join(map(repr, missing[:_NAMED])) + (", ..." if len(missing) > _NAMED else "")
@@ -63,9 +62,9 @@ def require(header: Sequence[str], names: Sequence[str], file: str) -> None:
 
 
 def read_table(raw: bytes, file: str, label: str | None = None) -> Table:
-    """Read CSV text; with ``label`` the first column must be called so and holds names.
+    """Read CSV text. With ``label``, the first column must have that name and holds names instead of numbers.
 
-    DatasetError says what is wrong.
+    DatasetError lists the errors.
     """
     rows = [row for row in csv.reader(io.StringIO(decode(raw, file), newline="")) if row]
     if len(rows) < 2:
@@ -77,7 +76,7 @@ def read_table(raw: bytes, file: str, label: str | None = None) -> Table:
         raise fail(f"{file}, line 1", header[0], "has one column; separate columns by commas, with decimal points")
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
-        raise fail(f"{file}, line 1", twice, f"column {twice!r} stands there twice; keep one")
+        raise fail(f"{file}, line 1", twice, f"column {twice!r} appears twice; keep one")
     if label and header[0] != label:
         raise fail(f"{file}, line 1", header[0], f"the first column is {header[0]!r}; it must be {label!r}")
     skip = 1 if label else 0
@@ -104,5 +103,7 @@ def _number(cell: str, where: str, faults: Faults) -> float:
     except ValueError:
         value = math.inf
     if math.isinf(value):
-        faults.add(where, cell, f"is {shown(cell)!r}; it must be a finite number, or empty where nothing was seen")
+        faults.add(
+            where, cell, f"is {shown(cell)!r}; it must be a finite number, or an empty cell where nothing was seen"
+        )
     return value

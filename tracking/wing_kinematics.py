@@ -1,9 +1,10 @@
-"""The prescribed motion of a wing from what cameras saw: flap angle zeta(t*) and wing pitch theta_w(t*).
+"""The motion of a wing from its tracked markers: flap angle zeta(t*) and wing pitch theta_w(t*).
 
 Geometry (Armanini et al. 2016, Eqs. 15, 17-19; docs/tracking.md), in body axes x forward, y right, z down. The wing
-turns about an axis along x. Closed, it stands ``dihedral`` above the horizontal; zeta is the angle from there, positive
-as it opens: an upper wing towards -z, a lower one towards +z. With n the direction in which the leading edge moves as
-the wing opens, the chord from trailing to leading edge is sin(theta_w) x + cos(theta_w) n; pi/2 is a chord along x.
+rotates about an axis along x. Closed, it is at the angle ``dihedral`` above the horizontal; zeta is the angle from
+there, positive as the wing opens: an upper wing towards -z, a lower one towards +z. With n the direction in which the
+leading edge moves as the wing opens, the chord from trailing to leading edge is sin(theta_w) x + cos(theta_w) n; pi/2
+is a chord along x.
 """
 
 from __future__ import annotations
@@ -12,29 +13,25 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy import optimize, stats
 
 from wingfit.records import FourierFlap, FourierPitch, PassivePitch, WingMotion
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.noise import least_squares, products
 from wingfit.tracking.smoothing import PeriodicFit, basis, fit_periodic
 
-Array = npt.NDArray[np.float64]
 PitchKind = Literal["fourier", "passive"]
-_FEWEST_BEATS = 1.5
-_STILL = 1e-6
-"""Angles that range over less, rad, do not move."""
-_CHANCE = 0.001
-"""A period that noise would show with a larger probability is not believed."""
-_FEWEST_SAMPLES = 2.5
-_LITTLE = 0.8
-"""A given frequency at which the series explains less of the variance than this is remarked on."""
+_MIN_BEATS = 1.5
+_STILL = 1e-6  # rad: a flap angle with a smaller range does not move
+_SIGNIFICANCE = 0.001  # largest p value of an accepted period
+_MIN_SAMPLES = 2.5
+_MIN_EXPLAINED = 0.8  # of the variance at a given frequency; less causes a remark
 
 
 @dataclass(frozen=True)
 class WingPlace:
-    """Which wing the markers sit on: ``upper`` or lower, ``right`` or left; ``dihedral`` in rad where known."""
+    """The wing that carries the markers: ``upper`` or lower, ``right`` or left; ``dihedral`` in rad where known."""
 
     upper: bool
     right: bool = True
@@ -43,7 +40,7 @@ class WingPlace:
 
 @dataclass(frozen=True, eq=False)
 class Angles:
-    """Flap angle and wing pitch (rad) [N] at increasing ``times`` [N] in s; NaN where not seen. ``pitch`` may lack."""
+    """Flap angle and wing pitch (rad) [N] at increasing ``times`` [N] in s; NaN where not seen."""
 
     times: Array
     flap: Array
@@ -63,7 +60,7 @@ class Frequency:
 class PitchLaw:
     """Eq. 17 fitted to wing pitch: ``errors`` [4] and ``correlation`` [4, 4] in the order of PassivePitch's fields.
 
-    ``misfit`` is the RMS difference in rad from the pitch as measured.
+    ``misfit`` is the RMS difference from the measured pitch, rad.
     """
 
     pitch: PassivePitch
@@ -74,9 +71,9 @@ class PitchLaw:
 
 @dataclass(frozen=True, eq=False)
 class WingKinematics:
-    """What was found: the motion, the series behind it with their errors, and what to know about them.
+    """The estimated motion, the series it is based on, and remarks.
 
-    ``angles`` are those fitted, the flap angle from the closed position.
+    ``angles`` are the fitted ones, the flap angle from the closed position.
     ``start`` is a time (s, clock of the recording) at which a beat starts; ``start_error`` its standard error.
     """
 
@@ -101,11 +98,11 @@ def from_markers(
         times: [T] s.
         leading_edge: [T, M, 3] markers on the leading edge from root to tip; two, or one with ``hinge``.
         chord: [T, K, 3] markers at the span station of the pitch, from leading to trailing edge, at least two.
-        place: of the wing.
+        place: which wing it is.
         hinge: y and z (m) of the flapping axis, where known.
 
-    Only frames that show every marker asked for count, so that none jumps as a marker comes and goes. Without a
-    dihedral the flap angle has an unknown constant, which :func:`wing_motion` settles.
+    Frames in which a marker is missing are NaN, so that the angles do not jump when markers appear and disappear.
+    Without a dihedral the flap angle has an unknown offset, which :func:`wing_motion` removes.
     """
     points = leading_edge[..., 1:]
     if hinge is not None:
@@ -142,15 +139,15 @@ def wing_motion(
     """Motion of the wing over its beat, from ``angles``.
 
     Args:
-        angles: flap angle and pitch; without pitch, none can be modelled and ValueError says so.
-        frequency: of the beat, Hz; found in the flap angle if left out.
-        harmonics: of both series; chosen by cross-validation if left out.
+        angles: flap angle and pitch; ValueError without pitch.
+        frequency: of the beat, Hz; None: estimated from the flap angle.
+        harmonics: number in both series; None: chosen by cross-validation.
         pitch: a Fourier series, or the law of Eq. 17.
         pitch_station: span fraction of the pitch.
         root_pitch: wing pitch at the flapping axis, rad.
         peel_end: t* at which the whole chord has come apart.
-        start: a time at which a beat starts, s; where the wings are closest if left out.
-        closed: flap angle of the closed wing as measured, rad; None: the smallest found, where the zero is unknown.
+        start: a time at which a beat starts, s; None: where the wings are closest.
+        closed: measured flap angle of the closed wing, rad; None: the smallest angle of the series.
     """
     if angles.pitch is None:
         raise ValueError("no wing pitch; give a column wing_pitch_deg, or markers along the chord")
@@ -176,7 +173,9 @@ def wing_motion(
     law = pitch_law(angles.times, angles.pitch, flap) if pitch == "passive" else None
     if law is not None and law.misfit > 2 * twist.noise.deviation:
         ratio = law.misfit / twist.noise.deviation
-        remarks.append(f"Eq. 17 misses the pitch by {ratio:.1f} times its noise: the law lacks something")
+        remarks.append(
+            f"the misfit of Eq. 17 to the pitch is {ratio:.1f} times its noise: the law does not describe this wing"
+        )
     motion = WingMotion(
         FourierFlap(*flap.series),
         law.pitch if law else FourierPitch(*twist.series),
@@ -190,33 +189,33 @@ def wing_motion(
 
 @one_blas_thread
 def flap_frequency(times: Array, flap: Array) -> Frequency:
-    """Flap frequency from the flap angle [N]: strongest period, then least squares of a series over the frequency.
+    """Flap frequency from the flap angle [N] (rad) at ``times`` [N] (s): the peak of the spectrum, then refined.
 
-    The standard error is that of the frequency fitted together with the series, under the noise found. ValueError where
-    such a period would be in noise by chance: the Wald statistic of the series under that noise, coloured as it is, for
-    as many trials as samples.
+    The refinement is a least-squares fit of a series and its frequency, whose standard error accounts for coloured
+    noise. ValueError if the period is not significant: the Wald statistic of the series under that noise, with
+    Bonferroni's correction for as many trials as samples.
     """
     _refuse_still(flap)
     seen = np.isfinite(flap)
     t, y = times[seen], flap[seen]
     if len(t) < 9:
-        raise ValueError(f"{len(t)} samples of the flap angle; at least 9 are needed to find the flap frequency")
+        raise ValueError(f"{len(t)} samples of the flap angle; at least 9 are needed to estimate the flap frequency")
     span, step = float(t[-1] - t[0]), float(np.median(np.diff(t)))
     first = _strongest(t, y)
-    if span * first < _FEWEST_BEATS:
-        message = f"the recording spans {span * first:.1f} beats; {_FEWEST_BEATS} are needed to find the flap frequency"
-        raise ValueError(f"{message}: give it, or record longer")
-    if step * first * _FEWEST_SAMPLES > 1:
+    if span * first < _MIN_BEATS:
         message = (
-            f"no flap frequency stands out: the strongest period, {first:.4g} Hz, has {1 / (step * first):.2g} samples"
+            f"the recording spans {span * first:.1f} beats; {_MIN_BEATS} are needed to estimate the flap frequency"
         )
-        raise ValueError(
-            f"{message}; at least {_FEWEST_SAMPLES} are needed: give the frequency, or check the flap angle"
+        raise ValueError(f"{message}: give it, or record longer")
+    if step * first * _MIN_SAMPLES > 1:
+        message = (
+            f"no significant flap frequency: the strongest period, {first:.4g} Hz, has {1 / (step * first):.2g} samples"
         )
+        raise ValueError(f"{message}; at least {_MIN_SAMPLES} are needed: give the frequency, or check the flap angle")
     orders = max(1, min(4, int(0.4 / (step * first)), (len(t) - 4) // 6))
     middle = float(t.mean())
 
-    def left(frequency: float) -> float:
+    def cost(frequency: float) -> float:
         X = basis((t - middle) * frequency, orders)
         return -float(right(X) @ np.linalg.solve(products(X, X), right(X)))
 
@@ -225,7 +224,7 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
 
     width = 0.5 / span
     best = optimize.minimize_scalar(
-        left, bounds=(first - width, first + width), method="bounded", options={"xatol": 1e-9 * first}
+        cost, bounds=(first - width, first + width), method="bounded", options={"xatol": 1e-9 * first}
     )
     hertz = float(best.x)
     phase = (t - middle) * hertz
@@ -234,11 +233,11 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
     joint = least_squares(t, np.column_stack([B, slope * (t - middle)]), y)
     moving, scatter = joint.coefficients[1:-1], joint.covariance[1:-1, 1:-1]
     size = float(moving @ np.linalg.solve(scatter, moving)) / len(moving)
-    chance = len(t) * float(stats.f.sf(size, len(moving), max(len(t) - len(moving) - 2, 1)))
-    if chance > _CHANCE:
+    p_value = len(t) * float(stats.f.sf(size, len(moving), max(len(t) - len(moving) - 2, 1)))
+    if p_value > _SIGNIFICANCE:
         raise ValueError(
-            f"no flap frequency stands out: the strongest period, {hertz:.4g} Hz, is what noise of "
-            f"{np.degrees(joint.noise.deviation):.2g} deg shows by chance: give the frequency, or check the flap angle"
+            f"no significant flap frequency: the strongest period, {hertz:.4g} Hz, is explained by noise of "
+            f"{np.degrees(joint.noise.deviation):.2g} deg: give the frequency, or check the flap angle"
         )
     return Frequency(hertz, float(np.sqrt(joint.covariance[-1, -1])))
 
@@ -253,27 +252,29 @@ def _refuse_still(flap: Array) -> None:
 
 
 def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
-    """A remark where the series at the given frequency leaves much of the flap angle unexplained."""
+    """A remark if the series at the given frequency explains little of the variance of the flap angle."""
     seen = np.isfinite(angles.flap)
     t, y = angles.times[seen], angles.flap[seen]
     share = 1 - float(np.mean((y - flap.at((t - flap.start) * flap.frequency)) ** 2) / np.var(y))
-    if share > _LITTLE:
+    if share > _MIN_EXPLAINED:
         return []
     try:
-        alone = f"by itself the flap angle shows {flap_frequency(angles.times, angles.flap).hertz:.5g} Hz"
+        alone = (
+            f"the frequency estimated from the flap angle is {flap_frequency(angles.times, angles.flap).hertz:.5g} Hz"
+        )
     except ValueError as error:
-        alone = f"by itself the flap angle shows none ({error})"
+        alone = f"no frequency can be estimated from the flap angle ({error})"
     given = f"at the flap frequency given, {flap.frequency:.5g} Hz, the motion explains {100 * max(share, 0):.0f} %"
     return [f"{given} of the flap angle's variance; {alone}"]
 
 
 def _strongest(times: Array, values: Array) -> float:
-    """Frequency, Hz, of the largest amplitude, to about a tenth of the resolution; bridges gaps by straight lines."""
+    """Frequency, Hz, of the largest amplitude, to about a tenth of the resolution; gaps are interpolated linearly."""
     step = float(np.median(np.diff(times)))
     count = int((times[-1] - times[0]) / step) + 1
     even = np.interp(times[0] + step * np.arange(count), times, values - values.mean())
     size = 8 * count
-    whole = size // count  # bins below one period of the record
+    whole = size // count  # index of one period per record; lower ones do not count
     amplitude = np.abs(np.fft.rfft(even, size))
     return float((whole + np.argmax(amplitude[whole:])) / (size * step))
 
@@ -281,7 +282,7 @@ def _strongest(times: Array, values: Array) -> float:
 def closest(flap: PeriodicFit) -> tuple[float, float]:
     """Phase t* in [0, 1) at which the wings are closest and begin to open, and its standard error in beats.
 
-    The error holds the noise of the rate there and what the series cuts off of the rate.
+    The error comes from the noise of the rate at that phase and from the truncation of the series.
     """
     grid = np.arange(720) / 720
     guess = float(grid[int(np.argmin(flap.at(grid)))])
@@ -300,7 +301,7 @@ def closest(flap: PeriodicFit) -> tuple[float, float]:
 def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
     """Fit Eq. 17, theta_w = pi/2 + c + c_zeta zeta + c_rate zeta' + c_square zeta'^2, to ``pitch`` [N] in rad.
 
-    The errors hold the noise of the pitch, coloured, and to first order that of the flap angle.
+    The errors account for the coloured noise of the pitch and, to first order, for that of the flap angle.
     """
     seen = np.isfinite(pitch)
     t, y = times[seen], pitch[seen] - np.pi / 2
@@ -320,7 +321,7 @@ def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
 
 
 def beats_of(t_star: Array) -> Array:
-    """Phase counted on over beats, from phases [N] that may start again at every beat."""
+    """Phase [N] that increases over beats, from phases [N] that may start again from 0 in every beat."""
     if not np.isfinite(t_star).all():
         raise ValueError("t_star has empty cells; give every row its phase")
     return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))
@@ -333,7 +334,7 @@ def _lowered(flap: PeriodicFit, by: float) -> PeriodicFit:
 
 
 def _direction(points: Array) -> Array:
-    """Unit vectors [T, 2] of the lines that fit ``points`` [T, M, 2] best, from the first point to the last."""
+    """Unit vectors [T, 2] of the least-squares lines through ``points`` [T, M, 2], from the first point to the last."""
     d = points - points.mean(axis=1, keepdims=True)
     xx, yy, xy = (np.sum(d[..., i] * d[..., j], axis=1) for i, j in ((0, 0), (1, 1), (0, 1)))
     angle = 0.5 * np.arctan2(2 * xy, xx - yy)
@@ -343,7 +344,7 @@ def _direction(points: Array) -> Array:
 
 
 def _unwrapped(angles: Array) -> Array:
-    """Angles without jumps of a turn, over gaps."""
+    """Angles without jumps of 2 pi, also across gaps."""
     unwrapped = angles.copy()
     seen = np.isfinite(angles)
     unwrapped[seen] = np.unwrap(angles[seen])

@@ -1,7 +1,7 @@
-"""Smoothing and differentiating in one linear step: kernels of a zero-phase Butterworth filter and its derivatives.
+"""Smoothing and differentiation in one step: convolution kernels of a zero-phase Butterworth filter.
 
-The filter is the digital Butterworth low-pass run forwards and backwards that :class:`wingfit.records.LowPass` names;
-the derivative is exact in frequency, so that a derivative is that of the filtered signal and loses nothing more.
+The filter is that of :class:`wingfit.records.LowPass`, a digital Butterworth low-pass run forwards and backwards. The
+derivatives are those of the filtered signal, exact in the frequency domain.
 """
 
 from __future__ import annotations
@@ -9,19 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy import signal
 
 from wingfit.records import LowPass
+from wingfit.records.array_types import Array
 
-Array = npt.NDArray[np.float64]
 _LENGTH = 8192
 _TAIL = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Symmetric windows of 2 n + 1 samples: row d of ``taps`` [3, 2 n + 1] gives the d-th derivative (per s^d).
+    """Windows of 2 n + 1 samples: row d of ``taps`` [3, 2 n + 1] gives the d-th derivative (per s^d).
 
     ``taps[d] @ x[i - n : i + n + 1]`` is the derivative at sample i.
     """
@@ -30,7 +29,7 @@ class Kernels:
 
     @property
     def reach(self) -> int:
-        """n: samples lost at each end and beside each gap."""
+        """n: number of samples lost at each end and on each side of a gap."""
         return int(self.taps.shape[1]) // 2
 
     def apply(self, values: Array, derivative: int) -> Array:
@@ -44,15 +43,15 @@ class Kernels:
 
 
 def kernels(low_pass: LowPass, rate: float) -> Kernels:
-    """Kernels for samples at ``rate`` Hz; ValueError for a cut-off that they cannot carry.
+    """Kernels for samples at ``rate`` Hz; ValueError if the cut-off is too high for that rate.
 
-    Cut where they have fallen to ``1e-4`` of their largest value, then corrected by the least change that makes them
-    exact for polynomials up to the third degree.
+    Truncated where they have decreased to 1e-4 of their largest value, then corrected by the least change (in least
+    squares) that makes them exact for cubic polynomials.
     """
     if not 0 < low_pass.cutoff <= 0.45 * rate:
         limit = 0.45 * rate
         raise ValueError(
-            f"cut-off {low_pass.cutoff:g} Hz; samples at {rate:g} Hz carry more than 0 and at most {limit:g} Hz: "
+            f"cut-off {low_pass.cutoff:g} Hz; with samples at {rate:g} Hz it must be above 0 and at most {limit:g} Hz: "
             "choose a lower cut-off or record faster"
         )
     frequency = np.fft.rfftfreq(_LENGTH, 1 / rate)

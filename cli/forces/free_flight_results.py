@@ -15,7 +15,7 @@ from wingfit.cli.base.output import note, number, say, table
 from wingfit.cli.loads import COLOURS
 from wingfit.client.client import WingfitError
 from wingfit.records import DatasetError, LowPass
-from wingfit.records.description.convert_vehicle import describe_recording
+from wingfit.records.description.convert import describe_recording
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.records.files.table import write_table
 from wingfit.tracking.free_flight import Body, FreeFlight, free_flight, recording

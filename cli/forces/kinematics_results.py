@@ -13,8 +13,9 @@ from wingfit.cli.base.files import write_text
 from wingfit.cli.base.output import note, number, say, table
 from wingfit.cli.loads import COLOURS
 from wingfit.client.client import WingfitError
-from wingfit.records import Condition, DatasetError, Recording, WingMotion
-from wingfit.records.description.convert_vehicle import describe_recording
+from wingfit.records import DatasetError
+from wingfit.records.description.convert import to_data
+from wingfit.records.description.vehicle_file import MotionFile
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.tracking.smoothing import PeriodicFit
 from wingfit.tracking.tables import Table, header_of, read_table, require
@@ -72,19 +73,12 @@ def estimate(wanted: Wanted) -> None:
     except (DatasetError, ValueError) as error:
         raise WingfitError("no motion found", str(error)) from error
     if wanted.output:
-        write_text(wanted.output, write_yaml({"motion": motion_data(found.motion, found.frequency.hertz)}))
+        write_text(wanted.output, write_yaml({"motion": to_data(found.motion, MotionFile)}))
         note(f"motion written to {wanted.output}; it goes under vehicle: or under a recording of dataset.yaml")
     if wanted.plot:
         write_text(wanted.plot, _page(found, f"Motion of the wing, {wanted.file.name}"))
         note(f"plots written to {wanted.plot}; open it in a browser")
     _report(found)
-
-
-def motion_data(motion: WingMotion, flap_frequency: float) -> Any:
-    """``motion`` as the plain data of ``dataset.yaml``."""
-    condition = Condition(flap_frequency, 0.0, 101325.0, 293.15)
-    bare = Recording("motion", "wind_tunnel", condition, np.empty(0), (), np.empty((0, 0)), motion=motion)
-    return describe_recording(bare)["motion"]
 
 
 def _bytes(file: Path) -> bytes:

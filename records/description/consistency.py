@@ -1,4 +1,4 @@
-"""What takes several values to judge: references between names, order, markers on the planform, masses, motion."""
+"""Checks that involve several values: references between names, order, markers on the planform, masses, motion."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from decimal import Decimal
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Float
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
 from wingfit.records.description.fields import FourierFile
 from wingfit.records.description.vehicle_file import MotionFile
@@ -21,7 +21,7 @@ Inconsistency = tuple[Path, object, str]
 
 
 def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
-    """Everything that does not fit together: path, value, message."""
+    """All inconsistencies between the values of a description, each as path, value and message."""
     yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
@@ -61,7 +61,7 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
-    """Wings that clap must be about closed at the start of the beat; a split cycle is so by its law."""
+    """Wings that clap must be nearly closed at the start of the beat; a split cycle always is."""
     flap = motion.flap
     if not isinstance(flap, FourierFile):
         return
@@ -93,9 +93,9 @@ def _unique(
         folded = name.lower() if ignore_case else name
         here = (*path, index, key) if key else (*path, index)
         if seen.get(folded) == name:
-            yield here, name, f"{name!r} stands here a second time; every name must be unique: rename one"
+            yield here, name, f"{name!r} is used a second time here; every name must be unique: rename one"
         elif folded in seen:
-            message = f"{name!r} differs from {seen[folded]!r} only by case, which files may not keep: rename one"
+            message = f"{name!r} differs from {seen[folded]!r} only by case, which some file systems ignore: rename one"
             yield here, name, message
         seen.setdefault(folded, name)
 
@@ -129,14 +129,14 @@ def _markers(wing: WingFile) -> Iterator[Inconsistency]:
             yield ("wing", "markers", index), marker.name, message
 
 
-def planform_outline(stations: Sequence[StationFile]) -> npt.NDArray[np.float64]:
+def planform_outline(stations: Sequence[StationFile]) -> Float[Array, "N 2"]:
     """Corners of the planform [N, 2] as (x, y): leading edge from root to tip, then trailing edge back."""
     leading = [(float(s.leading_edge_m), float(s.y_m)) for s in stations]
     trailing = [(float(s.leading_edge_m + s.chord_m), float(s.y_m)) for s in stations]
     return np.array(leading + trailing[::-1])
 
 
-def distance_outside(outline: npt.NDArray[np.float64], x: float, y: float) -> float:
+def distance_outside(outline: Float[Array, "N 2"], x: float, y: float) -> float:
     """Distance from (x, y) to the planform, m; 0 inside."""
     start, end = outline, np.roll(outline, -1, axis=0)
     point, edge = np.array([x, y]), end - start

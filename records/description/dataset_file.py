@@ -1,8 +1,7 @@
-"""The layout of ``dataset.yaml``: pydantic models, in the units that people write, with physical limits.
+"""The layout of ``dataset.yaml`` as pydantic models, in the units of the file, with physical limits.
 
-Only shape and single values are checked here; what needs several values (references between names, markers on
-the planform) is in ``wingfit.records.description.consistency``. The published JSON Schema is generated from these
-models.
+These check the layout and single values; ``wingfit.records.description.consistency`` checks relations between values.
+The published JSON Schema is generated from these models.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ DatasetFile = WingDatasetFile | VehicleDatasetFile
 
 
 def model_of(data: object) -> type[DatasetFile]:
-    """The model that ``data``, not checked yet, is meant for: a vehicle's where it has that key, or nearly."""
+    """The model for unchecked ``data``: a vehicle's if it has the key ``vehicle`` or a similar one, else a wing's."""
     keys = [str(key) for key in data] if isinstance(data, Mapping) else []
     meant = "wing" not in keys and difflib.get_close_matches("vehicle", keys, 1, 0.7)
     return VehicleDatasetFile if meant else WingDatasetFile

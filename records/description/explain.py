@@ -1,16 +1,17 @@
-"""Checks a description against its models and turns what pydantic says into errors a user can act on."""
+"""Checks a description against its models and converts pydantic's errors to messages with a remedy."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from typing import Any, get_args
+from collections.abc import Mapping
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wingfit.records.description.consistency import inconsistencies
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile, WingDatasetFile, model_of
+from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.quantity import FAULT, kind
 from wingfit.records.description.yaml_text import Document, Path
 from wingfit.records.errors import Faults, fail, nearest
@@ -37,10 +38,10 @@ _OTHER: dict[type[DatasetFile], tuple[type[DatasetFile], str, str]] = {
 
 
 def check_description(document: Document) -> DatasetFile:
-    """Validate the description; DatasetError lists everything that is wrong with it."""
+    """Validate the description; DatasetError lists its errors."""
     faults, data = Faults(), document.data
     if isinstance(data, Mapping) and "wing" in data and "vehicle" in data:
-        message = f"both 'wing' and 'vehicle' are described; a dataset is {' or '.join(_RIGS.values())}: split it"
+        message = f"both 'wing' and 'vehicle' are described; a dataset is of {' or '.join(_RIGS.values())}: split it"
         raise fail(document.where(("vehicle",)), None, message)
     root = model_of(data)
     try:
@@ -56,17 +57,17 @@ def check_description(document: Document) -> DatasetFile:
 
 
 class _Explainer:
-    """Puts pydantic's errors about one description into words; ``root`` is the model it was checked against."""
+    """Converts pydantic's errors on one description; ``root`` is the model it was checked against."""
 
     def __init__(self, document: Document, root: type[DatasetFile]) -> None:
         self.document, self.root = document, root
 
     def explain(self, errors: list[ErrorDetails], faults: Faults) -> None:
-        """Note all errors."""
+        """Add all errors to ``faults``."""
         mistaken = {self._renamed(error["loc"]) for error in errors if error["type"] == "extra_forbidden"}
         for error in errors:
             path, unknown = _path(error, self.document.data), error["type"] == "extra_forbidden"
-            # A key with the wrong unit is one mistake, not an unknown key and a missing one.
+            # A key with a wrong unit is one error, not an unknown key and a missing one.
             if error["type"] == "missing" and error["loc"] in mistaken:
                 continue
             value = error["input"] if error["type"] != "missing" else None
@@ -81,7 +82,7 @@ class _Explainer:
         if what == "extra_forbidden":
             return self._unknown_key(location)
         if what == "union_tag_not_found":
-            kinds = " or ".join(str(_kind(model)) for model in _models(self.root, location))
+            kinds = " or ".join(str(tag_of(model)) for model in _models(self.root, location))
             return f"the key 'kind' is missing; it must be {kinds}"
         return _plain_message(error)
 
@@ -97,7 +98,7 @@ class _Explainer:
         return f"unknown key {key!r}; {nearest(key, fields)}"
 
     def _renamed(self, location: Location) -> Location | None:
-        """Where an unknown key should have stood, when it is a known one with another unit or none."""
+        """The location of the known key that an unknown key matches except for its unit, or None."""
         key = str(location[-1])
         for known in self._fields(location):
             if _SUFFIX.search(known) and _stem(known) == _stem(key):
@@ -105,12 +106,12 @@ class _Explainer:
         return None
 
     def _fields(self, location: Location) -> list[str]:
-        """Keys that may stand beside the one at ``location``."""
+        """Valid keys of the mapping that contains ``location``."""
         return [name for model in _models(self.root, location[:-1])[:1] for name in model.model_fields]
 
 
 def _plain_message(error: ErrorDetails) -> str:
-    """Explain an error that says all by itself."""
+    """Message for an error that needs no context."""
     what, context, value = error["type"], error.get("ctx", {}), error["input"]
     if what == FAULT:
         return error["msg"]
@@ -134,33 +135,19 @@ def _stem(key: str) -> str:
 
 
 def _models(root: type[BaseModel], location: Location) -> list[type[BaseModel]]:
-    """Models that may describe what stands at ``location``: several where a union is not decided by its tag."""
+    """Models for the data at ``location``: several within a union whose tag is not given."""
     models = [root]
     for part in location:
         fields = [model.model_fields[str(part)] for model in models if str(part) in model.model_fields]
         if fields:
-            models = [model for field in fields for model in _inside(field.annotation)]
+            models = [model for field in fields for model in models_in(field.annotation)]
         else:
-            models = [model for model in models if _kind(model) == part] or models
+            models = [model for model in models if tag_of(model) == part] or models
     return models
 
 
-def _inside(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models within a type such as ``list[Model] | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for argument in get_args(annotation):
-        yield from _inside(argument)
-
-
-def _kind(model: type[BaseModel]) -> str | None:
-    """The tag of a model in a union."""
-    field = model.model_fields.get("kind")
-    return str(get_args(field.annotation)[0]) if field else None
-
-
 def _path(error: ErrorDetails, data: Any) -> Path:
-    """Pydantic's location as a path in the data: without the tags of unions, which stand in no file."""
+    """Pydantic's location as a path in the data, without the tags of unions, which are not keys of the file."""
     location, path = error["loc"], list[str | int]()
     for number, part in enumerate(location):
         inside = isinstance(data, Mapping) and part in data

@@ -1,17 +1,15 @@
-"""Types of single keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
+"""Types of the keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from wingfit.records.description.quantity import Text, fault, limits
-from wingfit.records.drive import FourierDrive
 from wingfit.records.limits import MAX_ESTIMATES, MAX_HARMONICS
-from wingfit.records.units import DEG, from_si, to_si
-from wingfit.records.vehicle import FourierFlap, FourierPitch
 
 METRES = "give metres: 0.22, not 220 or 22"
 
@@ -25,19 +23,11 @@ Name = Annotated[
     ),
 ]
 GeneName = Annotated[
-    str,
-    Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'"),
+    str, Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'")
 ]
 _UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
 Title = Annotated[
-    str,
-    Text(
-        rf"[^{_UNPRINTABLE}]+",
-        200,
-        "title",
-        "a title is one line of printable text, not empty",
-        portable=False,
-    ),
+    str, Text(rf"[^{_UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False)
 ]
 Prose = Annotated[
     str,
@@ -54,8 +44,7 @@ Chord = Annotated[Decimal, limits("0.0001", "5", "m", "chord", METRES)]
 Thickness = Annotated[Decimal, limits("0", "0.5", "m", "thickness", "give metres: 0.012, not 12", above=True)]
 Frequency = Annotated[Decimal, limits("0.01", "1000", "Hz", "beats per second")]
 Pressure = Annotated[
-    Decimal,
-    limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325"),
+    Decimal, limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325")
 ]
 Temperature = Annotated[Decimal, limits("-100", "100", "°C", "air temperature", "give degrees Celsius: 20, not 293.15")]
 Estimates = Annotated[
@@ -65,7 +54,7 @@ Estimates = Annotated[
 
 
 class Strict(BaseModel):
-    """Base of all models of the file: a key that is not known is an error."""
+    """Base of all models of the file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -85,24 +74,23 @@ class FourierFile(Strict):
             raise fault(f"cosine_deg has {cosines} entries and sine_deg {sines}; give as many of each: fill up with 0")
         return self
 
-    def radians(self) -> tuple[float, tuple[float, ...], tuple[float, ...]]:
-        """Mean, cosine and sine terms in rad."""
-        cosine, sine = (tuple(to_si(value, DEG) for value in terms) for terms in (self.cosine_deg, self.sine_deg))
-        return to_si(self.mean_deg, DEG), cosine, sine
+
+def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models within a type such as ``list[Model] | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from models_in(argument)
 
 
-def fourier_data(series: FourierDrive | FourierFlap | FourierPitch) -> dict[str, object]:
-    """``series`` as the plain data of ``dataset.yaml``."""
-    return {
-        "kind": series.kind,
-        "mean_deg": from_si(series.mean, DEG),
-        "cosine_deg": [from_si(value, DEG) for value in series.cosine],
-        "sine_deg": [from_si(value, DEG) for value in series.sine],
-    }
+def tag_of(model: type[BaseModel]) -> str | None:
+    """The value of the key ``kind`` that selects ``model`` in a union; None for a model without that key."""
+    field = model.model_fields.get("kind")
+    return str(get_args(field.annotation)[0]) if field else None
 
 
 def whole(value: Any) -> Any:
-    """``value`` as an int where it is a whole number, for types that admit only ints."""
+    """``value`` as an int if it is a whole number, for fields that admit only ints."""
     if isinstance(value, Decimal) and abs(value) < 10**6 and value == value.to_integral_value():
         return int(value)
     return value

@@ -14,19 +14,19 @@ from wingfit.records.errors import shown
 from wingfit.records.units import number_text
 
 FAULT = "wingfit"
-"""Type of the pydantic errors that carry a finished message."""
+"""Type of the pydantic errors whose message is final."""
 
 
 def fault(message: str) -> PydanticCustomError:
-    """Make a pydantic error with a finished message."""
+    """Make a pydantic error with this final message."""
     return PydanticCustomError(FAULT, "{message}", {"message": message})
 
 
 @dataclass(frozen=True)
 class Limits:
-    """A finite number in [low, high] ``unit``; read as a decimal, so that converting it to SI rounds once.
+    """A finite number in [low, high] ``unit``; read as a decimal, so that its conversion to SI rounds once.
 
-    ``above`` excludes ``low`` itself; ``remedy`` names the usual mistake.
+    ``above`` excludes ``low`` itself; ``remedy`` is advice for the usual mistake.
     """
 
     low: Decimal
@@ -71,9 +71,9 @@ def limits(low: str, high: str, unit: str, text: str, remedy: str = "", *, above
 
 @dataclass(frozen=True)
 class Text:
-    """Text of limited length that matches ``pattern``; ``rule`` says in words what is allowed.
+    """Text of limited length that matches ``pattern``; ``rule`` describes the pattern in messages.
 
-    A pattern that is not ``portable`` between dialects of regular expressions stays out of the JSON Schema.
+    A pattern that is not ``portable`` between dialects of regular expressions is omitted from the JSON Schema.
     """
 
     pattern: str
@@ -94,7 +94,7 @@ class Text:
         return {"type": "string", "description": self.text, "maxLength": self.length} | pattern
 
     def check(self, value: Any) -> str:
-        """``value`` where it is admissible text."""
+        """``value``, if it is admissible text; else a pydantic error."""
         if not isinstance(value, str):
             quoted = f'; put it in quotes: "{value}"' if isinstance(value, (bool, int, Decimal)) else ""
             raise fault(f"is {kind(value)}; it must be text{quoted}")
@@ -106,7 +106,7 @@ class Text:
 
 
 def kind(value: object) -> str:
-    """Say what ``value`` is, in the words of a YAML file."""
+    """Description of ``value`` in the terms of YAML, for messages."""
     if value is None:
         return "empty"
     if isinstance(value, bool):

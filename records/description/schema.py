@@ -1,4 +1,4 @@
-"""The JSON Schema of ``dataset.yaml``, generated from its models; run as a module, it is printed."""
+"""The JSON Schema of ``dataset.yaml``, generated from its models; running the module prints it."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ def dataset_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """Write the schema as it is published in docs/schemas/dataset.schema.json."""
+    """The text of the published schema, docs/schemas/dataset.schema.json."""
     return json.dumps(dataset_schema(), indent=2, ensure_ascii=False) + "\n"
 
 
 def _untitled(schema: Any) -> Any:
-    """Drop the titles that pydantic derives from key names; they say nothing."""
+    """``schema`` without the titles that pydantic derives from key names."""
     if isinstance(schema, list):
         return [_untitled(item) for item in schema]
     if not isinstance(schema, dict):

@@ -30,8 +30,7 @@ RightAngle = Annotated[Decimal, limits("-90", "90", "deg", "angle", _DEGREES)]
 Beats = Annotated[Decimal, limits("0", "0.5", "beats", "part of a beat", "give beats: 0.17, not 17 %", above=True)]
 Mass = Annotated[Decimal, limits("0", "100", "kg", "mass", "give kilograms: 0.0174, not 17.4", above=True)]
 Deviation = Annotated[
-    Decimal,
-    limits("0", "100", "N", "standard deviation of the noise", "give newtons: 0.005, not 5", above=True),
+    Decimal, limits("0", "100", "N", "standard deviation of the noise", "give newtons: 0.005, not 5", above=True)
 ]
 
 
@@ -84,7 +83,7 @@ class MotionFile(Strict):
     pitch_station: Annotated[
         Decimal, limits("0", "1", "spans", "where the pitch holds", "give a fraction of the span", above=True)
     ] = Decimal("0.7")
-    # No default: the source says "zero at the root", but its pitch is pi/2 where the chord lies along the body.
+    # No default: the source says "zero at the root", although its pitch is pi/2 where the chord lies along the body.
     root_pitch_deg: Annotated[
         Decimal, limits("-180", "180", "deg", "wing pitch at the flapping axis; 90: chord along the body", _DEGREES)
     ]
@@ -92,7 +91,7 @@ class MotionFile(Strict):
 
 
 class VehicleFile(Strict):
-    """The vehicle as built."""
+    """The vehicle."""
 
     name: Title
     layout: Literal["x4", "pair", "single"]
@@ -112,7 +111,7 @@ class VehicleFile(Strict):
 
 
 class LowPassFile(Strict):
-    """The zero-phase Butterworth filter that the values have been through."""
+    """The zero-phase Butterworth filter that was applied to the values."""
 
     cutoff_hz: Annotated[Decimal, limits("0", "1000000", "Hz", "half-power frequency of one pass", above=True)]
     order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(whole)] = 4
@@ -129,10 +128,7 @@ def _noise_kind(value: Any) -> str:
     return "per_axis" if isinstance(value, Mapping) else "one"
 
 
-Noise = Annotated[
-    Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")],
-    Discriminator(_noise_kind),
-]
+Noise = Annotated[Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")], Discriminator(_noise_kind)]
 
 
 class VehicleRecordingFile(Strict):
@@ -152,6 +148,5 @@ class VehicleRecordingFile(Strict):
     motion: MotionFile | None = Field(None, description="the wings' motion as measured in this recording")
     mass_kg: Mass | None = Field(None, description="the vehicle's mass in this recording, where it differs")
     standard_deviation_n: Noise | None = Field(
-        None,
-        description="known noise: one number, or {x: ..., z: ...} for the axes recorded; leave out if unknown",
+        None, description="known noise: one number, or {x: ..., z: ...} for the axes recorded; leave out if unknown"
     )

@@ -27,8 +27,7 @@ from wingfit.records.limits import MAX_MARKERS, MAX_RODS, MAX_STATIONS
 Place = Annotated[Decimal, limits("-10", "10", "m", "coordinate in the wing frame (x aft, y outboard, z up)", METRES)]
 Length = Annotated[Decimal, limits("0", "10", "m", "length", METRES, above=True)]
 Deviation = Annotated[
-    Decimal,
-    limits("0", "0.1", "m", "standard deviation of the noise", "give metres: 0.0005, not 0.5", above=True),
+    Decimal, limits("0", "0.1", "m", "standard deviation of the noise", "give metres: 0.0005, not 0.5", above=True)
 ]
 
 
@@ -42,12 +41,11 @@ class StationFile(Strict):
 
 
 class MaterialsFile(Strict):
-    """Masses that are no genes."""
+    """Densities, which are not genes."""
 
     foam_density_kg_m3: Annotated[Decimal, limits("0", "2000", "kg/m^3", "density of the foam", above=True)]
     skin_areal_density_kg_m2: Annotated[
-        Decimal,
-        limits("0", "10", "kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2"),
+        Decimal, limits("0", "10", "kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2")
     ]
 
 
@@ -113,7 +111,7 @@ class FourBarFile(Strict):
 
 
 class WingFile(Strict):
-    """The wing as built."""
+    """The wing."""
 
     name: Title
     stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)
@@ -155,6 +153,5 @@ class WingRecordingFile(Strict):
         "9.80665"
     )
     standard_deviation_m: Noise | None = Field(
-        None,
-        description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown",
+        None, description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown"
     )

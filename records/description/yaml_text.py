@@ -1,7 +1,7 @@
-"""YAML as the dataset format needs it: plain data with the line of every key, numbers as decimals, no tricks.
+"""The subset of YAML that the dataset format uses: plain data with the line of every key, numbers as decimals.
 
-Anchors, aliases, tags, several documents and repeated keys are refused; ``yes``, ``12:30``, dates are text,
-as in YAML 1.2. The tree is built from parser events, so that no object is ever constructed from a tag.
+Anchors, aliases, tags, several documents and repeated keys are refused; ``yes``, ``12:30``, dates are text, as in
+YAML 1.2. The data are built from parser events, so that no object is constructed from a tag.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _WORDS: dict[str, object] = {"true": True, "false": False, "null": None, "~": No
 
 @dataclass(frozen=True)
 class Document:
-    """Parsed YAML: plain data, and the place (line, column; from 1) of every key and item."""
+    """Parsed YAML: plain data, and the position (line, column; from 1) of every key and item."""
 
     file: str
     data: Any
     places: dict[Path, tuple[int, int]] = field(default_factory=dict)
 
     def where(self, path: Path) -> str:
-        """File, line and dotted key of ``path``; a missing key is placed where its parent is."""
+        """File, line and dotted key of ``path``; a missing key has the position of its parent."""
         known = path
         while known and known not in self.places:
             known = known[:-1]
@@ -43,7 +43,7 @@ class Document:
         return f"{self.file}{line}: {key}" if key else f"{self.file}{line}"
 
     def names(self, *path: str) -> list[str]:
-        """Names in the list at ``path``, of data that may not be checked yet."""
+        """Names in the list at ``path``; the data need not have been checked."""
         data = self.data
         for key in path:
             data = data.get(key) if isinstance(data, dict) else None
@@ -103,7 +103,7 @@ class _Builder:
         return Document(self.file, data, self.places)
 
     def _counted(self, events: Iterator[Any]) -> Iterator[Any]:
-        """The events, as long as they are not too many: what is built of them takes far more memory than the text."""
+        """The events, limited in number: the data built from them take far more memory than the text."""
         for number, event in enumerate(events):
             if number > MAX_ITEMS:
                 raise self._error(event, f"more than {MAX_ITEMS} keys, items and values; put samples in CSV")
@@ -135,7 +135,7 @@ class _Builder:
             key = event.value
             if key in result:
                 first = self.places[(*path, key)][0]
-                raise self._error(event, f"key {key!r} stands here and on line {first}; keep one", key)
+                raise self._error(event, f"key {key!r} is repeated here, after line {first}; keep one", key)
             self.places[(*path, key)] = _place(event)
             result[key] = self._value(next(self.events), (*path, key))
         return result
@@ -177,6 +177,6 @@ def _represent_number(dumper: yaml.SafeDumper, value: Decimal) -> yaml.ScalarNod
     return yaml.ScalarNode(tag, text)
 
 
-# Text such as "1e5" must be quoted: our reader takes it for a number, YAML 1.1 does not.
+# Text such as "1e5" must be quoted: it is a number to this reader, but not in YAML 1.1.
 _Dumper.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(f"^(?:{NUMBER.pattern})$"), list("-+.0123456789"))
 _Dumper.add_representer(Decimal, _represent_number)

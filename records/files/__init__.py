@@ -1,1 +1,1 @@
-"""Datasets as files: folders, zips and NetCDF, and how files from strangers are read."""
+"""Datasets as files: folders, zips and NetCDF; uploaded files are read in a separate process."""

@@ -1,4 +1,4 @@
-"""A dataset as a zip of its folder. Archives come from strangers: sizes first, nothing is extracted."""
+"""A dataset as a zip of its folder. Archives are not trusted: sizes are checked first, nothing is extracted to disk."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 class ZipFiles:
-    """Files in a zip, those of a single top-level folder seen from inside it."""
+    """Files in a zip; names are relative to the top-level folder if there is only one."""
 
     def __init__(self, data: bytes, label: str) -> None:
         self.label = label
@@ -50,7 +50,7 @@ class ZipFiles:
         return list(self._entries)
 
     def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError when the archive is damaged there."""
+        """Contents of a file; DatasetError if the archive is damaged."""
         try:
             return self._zip.read(self._entries[name])
         except _BROKEN as error:
@@ -90,7 +90,7 @@ def _check_entries(entries: Sequence[zipfile.ZipInfo], packed: int, label: str) 
         raise fail(label, expanded, message)
     faults, seen = Faults(), set[str]()
     for entry in entries:
-        problem = _entry_problem(entry) or ("stands twice in the zip; keep one" if entry.filename in seen else None)
+        problem = _entry_problem(entry) or ("appears twice in the zip; keep one" if entry.filename in seen else None)
         if problem:
             faults.add(f"{label}: {entry.filename!r}", entry.filename, problem)
         seen.add(entry.filename)
@@ -98,7 +98,7 @@ def _check_entries(entries: Sequence[zipfile.ZipInfo], packed: int, label: str) 
 
 
 def _entry_problem(entry: zipfile.ZipInfo) -> str | None:
-    # zipfile cuts a name at its first NUL and turns backslashes round; judge what is really stored.
+    # zipfile cuts a name at its first NUL and replaces backslashes; orig_filename is the stored name.
     name = entry.orig_filename
     if "\0" in name or "\\" in name:
         return "a name with a backslash or NUL; zip again with '/' between folder and file"
@@ -114,7 +114,7 @@ def _entry_problem(entry: zipfile.ZipInfo) -> str | None:
 
 
 def _prefix(names: Sequence[str]) -> str:
-    """``folder/`` when everything lies in one folder that holds the description, else nothing."""
+    """``folder/`` if all files are in one folder that contains the description, else the empty string."""
     folders = {name.partition("/")[0] for name in names}
     single = f"{folders.pop()}/" if len(folders) == 1 else ""
     return single if f"{single}{DESCRIPTION}" in names else ""

@@ -1,4 +1,4 @@
-"""From a description and numbers, however stored, to a dataset; and the same checks before writing."""
+"""Builds a dataset from a description and samples, from any kind of file; the same checks are made before writing."""
 
 from __future__ import annotations
 
@@ -7,11 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from wingfit.records.dataset import Dataset, Recording
-from wingfit.records.description import convert_vehicle, convert_wing
-from wingfit.records.description.dataset_file import VehicleDatasetFile
+from wingfit.records.description.convert import RecordingFile, describe_recording, describe_rig, to_recording, to_rig
 from wingfit.records.description.explain import check_description
-from wingfit.records.description.vehicle_file import VehicleRecordingFile
-from wingfit.records.description.wing_file import WingRecordingFile
 from wingfit.records.description.yaml_text import Document
 from wingfit.records.errors import DatasetError, Faults, nearest
 from wingfit.records.files.forces import AXES
@@ -28,20 +25,15 @@ At = Callable[[str, Samples, int], str]
 def assemble(
     document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
 ) -> Dataset:
-    """Build the dataset described by ``document``, of at most ``room`` numbers.
+    """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists all faults.
 
-    ``read(name, room)`` gives the samples of a recording of at most ``room`` numbers, ``where(name)``
-    says where they are stored, ``at(name, samples, row)`` where one instant is. Faults of all recordings are
-    collected.
+    ``read(name, room)`` returns the samples of a recording of at most ``room`` numbers. For messages, ``where(name)``
+    names the place where they are stored and ``at(name, samples, row)`` that of one instant.
     """
     checked = check_description(document)
-    rig: Wing | Vehicle
-    if isinstance(checked, VehicleDatasetFile):
-        rig = convert_vehicle.to_vehicle(checked.vehicle)
-    else:
-        rig = convert_wing.to_wing(checked.wing)
+    rig = to_rig(checked)
     faults, recordings = Faults(), list[Recording]()
-    entries: Sequence[WingRecordingFile | VehicleRecordingFile] = checked.recordings
+    entries: Sequence[RecordingFile] = checked.recordings
     for index, entry in enumerate(entries):
         try:
             samples = read(entry.name, room)
@@ -49,12 +41,7 @@ def assemble(
             faults.extend(error)
             continue
         room -= samples.values.size + samples.times.size
-        path = ("recordings", index)
-        recording = (
-            convert_wing.to_recording(entry, samples, document, path, faults)
-            if isinstance(entry, WingRecordingFile)
-            else convert_vehicle.to_recording(entry, samples, document, path, faults)
-        )
+        recording = to_recording(entry, samples, document, ("recordings", index), faults)
         check_numbers(
             recording,
             rig,
@@ -70,7 +57,7 @@ def assemble(
 
 
 def checked_description(dataset: Dataset) -> dict[str, object]:
-    """Describe ``dataset``, after the checks that reading makes: what is written can be read."""
+    """Plain data of ``dataset.yaml``, after the checks that reading makes, so that a written dataset can be read."""
     faults = Faults()
     for recording in dataset.recordings:
         _check_kind(recording, dataset, faults)
@@ -99,25 +86,18 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
 
 def describe(dataset: Dataset) -> dict[str, object]:
     """``dataset`` without its numbers, as the plain data of ``dataset.yaml``."""
-    rig: dict[str, object]
-    if isinstance(dataset.rig, Vehicle):
-        rig = {"vehicle": convert_vehicle.describe_vehicle(dataset.rig)}
-        recordings = [convert_vehicle.describe_recording(recording) for recording in dataset.recordings]
-    else:
-        rig = {"wing": convert_wing.describe_wing(dataset.rig)}
-        recordings = [convert_wing.describe_recording(recording) for recording in dataset.recordings]
     return {
         "format_version": FORMAT_VERSION,
         "name": dataset.name,
         **({"description": dataset.description} if dataset.description else {}),
-        **rig,
-        "recordings": recordings,
+        "vehicle" if isinstance(dataset.rig, Vehicle) else "wing": describe_rig(dataset.rig),
+        "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
     }
 
 
 def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
-    """Note what the file of this kind of dataset has no place for, rather than lose it."""
+    """Add a fault for every attribute that files of this kind of dataset cannot store."""
     where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
     lost: list[tuple[str, object]] = [
         ("markers", recording.markers),
@@ -145,9 +125,7 @@ def _check_shapes(recording: Recording, faults: Faults) -> None:
         if np.shape(array) != shape or np.asarray(array).dtype != np.float64:
             found = f"{np.asarray(array).dtype} {list(np.shape(array))}"
             faults.add(
-                f"{where}: {name}",
-                found,
-                f"is {found}; it must be float64 {list(shape)}: convert or transpose it",
+                f"{where}: {name}", found, f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
             )
 
 
@@ -157,4 +135,4 @@ def _check_markers(recording: Recording, wing: Wing, where: str, faults: Faults)
         if name not in known:
             faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")
         if name in recording.markers[:index]:
-            faults.add(where, name, f"marker {name!r} stands twice; keep one")
+            faults.add(where, name, f"marker {name!r} appears twice; keep one")

@@ -1,4 +1,4 @@
-"""A dataset as files: ``dataset.yaml`` and ``recordings/<name>.csv``, in a folder or whatever holds files."""
+"""A dataset as files: ``dataset.yaml`` and ``recordings/<name>.csv``, in a folder or an archive."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ RECORDINGS = "recordings"
 
 
 class Files(Protocol):
-    """Something that holds files."""
+    """A folder or archive."""
 
     @property
     def label(self) -> str:
-        """What messages call it."""
+        """Its name in messages."""
         ...
 
     def names(self) -> list[str]:
@@ -45,7 +45,7 @@ class FolderFiles:
         self.label = str(path)
 
     def names(self) -> list[str]:
-        """Files that may belong to a dataset: the description and what lies in ``recordings``."""
+        """Files that may belong to a dataset: those of the folder and of ``recordings``."""
         top = [path.name for path in self.path.iterdir() if path.is_file()]
         inner = [f"{RECORDINGS}/{p.name}" for p in (self.path / RECORDINGS).glob("*") if p.is_file()]
         names = top + inner
@@ -55,7 +55,7 @@ class FolderFiles:
         return names
 
     def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError when it is too large or not readable."""
+        """Contents of a file; DatasetError if it is too large or not readable."""
         path = self.path / name
         try:
             size = path.stat().st_size
@@ -68,7 +68,7 @@ class FolderFiles:
 
 
 def read_files(files: Files) -> Dataset:
-    """Read a dataset; DatasetError lists what is wrong with it."""
+    """Read a dataset; DatasetError lists its errors."""
     names = files.names()
     if DESCRIPTION not in names:
         raise fail(files.label, None, _no_description(names))
@@ -103,7 +103,7 @@ def read_files(files: Files) -> Dataset:
 
 
 def contents(dataset: Dataset) -> dict[str, bytes]:
-    """Write the files of ``dataset`` into memory, sorted; DatasetError when it breaks a limit."""
+    """Contents of the files of ``dataset`` by name, sorted; DatasetError if it violates the format."""
     files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
     for recording in sorted(dataset.recordings, key=lambda r: r.name):
         files[sample_file(recording.name)] = _table(recording).encode()
@@ -116,7 +116,7 @@ def _table(recording: Recording) -> str:
 
 
 def write_folder(dataset: Dataset, path: Path) -> None:
-    """Write ``dataset`` into a new or empty folder; DatasetError when there is anything in it."""
+    """Write ``dataset`` into a new or empty folder; DatasetError if it is not empty."""
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise fail(str(path), None, "exists and is not an empty folder; choose a new name or remove it first")
     for name, data in contents(dataset).items():

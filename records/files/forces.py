@@ -27,9 +27,9 @@ _WIND_AXES = re.compile(r"(?:lift|drag|thrust)(?:_?[a-z]+)?", re.IGNORECASE)
 
 
 def read_forces(raw: bytes, file: str, room: int = MAX_VALUES) -> Samples:
-    """Read CSV; ``room`` are the numbers the dataset may still hold. The channels are x before z in any file.
+    """Read CSV of at most ``room`` numbers. The order of the channels is x, z, whatever that of the columns.
 
-    DatasetError names line and column of everything that is not as it should be.
+    DatasetError names line and column of every error.
     """
     return read_table(raw, file, _layout, room, "nothing was measured")
 
@@ -38,7 +38,7 @@ def _layout(header: Sequence[str], where: str) -> Layout:
     columns = read_columns(header, where, _problem)
     found = [(name, axis) for name, axis in _COLUMNS.items() if name in columns]
     if not found:
-        raise fail(where, ",".join(header), f"there is no force; add {' or '.join(_COLUMNS)}, or both")
+        raise fail(where, ",".join(header), f"there is no column of forces; add {' or '.join(_COLUMNS)}, or both")
     return Layout(columns["time_s"], [columns[name] for name, _ in found], forces=tuple(axis for _, axis in found))
 
 

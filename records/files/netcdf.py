@@ -2,12 +2,12 @@
 
 Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)`` and, NaN
 where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
-``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can point to other files of the
-server and every such pointer must be refused.
+``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can link to other files of the
+server and every such link must be refused.
 
-Sizes of items and chunks, and filters, are checked before anything is read. That bounds what an honest file takes. A
-damaged or hostile one can still make the HDF5 library loop, crash or take memory without end: a stranger's file is
-read by :mod:`wingfit.records.files.confined` only.
+Sizes of items and chunks, and filters, are checked before anything is read, which limits the memory for a valid file. A
+damaged or malicious one can still make the HDF5 library loop, crash or exhaust memory; so uploaded files are read only
+by :mod:`wingfit.records.files.confined`.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from typing import Any, BinaryIO, NamedTuple
 import h5netcdf
 import h5py
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset, Recording
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
@@ -43,7 +43,6 @@ from wingfit.records.limits import (
 )
 
 FORMAT = "wingfit dataset"
-Array = npt.NDArray[np.float64]
 BLOCK = 2**20  # numbers
 # Filters that come with h5py, each of which may be in a variable's pipeline once.
 FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, h5py.h5z.FILTER_LZF}
@@ -51,7 +50,7 @@ _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeErro
 
 
 class Limit(NamedTuple):
-    """Numbers that may be read: ``left`` of ``most``; and whether it matters how they are stored."""
+    """Numbers that may still be read, ``left`` of ``most``, and whether the storage layout is checked."""
 
     left: int
     most: int
@@ -89,16 +88,16 @@ def _write_recording(group: Any, recording: Recording) -> None:
 
 
 def read_netcdf(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a NetCDF-4 file that is trusted."""
+    """Read a dataset from the bytes of a trusted NetCDF-4 file."""
     return parse_netcdf(io.BytesIO(data), label)[0]
 
 
 def parse_netcdf(
     opened: BinaryIO, label: str, most: int = MAX_VALUES, *, storage: bool = True
 ) -> tuple[Dataset, Parsed]:
-    """Read a NetCDF-4 file of at most ``most`` numbers: the dataset, and what it was built from.
+    """Read a NetCDF-4 file of at most ``most`` numbers; returns the dataset and its parsed contents.
 
-    ``storage``: refuse chunks, filters and texts of fixed length by which a small file takes much memory.
+    ``storage``: refuse chunks, filters and fixed-length texts by which a small file needs much memory.
     """
     with _damage(label), h5py.File(opened, "r") as file:
         text, samples = _attribute(file, "dataset_yaml", label), dict[str, Samples]()
@@ -135,7 +134,7 @@ def _at(label: str, name: str, row: int) -> str:
 
 @contextmanager
 def _damage(where: str) -> Iterator[None]:
-    """Turn whatever HDF5 says about a broken file into a DatasetError."""
+    """Convert any exception of HDF5 on a damaged file to a DatasetError."""
     try:
         yield
     except DatasetError:
@@ -162,7 +161,7 @@ def _attribute(file: Any, name: str, label: str) -> bytes:
 
 
 def _child(parent: Any, name: str, where: str, kind: type) -> Any:
-    """Member of a group, which must lie in this very file."""
+    """Member of a group; DatasetError if it is a link to elsewhere."""
     link = parent.get(name, getlink=True)
     if link is None:
         raise fail(where, name, f"{name!r} is missing; see docs/formats.md for the groups and variables")
@@ -181,7 +180,7 @@ def _group(parent: Any, name: str, where: str) -> Any:
 def _variable(group: Any, name: str, where: str) -> Any:
     variable = _child(group, name, where, h5py.Dataset)
     if variable.is_virtual or variable.external:
-        raise fail(where, name, f"{name!r} keeps its data in other files; copy them into this one")
+        raise fail(where, name, f"{name!r} stores its data in other files; copy them into this one")
     if variable.shape is None:
         raise fail(where, name, f"{name!r} has no dimensions and no data; see docs/formats.md for its shape")
     return variable
@@ -225,7 +224,7 @@ def _forces(group: Any, where: str, limit: Limit) -> Samples:
 
 
 def _numbers(variable: Any) -> Array:
-    """All of a variable, some whole chunks at a time: in one go the library would hold it twice."""
+    """All values of a variable, read some chunks at a time: at once, the library would hold them twice."""
     made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
     rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
     for start in range(0, len(made), rows):
@@ -235,7 +234,7 @@ def _numbers(variable: Any) -> Array:
 
 
 def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
-    """Declared shapes cost nothing to write: check them before memory is spent."""
+    """Check the declared sizes before memory is allocated for them."""
     if times.size > MAX_ROWS:
         raise fail(where, times.size, f"{times.size} times; at most {MAX_ROWS} are read: cut it")
     if times.size + values.size > limit.left:
@@ -249,7 +248,7 @@ def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
 
 
 def _check_storage(variable: Any, where: str) -> None:
-    """Refuse chunks and filters by which a small file takes much memory."""
+    """Refuse chunks and filters by which a small file needs much memory."""
     chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize
     if chunk > MAX_CHUNK_BYTES:
         message = (
@@ -283,4 +282,4 @@ def _check_names(markers: tuple[str, ...], known: list[str], where: str) -> None
         if name not in known:
             raise fail(where, name, f"no marker is called {name!r} in dataset_yaml; {nearest(name, known)}")
         if name in markers[:index]:
-            raise fail(where, name, f"marker {name!r} stands twice; keep one")
+            raise fail(where, name, f"marker {name!r} appears twice; keep one")

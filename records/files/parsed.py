@@ -1,8 +1,9 @@
-"""A dataset in the project's own form: what is stored of a file that must not be opened a second time.
+"""The internal storage format of a dataset, to which an uploaded NetCDF file is converted once.
 
-A zip that the service writes for itself, and never takes as an upload: ``dataset.yaml`` byte for byte; ``layout.json``
-with the number of instants of each recording and its markers or axes of force; ``recordings/<name>.f8`` with its times
-[T], then its values [T, C], as little-endian 64-bit numbers. Read again, it is the same dataset, bit for bit.
+A zip that the service writes for itself and does not accept as an upload: ``dataset.yaml`` byte for byte;
+``layout.json`` with the number of instants of each recording and its markers or axes of force; ``recordings/<name>.f8``
+with its times [T], then its values [T, C], as little-endian 64-bit numbers. Reading restores the same dataset, bit for
+bit.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset
 from wingfit.records.description.yaml_text import read_yaml
 from wingfit.records.errors import DatasetError, fail
@@ -28,15 +29,13 @@ from wingfit.records.limits import MAX_DESCRIPTION_BYTES, MAX_RECORDINGS
 
 LAYOUT = "layout.json"
 NUMBER = "<f8"
-# Recorded numbers end in noise: packing them harder takes many times as long and saves a few percent.
+# Measured numbers end in noise: a higher level takes many times as long and saves a few percent.
 DEFLATE_LEVEL = 1
 BLOCK = 2**17  # numbers that are packed at a time
-# The end of a zip that is smaller than 2 GiB and has no comment; of a larger one, 20 bytes in front of it begin so.
+# End record of a zip below 2 GiB without a comment; in a larger one a locator of 20 bytes precedes it.
 _END, _END_OF_LARGE = struct.Struct("<4s4H2LH"), b"PK\6\7"
 LONGEST_ENTRY = 1024  # bytes of an entry in the directory: its name, and 46
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -65,19 +64,19 @@ def pack(parsed: Parsed, into: IO[bytes]) -> None:
 
 
 def load_parsed(data: bytes, label: str) -> Dataset:
-    """The dataset that was packed; ``label`` is what messages call it. DatasetError where ``data`` is damaged."""
+    """The dataset that was packed; ``label`` names it in messages. DatasetError if ``data`` is damaged."""
     try:
         _check_directory(data)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             return _dataset(archive, label)
     except DatasetError:
         raise
-    except Exception as error:  # whatever it is: what wrote it read a stranger's file
+    except Exception as error:  # of any kind: the process that wrote it had read an untrusted file
         raise fail(label, None, f"its stored form is damaged ({error}); upload the file again") from None
 
 
 def _check_directory(data: bytes) -> None:
-    """A directory that lists more than we ever write would take memory before anything of it is looked at."""
+    """Check the size of the zip's directory, which zipfile reads into memory as a whole."""
     end = data[-_END.size :]
     if len(end) < _END.size or data[-_END.size - 20 :].startswith(_END_OF_LARGE):
         raise ValueError("it does not end as it was written")
@@ -88,7 +87,7 @@ def _check_directory(data: bytes) -> None:
 
 def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
     if any(entry.compress_type != zipfile.ZIP_DEFLATED or entry.flag_bits & 1 for entry in archive.infolist()):
-        raise ValueError("it is packed as none was written")
+        raise ValueError("an entry is not deflated, or is encrypted")
     document = read_yaml(_text(archive, DESCRIPTION), f"{label}: {DESCRIPTION}")
     layout = json.loads(_text(archive, LAYOUT))
 
@@ -99,7 +98,7 @@ def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> bytes:
-    """An entry of at most ``MAX_DESCRIPTION_BYTES``: what wrote it read a stranger's file."""
+    """An entry; ValueError above ``MAX_DESCRIPTION_BYTES``."""
     if archive.getinfo(name).file_size > MAX_DESCRIPTION_BYTES:
         raise ValueError(f"{name} is too large")
     return archive.read(name)
@@ -116,11 +115,11 @@ def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], roo
 
 
 def _array(stream: IO[bytes], shape: tuple[int, ...]) -> Array:
-    """Read straight into memory of its own: kernels take a read-only array for another type."""
+    """Read into a writable array: to numba, read-only arrays are another type."""
     array = np.empty(shape, dtype=NUMBER)
     rest = array.reshape(-1).view(np.uint8).data
     while rest:
-        count = stream.readinto(rest)  # type: ignore[attr-defined]  # it has, though its protocol does not say so
+        count = stream.readinto(rest)  # type: ignore[attr-defined]  # missing in the protocol
         if not count:
             raise EOFError("it ends early")
         rest = rest[count:]

@@ -1,12 +1,12 @@
-"""Checks on the numbers of a recording, wherever they come from: order of times, amount of data, unit."""
+"""Checks of the numbers of a recording: order of times, amount of data, plausible units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
 from wingfit.records.limits import (
@@ -22,22 +22,17 @@ from wingfit.records.limits import (
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
 
-Array = npt.NDArray[np.float64]
 Locate = Callable[[int], str]
 _SHOWN = 3
-ABSURD = 1e6  # weights: no unit makes a force of one weight so large a number
+ABSURD = 1e6  # weights: in no unit is the weight so large a number
 
 
 def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
-    """Note what is wrong with the times and values of ``recording``; ``at(row)`` says where a row stands."""
+    """Add the faults of the times and values of ``recording``; ``at(row)`` names the place of a row in messages."""
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not MIN_FRAMES <= frames <= MAX_ROWS:
-        faults.add(
-            where,
-            frames,
-            f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or cut in parts",
-        )
+        faults.add(where, frames, f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or split it")
     if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= MAX_MARKERS:
         faults.add(where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {MAX_MARKERS}")
     increasing = _check_times(times, at, faults)
@@ -57,8 +52,8 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         _check_clock(recording, where, at, faults)
 
 
-def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
-    """Whether times are finite and increase; notes where not."""
+def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
+    """Whether the times are finite and increase; adds faults where not."""
     bad = np.flatnonzero(~np.isfinite(times))
     for row in bad[:_SHOWN]:
         faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
@@ -73,8 +68,10 @@ def _check_times(times: Array, at: Locate, faults: Faults) -> bool:
     return not back.size
 
 
-def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where: str, faults: Faults) -> None:
-    """Markers stay within about a span of the hinge; those further out are in another unit or frame."""
+def _check_positions(
+    values: Float[Array, "T C"], markers: tuple[str, ...], wing: Wing, where: str, faults: Faults
+) -> None:
+    """Markers are within about a span of the hinge; farther ones indicate another unit or frame."""
     hinge = (0.0, wing.hinge.y, wing.hinge.z)
     distance = _typical(values, hinge)
     limit = IMPLAUSIBLE_SPANS * wing.span
@@ -99,22 +96,22 @@ def _check_positions(values: Array, markers: tuple[str, ...], wing: Wing, where:
         faults.add(where, f"{each[k]:.4g}", message)
 
 
-def _typical(values: Array, hinge: tuple[float, float, float]) -> float:
-    """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 where none is known.
+def _typical(values: Float[Array, "T C"], hinge: tuple[float, float, float]) -> float:
+    """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 without any value.
 
-    One axis after the other: a large recording is not copied whole.
+    One axis after the other, to save memory.
     """
     return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
 
 
-def _median_distance(places: Array, origin: float) -> float:
+def _median_distance(places: Float[Array, "T M"], origin: float) -> float:
     distances = np.abs(places - origin)
     known = distances[np.isfinite(distances)]
     return float(np.median(known, overwrite_input=True)) if known.size else 0.0
 
 
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
-    """Forces in flight are about a weight; typical ones far from it are in another unit. One axis may be zero."""
+    """Forces in flight are about a weight; far larger or smaller ones indicate another unit. One axis may be zero."""
     sizes = {}
     for name, axis in zip(recording.forces, recording.values.T, strict=True):
         found = axis[np.isfinite(axis)]
@@ -141,7 +138,7 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
 
 
 def _unit(weights: float) -> str:
-    """The unit in which a force of so many weights would be nearest to one weight."""
+    """The likely unit of a force of so many weights: the one that makes it about one weight."""
     if weights < 1:
         return "a much larger unit"
     if weights > ABSURD:
@@ -152,7 +149,7 @@ def _unit(weights: float) -> str:
 
 
 def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -> None:
-    """Forces cover a beat at an even clock, fast enough for the filter that they have been through."""
+    """Check that forces cover a beat at even steps, fast enough for the filter that was applied to them."""
     times, frequency, low_pass = recording.times, recording.condition.flap_frequency, recording.low_pass
     steps = np.diff(times)
     step = float(np.median(steps))
@@ -180,13 +177,13 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
         faults.add(where, f"{1 / step:.4g}", message)
     if low_pass is not None and low_pass.cutoff < frequency:
         message = (
-            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz, below the flap frequency, {frequency:g} Hz: of such values "
-            "no beat is left; check both, give values less filtered, or leave low_pass out if they are not filtered"
+            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz, below the flap frequency, {frequency:g} Hz: such a "
+            "filter removes the beat; check both, filter less, or omit low_pass if the values are not filtered"
         )
         faults.add(where, low_pass.cutoff, message)
     if low_pass is not None and low_pass.cutoff >= 0.5 / step:
         message = (
             f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "
-            "Hz: check both, or leave low_pass out"
+            "Hz: check both, or omit low_pass"
         )
         faults.add(where, low_pass.cutoff, message)

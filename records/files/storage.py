@@ -1,4 +1,4 @@
-"""Load and save datasets: a folder, a zip of it, or NetCDF; what a file is, its contents say."""
+"""Load and save datasets as a folder, a zip of it, or NetCDF; the contents determine the type of a file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OTHERS = {
 
 
 def load_dataset(path: str | Path) -> Dataset:
-    """Read the folder, zip or NetCDF file at ``path``; DatasetError lists what is wrong with it."""
+    """Read the folder, zip or NetCDF file at ``path``; DatasetError lists its errors."""
     path = Path(path)
     if path.is_dir():
         return read_files(FolderFiles(path))
@@ -41,19 +41,19 @@ def load_dataset(path: str | Path) -> Dataset:
 
 
 def label_of(filename: str) -> str:
-    """What messages call an upload that its sender calls ``filename``."""
+    """The name by which messages refer to an upload called ``filename``."""
     return shown(filename.replace("\\", "/").rpartition("/")[2]) or "upload"
 
 
 def is_netcdf(data: bytes) -> bool:
-    """Whether ``data`` is of the kind that only the HDF5 library reads."""
+    """Whether ``data`` is an HDF5 file, as NetCDF-4 files are."""
     return data[: len(_HDF5)] == _HDF5
 
 
 def load_archive(data: bytes, filename: str) -> Dataset:
-    """Read a zip or NetCDF file from its bytes; ``filename`` is only what messages call it.
+    """Read a zip or NetCDF file from its bytes; ``filename`` is used in messages only.
 
-    NetCDF from a stranger is for :func:`wingfit.records.files.confined.convert_netcdf`.
+    For untrusted NetCDF files use :func:`wingfit.records.files.confined.convert_netcdf`.
     """
     label = label_of(filename)
     _check_size(len(data), label)
@@ -72,8 +72,8 @@ def load_archive(data: bytes, filename: str) -> Dataset:
 def save_dataset(dataset: Dataset, path: str | Path) -> None:
     """Write ``dataset`` as zip (``.zip``), NetCDF (``.nc``) or folder (anything else).
 
-    An existing file is replaced at once, never left half written; a folder must be new or empty. DatasetError
-    when the dataset breaks a limit of the format: what is written can be read.
+    An existing file is replaced atomically; a folder must be new or empty. DatasetError if the dataset violates the
+    format, so that a written dataset can always be read.
     """
     path = Path(path)
     suffix = path.suffix.lower()

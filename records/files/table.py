@@ -1,7 +1,7 @@
 """The numbers of one recording as CSV: a column ``time_s``, and columns that a layout knows.
 
-Numbers are written by ``repr`` and read by ``float``, which is exact. A clean row costs one ``float`` a cell;
-only a file with anything suspicious in it takes the slow road that names the cell.
+Numbers are written by ``repr`` and read by ``float``, which is exact. Files of digits only are read by ``float`` alone;
+those with other characters are read by a slower function that names the faulty cell.
 """
 
 from __future__ import annotations
@@ -15,48 +15,35 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.records.dataset import ForceAxis
 from wingfit.records.description.yaml_text import NUMBER
 from wingfit.records.errors import DatasetError, Faults, decode, fail, shown
 from wingfit.records.limits import MAX_ROWS, MAX_VALUES, MIN_FRAMES
 
-Array = npt.NDArray[np.float64]
 _SUSPICIOUS = re.compile(r"[^0-9eE+\-., \r\n]")
-_TIMES = {
-    "time",
-    "t",
-    "t_s",
-    "times",
-    "time_ms",
-    "time_us",
-    "seconds",
-    "frame",
-    "frames",
-    "timestamp",
-    "time_min",
-}
+_TIMES = {"time", "t", "t_s", "times", "time_ms", "time_us", "seconds", "frame", "frames", "timestamp", "time_min"}
 _MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/a"}
 
 
 @dataclass(frozen=True)
 class Samples:
-    """The numbers of a recording, of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`).
+    """The numbers of a recording of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`).
 
-    ``lines`` [T] is the line of the file that each instant came from.
+    ``lines`` [T] are the lines of the file with each instant.
     """
 
-    times: Array
-    values: Array
-    lines: npt.NDArray[np.int64]
+    times: Float[Array, " T"]
+    values: Float[Array, "T C"]
+    lines: Int[Index, " T"]
     markers: tuple[str, ...] = ()
     forces: tuple[ForceAxis, ...] = ()
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which columns hold what: ``columns`` [C] in the order of the channels."""
+    """Columns of a file: that of the time, and ``columns`` [C] in the order of the channels."""
 
     time: int
     columns: list[int]
@@ -64,7 +51,7 @@ class Layout:
     forces: tuple[ForceAxis, ...] = ()
 
 
-def write_table(columns: Sequence[str], times: Array, values: Array) -> str:
+def write_table(columns: Sequence[str], times: Float[Array, " T"], values: Float[Array, "T C"]) -> str:
     """CSV text of ``values`` [T, C] under the names ``columns``; NaN is an empty cell."""
     rows = zip(times.tolist(), values.tolist(), strict=True)
     lines = (",".join([repr(time), *(repr(v) if v == v else "" for v in row)]) for time, row in rows)
@@ -72,15 +59,14 @@ def write_table(columns: Sequence[str], times: Array, values: Array) -> str:
 
 
 def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], Layout], room: int, gap: str) -> Samples:
-    """Read CSV of at most ``room`` numbers; ``read_layout(header, where)`` judges the header.
+    """Read CSV of at most ``room`` numbers; ``read_layout(header, where)`` checks the header and returns the layout.
 
-    ``gap`` says where a cell may be empty. DatasetError names line and column of everything that is not as it should
-    be.
+    ``gap`` says in messages when a cell may be empty. DatasetError names line and column of every error.
     """
     text = decode(raw, file)
     if not text.strip():
         raise fail(file, None, f"the file is empty; it needs a header and at least {MIN_FRAMES} rows")
-    # Not io.StringIO, which takes four bytes for each character.
+    # Not io.StringIO, which takes four bytes per character.
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(raw), "utf-8-sig", newline=""), strict=True)
     try:
         header = [name.strip() for name in next(reader)]
@@ -97,7 +83,7 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
 
 
 def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str | None]) -> dict[str, int]:
-    """Place of each column by name; ``problem(name)`` says what is wrong with one that is not ``time_s``."""
+    """Index of each column by name; ``problem(name)`` returns the fault of a column other than ``time_s``, or None."""
     _check_separator(header, where)
     columns, faults = dict[str, int](), Faults()
     for index, name in enumerate(header):
@@ -120,7 +106,7 @@ def _check_separator(header: Sequence[str], where: str) -> None:
 
 def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
     if name in earlier:
-        return f"column {name!r} also stands as column {earlier[name] + 1}; keep one"
+        return f"column {name!r} is also column {earlier[name] + 1}; keep one"
     if not name:
         return "this column has no name; name it or remove the comma at the end of the lines"
     if name != "time_s" and (name.lower() in _TIMES or name.lower() == "time_s"):
@@ -130,8 +116,8 @@ def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
 
 def _rows(
     reader: Iterable[list[str]], header: Sequence[str], file: str, room: int, gap: str | None
-) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Read all rows as numbers [T, columns], and their lines. No ``gap``: the text holds no letters, no 'nan'."""
+) -> tuple[Array, Index]:
+    """Read all rows as numbers [T, columns], and their lines; ``gap`` is None if the text has no letters."""
     convert: Callable[[list[str]], list[float]] = _fast if gap is None else _strict
     numbers, lines, width, faults = array("d"), array("q"), len(header), Faults()
     line = getattr(reader, "line_num", 1)
@@ -145,7 +131,7 @@ def _rows(
             try:
                 numbers.extend(convert(row))
             except ValueError:
-                numbers.extend(_explained(row, header, f"{file}, line {line}", gap or "there is no number", faults))
+                numbers.extend(_checked_cells(row, header, f"{file}, line {line}", gap or "there is no number", faults))
             lines.append(line)
         if faults.full:
             break
@@ -154,9 +140,7 @@ def _rows(
     matrix = np.frombuffer(numbers, dtype=np.float64).reshape(-1, width)
     for index, column in np.argwhere(np.isinf(matrix))[:10]:
         faults.add(
-            f"{file}, line {lines[index]}, column {header[column]!r}",
-            None,
-            "is too large for a number; check its unit",
+            f"{file}, line {lines[index]}, column {header[column]!r}", None, "is too large for a number; check its unit"
         )
     faults.raise_any()
     return matrix, np.array(lines, dtype=np.int64)
@@ -179,8 +163,8 @@ def _cell(cell: str) -> float:
     return float(text)
 
 
-def _explained(row: list[str], header: Sequence[str], where: str, gap: str, faults: Faults) -> list[float]:
-    """Numbers of a row that the quick conversion refused; notes every cell that is none."""
+def _checked_cells(row: list[str], header: Sequence[str], where: str, gap: str, faults: Faults) -> list[float]:
+    """Numbers of a row that could not be converted as a whole; adds a fault for every cell that is not a number."""
     numbers = []
     for name, cell in zip(header, row, strict=True):
         try:
@@ -200,7 +184,7 @@ def _not_a_number(text: str, gap: str) -> str:
 
 
 def _ragged(row: list[str], width: int) -> str:
-    cause = "the line is cut off or lacks commas" if len(row) < width else "decimal commas, or a comma too many"
+    cause = "the line is cut off, or commas are missing" if len(row) < width else "decimal commas, or a comma too many"
     return f"has {len(row)} cells where the header has {width}; {cause}"
 
 
@@ -212,6 +196,6 @@ def _check_size(rows: int, numbers: int, file: str, room: int) -> None:
 
 
 def too_much(where: str, most: int = MAX_VALUES) -> DatasetError:
-    """Make the error of a dataset with more than ``most`` numbers."""
+    """The error for a dataset with more than ``most`` numbers."""
     message = f"the dataset holds more than {most} numbers, the most that are read; split it or thin it out"
     return fail(where, None, message)

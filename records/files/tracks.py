@@ -14,9 +14,9 @@ _OTHER_UNIT = re.compile(r"(?P<marker>.+?)_?(?P<axis>[xyzXYZ])(?:_?(?:mm|cm|m|px
 
 
 def read_tracks(raw: bytes, file: str, known: Sequence[str], room: int = MAX_VALUES) -> Samples:
-    """Read CSV; ``known`` are the wing's markers, ``room`` the numbers the dataset may still hold.
+    """Read CSV of at most ``room`` numbers; ``known`` are the wing's markers.
 
-    DatasetError names line and column of everything that is not as it should be.
+    DatasetError names line and column of every error.
     """
     return read_table(raw, file, lambda header, where: _layout(header, where, known), room, "the marker was not seen")
 
@@ -31,7 +31,7 @@ def _layout(header: Sequence[str], where: str, known: Sequence[str]) -> Layout:
             message = f"column {name!r} is missing; a marker needs its x, y and z (cells may be empty)"
             faults.add(where, name, message)
     if not markers:
-        faults.add(where, ",".join(header), "there is no marker; add columns such as " + _example(known))
+        faults.add(where, ",".join(header), "there is no column of a marker; add columns such as " + _example(known))
     if len(markers) > MAX_MARKERS:
         faults.add(where, len(markers), f"{len(markers)} markers; at most {MAX_MARKERS} are read: remove some")
     faults.raise_any()

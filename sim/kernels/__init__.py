@@ -1,7 +1,7 @@
-"""The compiled inner loops: eight individuals side by side, the lane as the innermost array axis.
+"""Compiled inner loops for eight individuals at a time; the last axis of the arrays is the individual, called lane.
 
-Nothing outside ``sim`` calls these; ``wingfit.sim.solver.simulate`` is the one door. Every lane does its own arithmetic
-in a fixed order, so that an individual's numbers do not depend on its neighbours, its lane or the size of the batch.
+Only ``sim`` uses these. The arithmetic of every lane has a fixed order, so that the results of an individual do not
+depend on the other lanes or on the size of the batch.
 """
 
 LANES = 8

@@ -1,10 +1,10 @@
 """Strip aerodynamics (thesis III-E, Eqs. 8-13), lane by lane.
 
-A strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
-shared among them. Beyond what is printed: alpha lies in [-pi/2, pi/2], drag grows with |alpha| (as printed it would
-push the wing at negative angles), and in reversed flow the lift keeps the sign of the normal flow; the change of sign
-is smoothed within 15 degrees of 90 so that the force has no jump, and is exactly one elsewhere. The affine law is good
-to about 15 degrees and is used as printed beyond.
+Each strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
+distributed to these. Differences from the printed equations: alpha lies in [-pi/2, pi/2]; drag grows with |alpha| (as
+printed, it would accelerate the wing at negative angles); in reversed flow the lift has the sign of the normal flow,
+with the change of sign smoothed within 15 degrees of 90 so that the force is continuous. The affine law is valid to
+about 15 degrees and is used as printed beyond.
 """
 
 from __future__ import annotations
@@ -12,37 +12,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.sim.kernels import LANES
-from wingfit.sim.kernels.arrays import (
-    ALPHA,
-    AREA,
-    CHORD_X,
-    CIRCULATION,
-    DRAG,
-    DRAG_SLOPE,
-    FORWARD,
-    LIFT_SLOPE,
-    NORMAL_X,
-    PITCH_RATE,
-    PLACE_X,
-    PUSH_C,
-    PUSH_L,
-    PUSH_M,
-    PUSH_N,
-    SPEED,
-    STREAM_C,
-    STREAM_N,
-)
+from wingfit.records.array_types import Array, Index
+from wingfit.sim.kernels import LANES, arrays
 from wingfit.sim.kernels.jit import allocating, kernel
 from wingfit.sim.kernels.lanes.lanewise import angle
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 REVERSAL = math.sin(math.radians(15.0))
-STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
+STILL = 1e-9  # m/s, avoids division by zero without flow
 
 
 @allocating
@@ -59,11 +37,11 @@ def strip_flow(
     flow: Array,
     loads: Array,
 ) -> None:
-    """The airflow of every strip, ``flow`` [S, FLOW, W], and what the affine laws make of it, ``loads`` [S, LOADS, W].
+    """The airflow of every strip, ``flow`` [S, FLOW, W], and ``loads`` [S, LOADS, W] by the affine laws.
 
     ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
     centroid in the body frame; ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b; ``induced`` [S, 3, W]: velocity of the
-    air on top of the wind, or empty, and then the strip's place and pitch rate are not asked for either.
+    air in addition to the wind; if it is empty, position and pitch rate of the strips are not computed either.
     """
     mean = np.empty((9, LANES))
     for s in range(len(start) - 1):
@@ -89,7 +67,7 @@ def strip_flow(
         ux, uy, uz = load1(wind, 0) - load1(mean, 0), load1(wind, 1) - load1(mean, 1), load1(wind, 2) - load1(mean, 2)
         if len(induced):
             ux, uy, uz = ux + load(induced, s, 0), uy + load(induced, s, 1), uz + load(induced, s, 2)
-            _whereabouts(s, start, weight, centroid, R, p, V, flow)
+            _position_and_pitch_rate(s, start, weight, centroid, R, p, V, flow)
         uc = ux * cx + uy * cy + uz * cz
         un = ux * nx + uy * ny + uz * nz
         q = root(uc * uc + un * un + STILL * STILL)
@@ -97,37 +75,37 @@ def strip_flow(
         forward = 0.5 * x * (3.0 - x * x)
         alpha = angle(un, uc * forward)
         for i, value in enumerate((cx, cy, cz)):
-            store(flow, s, CHORD_X + i, value)
+            store(flow, s, arrays.CHORD_X + i, value)
         for i, value in enumerate((nx, ny, nz)):
-            store(flow, s, NORMAL_X + i, value)
-        store(flow, s, STREAM_C, uc)
-        store(flow, s, STREAM_N, un)
-        store(flow, s, SPEED, q)
-        store(flow, s, ALPHA, alpha)
-        store(flow, s, FORWARD, forward)
+            store(flow, s, arrays.NORMAL_X + i, value)
+        store(flow, s, arrays.STREAM_C, uc)
+        store(flow, s, arrays.STREAM_N, un)
+        store(flow, s, arrays.SPEED, q)
+        store(flow, s, arrays.ALPHA, alpha)
+        store(flow, s, arrays.FORWARD, forward)
         cl = load1(coefficients, 0) * alpha + load1(coefficients, 1)
         cd = load1(coefficients, 2) * magnitude(alpha) + load1(coefficients, 3)
-        store(loads, s, CIRCULATION, q * cl * forward)
-        store(loads, s, DRAG, q * cd)
-        store(loads, s, LIFT_SLOPE, q * load1(coefficients, 0))
-        store(loads, s, DRAG_SLOPE, q * (cd + load1(coefficients, 2)))
-        for i in (PUSH_N, PUSH_C, PUSH_M, PUSH_L):
+        store(loads, s, arrays.CIRCULATION, q * cl * forward)
+        store(loads, s, arrays.DRAG, q * cd)
+        store(loads, s, arrays.LIFT_SLOPE, q * load1(coefficients, 0))
+        store(loads, s, arrays.DRAG_SLOPE, q * (cd + load1(coefficients, 2)))
+        for i in (arrays.PUSH_N, arrays.PUSH_C, arrays.PUSH_M, arrays.PUSH_L):
             store(loads, s, i, 0.0)
 
 
 @kernel
-def _whereabouts(
+def _position_and_pitch_rate(
     s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
 ) -> None:
-    """Where the strip's area is in the world, and how fast it pitches."""
-    for i in (PLACE_X, PLACE_X + 1, PLACE_X + 2, PITCH_RATE):
+    """Set the position of the strip's centroid in the world, and its pitch rate."""
+    for i in (arrays.PLACE_X, arrays.PLACE_X + 1, arrays.PLACE_X + 2, arrays.PITCH_RATE):
         store(flow, s, i, 0.0)
     for n in range(start[s], start[s + 1]):
         g, x, y = weight[n], centroid[n, 0], centroid[n, 1]
         for i in range(3):
             place = load(p, n, i) + load(R, n, 3 * i) * x + load(R, n, 3 * i + 1) * y
-            store(flow, s, PLACE_X + i, load(flow, s, PLACE_X + i) + g * place)
-        store(flow, s, PITCH_RATE, load(flow, s, PITCH_RATE) + g * load(V, n, 1))
+            store(flow, s, arrays.PLACE_X + i, load(flow, s, arrays.PLACE_X + i) + g * place)
+        store(flow, s, arrays.PITCH_RATE, load(flow, s, arrays.PITCH_RATE) + g * load(V, n, 1))
 
 
 @allocating
@@ -153,29 +131,29 @@ def strip_forces(
 ) -> None:
     """Add the air's wrench to every body, from the ``loads`` of its strip.
 
-    ``lift_x``, ``drag_x`` [N, W]: where the shares act along the chord, in the body frame; ``spread``: whether
-    there are loads that are spread evenly. Also out: ``damping`` [N, W], force per normal speed of the body (for the
-    linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
+    ``lift_x``, ``drag_x`` [N, W]: points of action of the shares along the chord, in the body frame; ``spread``:
+    whether there are uniformly distributed loads. Also set: ``damping`` [N, W], force per normal speed of the body (for
+    the linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
     """
     lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
     push = np.empty((5, LANES))
     for s in range(len(start) - 1):
-        scale = load0(density) * (0.5 * geometry[s, AREA])
-        uc, un = load(flow, s, STREAM_C), load(flow, s, STREAM_N)
-        fl, fd = scale * load(loads, s, CIRCULATION), scale * load(loads, s, DRAG)
+        scale = load0(density) * (0.5 * geometry[s, arrays.AREA])
+        uc, un = load(flow, s, arrays.STREAM_C), load(flow, s, arrays.STREAM_N)
+        fl, fd = scale * load(loads, s, arrays.CIRCULATION), scale * load(loads, s, arrays.DRAG)
         for i in range(3):
-            c, n_ = load(flow, s, CHORD_X + i), load(flow, s, NORMAL_X + i)
+            c, n_ = load(flow, s, arrays.CHORD_X + i), load(flow, s, arrays.NORMAL_X + i)
             store1(lift, i, fl * (uc * n_ - un * c))
             store1(drag, i, fd * (uc * c + un * n_))
             store1(force, i, load1(force, i) + load1(lift, i) + load1(drag, i))
             if spread:
-                store1(push, i, scale * (load(loads, s, PUSH_C) * c + load(loads, s, PUSH_N) * n_))
+                store1(push, i, scale * (load(loads, s, arrays.PUSH_C) * c + load(loads, s, arrays.PUSH_N) * n_))
                 store1(force, i, load1(force, i) + load1(push, i))
-        store1(lift, 3, scale * load(loads, s, LIFT_SLOPE))
-        store1(drag, 3, scale * load(loads, s, DRAG_SLOPE))
+        store1(lift, 3, scale * load(loads, s, arrays.LIFT_SLOPE))
+        store1(drag, 3, scale * load(loads, s, arrays.DRAG_SLOPE))
         if spread:
-            store1(push, 3, scale * load(loads, s, PUSH_M))
-            store1(push, 4, scale * load(loads, s, PUSH_L))
+            store1(push, 3, scale * load(loads, s, arrays.PUSH_M))
+            store1(push, 4, scale * load(loads, s, arrays.PUSH_L))
         for n in range(start[s], start[s + 1]):
             y = centroid[n, 1]
             a, b = load1(lift_share, n), load1(drag_share, n)

@@ -1,54 +1,51 @@
-"""What the kernels are given and what they leave behind: all arrays of a group of lanes, with their shapes."""
+"""Inputs and outputs of the kernels: all arrays of a group of lanes, with their shapes."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.lanes.memory import aligned, several
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 STAGES = 6
 # Ports through which power enters the wing.
 DAMPERS, FRONT_MOTOR, REAR_MOTOR, AIR, PORTS = 0, 1, 2, 3, 4
-# What is known of a strip's flow before the laws of the air are asked.
+# The flow of a strip, input of the laws of the air.
 (
     CHORD_X, CHORD_Y, CHORD_Z,  # unit vector from leading to trailing edge, in the world
     NORMAL_X, NORMAL_Y, NORMAL_Z,  # unit vector out of the upper side
-    PLACE_X, PLACE_Y, PLACE_Z,  # of the strip's area in the world, m; only where laws of effects ask
+    PLACE_X, PLACE_Y, PLACE_Z,  # of the strip's centroid in the world, m; only for laws of effects
     STREAM_C, STREAM_N,  # velocity of the air relative to the strip, m/s
-    SPEED, ALPHA, FORWARD,  # its size; the angle of attack; 1 in flow from ahead, -1 from behind
+    SPEED, ALPHA, FORWARD,  # its magnitude; the angle of attack; 1 in flow from ahead, -1 from behind
     PITCH_RATE,  # of the strip about the span, nose up, rad/s
     FLOW,
 ) = range(16)  # fmt: skip
-# What the laws of the air make of it; forces are these times density times area / 2.
+# Results of the laws of the air; forces are these times density times area / 2.
 (
-    CIRCULATION,  # speed times lift coefficient, m/s: a force across the stream, shared out as lift
-    DRAG,  # speed times drag coefficient, m/s: a force along the stream, shared out as drag
-    LIFT_SLOPE, DRAG_SLOPE,  # their changes with the angle of attack, for the linearisation
-    PUSH_N, PUSH_C,  # m^2/s^2: force along normal and chord, spread evenly over the strip
-    PUSH_M, PUSH_L,  # m^3/s^2: moment about the span, nose up, and about the chord, tip up, spread evenly
+    CIRCULATION,  # speed times lift coefficient, m/s: a force across the stream, distributed like lift
+    DRAG,  # speed times drag coefficient, m/s: a force along the stream, distributed like drag
+    LIFT_SLOPE, DRAG_SLOPE,  # their derivatives by the angle of attack, for the linearisation
+    PUSH_N, PUSH_C,  # m^2/s^2: force along normal and chord, uniform over the strip
+    PUSH_M, PUSH_L,  # m^3/s^2: moment about the span, nose up, and about the chord, tip up, uniform
     LOADS,
 ) = range(9)  # fmt: skip
-# Derivatives that the step needs of each state of an effect (wingfit.sim.kernels.laws).
+# Derivatives of each state of an effect that the step needs (wingfit.sim.kernels.laws).
 DECAY, DRIVE, PULL = range(3)
 FRAME = 17  # numbers in a law's frame: places, parameters and states per place, then addresses
-# Of the clock of a beat: the drive phase now, that at the start of the step, and the stage's share of a step's change.
+# Clock of a beat: drive phase now, that at the start of the step, and the method's term for explicit time dependence.
 NOW, START, SHARE, CLOCK = range(4)  # rad
 # Geometry of a strip.
 AREA, MEAN_CHORD, WIDTH, STATION, GEOMETRY = range(5)  # m^2, m, m, part of the span from root to tip
 
 
 class Wiring(NamedTuple):
-    """Topology and geometry, the same for every individual. Bodies 0..N-1, driving rods N and N+1.
+    """Topology and geometry, the same for all individuals. Bodies 0..N-1, driving rods N and N+1.
 
-    Connectors from number ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
-    (``wingfit.sim.kernels.tangents``); order to fill are that of ``wingfit.sim.solver.elimination``. ``geometry`` [S,
-    GEOMETRY].
+    Connectors from index ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
+    (``wingfit.sim.kernels.tangents``); ``order`` to ``fill`` are those of ``wingfit.sim.solver.elimination``.
+    ``geometry`` [S, GEOMETRY].
     """
 
     mass: Array
@@ -87,13 +84,12 @@ class Setting(NamedTuple):
 class Laws(NamedTuple):
     """Compiled laws of the effects chosen.
 
-    ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, where in
-    ``parameters`` [., W] and in the states [Z, W] they start; of a strip whether it is called BEFORE the flow is known,
-    of a connector where in ``axes`` its states' axes start. ``axes``: of each state per connector, 0..5 as in
-    stiffness. ``size`` [Z]: a state times this is comparable with metres. ``point`` [L, 5]: address of the law, number
-    of parameters and of points, where in ``parameters`` and among the points they start; ``bodies`` [P] of the points,
-    and where they lie on these, ``arms`` [P, 3, W].
-    ``motor`` [MOTOR, W] or empty: a drive that gives way (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
+    ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, their first
+    indices in ``parameters`` [., W] and in the states [Z, W], first index in ``axes``. ``axes``: axis of each state per
+    connector, 0..5 as in stiffness. ``size`` [Z]: scale of a state in metres. ``point`` [L, 5]: address of the law,
+    number of parameters and of points, first indices in ``parameters`` and among the points; ``bodies`` [P] of the
+    points, and where they lie on these, ``arms`` [P, 3, W]. ``motor`` [MOTOR, W] or empty: a compliant drive
+    (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
     """
 
     strip: Index
@@ -108,14 +104,14 @@ class Laws(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """What differs between individuals.
+    """Inputs that differ between individuals.
 
     Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W],
-    ``hinge`` [9, W]: axis of the driving rods, how far its true place is from where the rods have it, and that place
-    (m). Then what only some wings have, and empty elsewhere: the stiffness [C, 9, W] that couples rotation with
-    translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their block in the matrix, whose momentum is
-    joined by ``masses`` [P, 36, W], the first ``weighing`` of them of weight, the others of air moved along; and the
-    laws of effects, see :mod:`wingfit.sim.kernels.laws`.
+    ``hinge`` [9, W]: axis of the driving rods, offset of its true position from that in the rods' frame, and the true
+    position (m). The others are empty for most wings: the stiffness [C, 9, W] that couples rotation with translation;
+    ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose momenta are coupled by ``masses``
+    [P, 36, W], the first ``weighing`` of which have weight, while the others are added mass of the air; and the laws of
+    effects, see :mod:`wingfit.sim.kernels.laws`.
     """
 
     stiffness: Array
@@ -143,7 +139,7 @@ class State(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Scratch of one group of lanes; see :func:`new_work` for the shapes."""
+    """Working arrays of one group of lanes; see :func:`new_work` for the shapes."""
 
     R: Array
     p: Array
@@ -204,11 +200,11 @@ class Work(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What a beat leaves behind, per step.
+    """Results of a beat, per step.
 
     tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
     [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational. R, p, V, z: the
-    motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty where nobody asked.
+    motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty if not requested.
     """
 
     tracks: Array
@@ -223,7 +219,7 @@ class Trace(NamedTuple):
 
 
 def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
-    """Scratch arrays for a group of lanes."""
+    """Working arrays for a group of lanes."""
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
     motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
@@ -231,64 +227,28 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
     blocks = n + 2 * len(wiring.below) + c - wiring.driven
     scratch = several(
         {
-            "R": (n + 2, 9),
-            "p": (n + 2, 3),
-            "V": motion,
-            "z": (z,),
-            "xi": motion,
-            "r_xi": motion,
-            "known": motion,
-            "U_xi": stages,
-            "U_V": stages,
-            "U_z": (STAGES, z),
-            "wrench": motion,
-            "lead": motion,
-            "Q": (c, 9),
-            "d": (c, 3),
-            "Q0": (c, 9),
-            "d0": (c, 3),
-            "blocks": (blocks, 36),
-            "flow": (s, FLOW),
-            "loads": (s, LOADS),
-            "induced": (s if len(laws.strip) else 0, 3),
-            "normal_damping": (n,),
-            "drag0": (n,),
-            "V0": motion,
-            "R0": (n + 2, 9),
-            "lost": (),
-            "stored": (),
-            "air_power": (),
-            "air_force": (3,),
-            "z_rate": (z,),
-            "z_tangent": (3, z),
-            "z_tangent0": (3, z),
-            "z_known": (z,),
-            "twist": joints,
-            "more": joints,
-            "more0": joints,
-            "more_k": joints,
-            "more_d": joints,
-            "more_k0": joints,
-            "more_d0": joints,
-            "push": joints,
-            "rods": (2, 3),
-            "clock": (CLOCK,),
-            "place": (points, 3),
-            "turn": (points, 9),
-            "point_twist": (points, 6),
-            "point_wrench": (points, 6),
-            "point_k": (points, 36),
-            "point_d": (points, 36),
-            "drag": (points, 36),
+            "R": (n + 2, 9), "p": (n + 2, 3), "V": motion, "z": (z,),
+            "xi": motion, "r_xi": motion, "known": motion, "wrench": motion, "lead": motion,
+            "U_xi": stages, "U_V": stages, "U_z": (STAGES, z),
+            "Q": (c, 9), "d": (c, 3), "Q0": (c, 9), "d0": (c, 3), "blocks": (blocks, 36),
+            "flow": (s, FLOW), "loads": (s, LOADS), "induced": (s if len(laws.strip) else 0, 3),
+            "normal_damping": (n,), "drag0": (n,), "V0": motion, "R0": (n + 2, 9),
+            "lost": (), "stored": (), "air_power": (), "air_force": (3,),
+            "z_rate": (z,), "z_tangent": (3, z), "z_tangent0": (3, z), "z_known": (z,),
+            "twist": joints, "more": joints, "more0": joints, "push": joints,
+            "more_k": joints, "more_d": joints, "more_k0": joints, "more_d0": joints,
+            "rods": (2, 3), "clock": (CLOCK,),
+            "place": (points, 3), "turn": (points, 9), "point_twist": (points, 6), "point_wrench": (points, 6),
+            "point_k": (points, 36), "point_d": (points, 36), "drag": (points, 36),
         }
-    )
+    )  # fmt: skip
     work = Work(
         **scratch,
         against=aligned(-lanes.damping),
         strip_frames=np.zeros((len(laws.strip), FRAME), np.int64),
         connector_frames=np.zeros((len(laws.connector), FRAME), np.int64),
         point_frames=np.zeros((len(laws.point), FRAME), np.int64),
-        # whose addresses are in the frames, so that they live as long
+        # referenced here because the frames contain their addresses
         parameters=laws.parameters,
         density=setting.density,
         wind=setting.wind,
@@ -298,7 +258,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
 
 
 def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
-    """Tell every law where its arrays are."""
+    """Fill the frame of every law with the addresses of its arrays."""
     air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind, work.clock)
     joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
     for k, row in enumerate(laws.strip):
@@ -316,6 +276,6 @@ def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> Non
 
 
 def _frame(places: int, row: Index, arrays: tuple[Array, ...]) -> list[int]:
-    """What a law is given: how many places, parameters and states, then where the arrays are."""
+    """The frame of a law: numbers of places, parameters and states, then the addresses of its arrays."""
     found = [places, int(row[1]), int(row[2]), *(array.ctypes.data for array in arrays)]
     return found + [0] * (FRAME - len(found))

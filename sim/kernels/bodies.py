@@ -8,21 +8,19 @@ R = R0 exp(theta~), p = p0 + R0 d. Wrenches [N, 6, W] are (tau, F) in the body f
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import Three, cross
 from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel
 def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
     """Pose at local coordinates ``xi`` about (R0, p0).
 
-    sin(t)/t and (1 - cos(t))/t^2 are summed as series in t^2 (exact to round-off for t < 1; larger rotations in one
-    step are a diverging individual, which the integrator flags).
+    sin(t)/t and (1 - cos(t))/t^2 are power series in t^2, exact to round-off for t < 1; the integrator treats larger
+    rotations in one step as divergence.
     """
     for n in range(len(xi)):
         x, y, z = load(xi, n, 0), load(xi, n, 1), load(xi, n, 2)
@@ -49,7 +47,7 @@ def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
 def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
     """Rate of the local coordinates: theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp v.
 
-    theta is O(step); the series are cut where the rest is of fourth order in it.
+    theta is O(step); the series are truncated at an error of fourth order in theta.
     """
     a, b = cross(theta, omega), cross(theta, v)
     c, d = cross(theta, a), cross(theta, b)
@@ -67,7 +65,7 @@ def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vec
 
 @kernel
 def inertial(mass: Array, inertia: Array, R: Array, V: Array, gravity: float, wrench: Array) -> None:
-    """Start the wrench on each body: gravity and the gyroscopic terms -omega x (I omega), -m omega x v."""
+    """Set the wrench on each body to gravity and the gyroscopic terms -omega x (I omega), -m omega x v."""
     for n in range(len(mass)):
         m = mass[n]
         i00, i11, i22 = inertia[n, 0], inertia[n, 4], inertia[n, 8]
@@ -115,7 +113,7 @@ def kinetic_and_height(
 
 
 @kernel
-def track(markers: Array, carrier: npt.NDArray[np.int64], R: Array, p: Array, out: Array) -> None:
+def track(markers: Array, carrier: Index, R: Array, p: Array, out: Array) -> None:
     """World positions [M, 3, W] of markers carried at ``markers`` [M, 3] in the frames of bodies ``carrier`` [M]."""
     for m in range(len(carrier)):
         n = carrier[m]

@@ -1,26 +1,22 @@
-"""Coordinates of one individual's pose about another pose, and back: what the search for a periodic motion compares."""
+"""Coordinates of one individual's state relative to a pose, and back; used by the search for a periodic motion."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import State
 from wingfit.sim.kernels.jit import inlined, kernel
 
-Array = npt.NDArray[np.float64]
-
-LENGTH = 0.1  # m, a chord: makes rotations comparable with displacements
+LENGTH = 0.1  # m, about a chord; converts rotations to displacements
 
 
 @kernel
 def coordinates(about: State, state: State, rate: float, sizes: Array, out: Array) -> None:
-    """Fill ``out`` [12 N + Z] with coordinates (m) of ``state`` about the pose ``about``, driving rods left out.
+    """Fill ``out`` [12 N + Z] with coordinates (m) of ``state`` relative to the pose ``about``, without the rods.
 
-    Of each body: turn times LENGTH, displacement, angular velocity times LENGTH over ``rate`` (rad/s), velocity over
-    ``rate``; then the effects' states times ``sizes`` [Z]. The arrays of both states have no lanes.
+    For each body: rotation vector times LENGTH, displacement, angular velocity times LENGTH over ``rate`` (rad/s),
+    velocity over ``rate``; then the effects' states times ``sizes`` [Z]. The arrays of both states have no lanes.
     """
     bodies = len(state.V) - 2
     for n in range(bodies):
@@ -37,7 +33,7 @@ def coordinates(about: State, state: State, rate: float, sizes: Array, out: Arra
 
 @kernel
 def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -> None:
-    """Write into ``state`` what lies at the coordinates ``x`` [12 N + Z]; its driving rods stay as they are."""
+    """Set ``state`` to that with the coordinates ``x`` [12 N + Z]; its driving rods are not changed."""
     bodies = len(state.V) - 2
     for n in range(bodies):
         k = 12 * n
@@ -52,10 +48,10 @@ def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -
 
 @inlined
 def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
-    """Axis times angle (rad) of the turn first^T second of two matrices [9]: by the unit quaternion of that turn.
+    """Rotation vector (rad) of first^T second, for matrices [9], by the unit quaternion.
 
-    Its largest component is taken by a square root and the others by division, so that any angle is as good (Shepperd,
-    J. Guidance and Control 1, 1978).
+    The largest component is computed first and the others divided by it, for accuracy at any angle (Shepperd, J.
+    Guidance and Control 1, 1978).
     """
     a, b, c = _column(first, second, 0)
     d, e, f = _column(first, second, 1)
@@ -69,7 +65,7 @@ def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
         w, x, y, z = g - c, b + d, 1 + e - i - a, f + h
     else:
         w, x, y, z = b - d, c + g, f + h, 1 + i - a - e
-    sine = math.sqrt(x * x + y * y + z * z)  # that of half the angle, times what w is too large by
+    sine = math.sqrt(x * x + y * y + z * z)  # of half the angle, with the same factor as w
     factor = 2 * math.atan(sine / w) / sine if sine != 0 else 0.0
     return factor * x, factor * y, factor * z
 

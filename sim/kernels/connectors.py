@@ -4,14 +4,12 @@ A connector joins frame A on body ``first`` (at arm a) to frame B on body ``seco
 their bodies. Q = R_A^T R_B and d = R_A^T (o_B - o_A) are B's pose in A. Energies (physics of the spring):
 V_o = -tr(G_o Q) + tr(G_o), V_t = 1/4 d^T K_t d + 1/4 d^T Q K_t Q^T d and, where rotation and translation are coupled,
 V_c = tr(G_c Q^T d~), signed so that it is phi^T K_c d for small rotations phi. The wrench on B, in A's axes at o_B, is
-minus their gradient; that on A balances it: force and moment vanish in sum, the forces being d apart.
+minus their gradient; that on A balances it.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
@@ -29,9 +27,6 @@ from wingfit.sim.kernels.lanes.matrices import (
     transposed,
 )
 from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 @kernel
@@ -88,7 +83,7 @@ def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three
 
 @inlined
 def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
-    """The same of the coupling stiffness, with N = Q G_c: V_c = n . d for n~ = N - N^T."""
+    """Moment, force and energy of the coupling stiffness, with N = Q G_c: V_c = n . d for n~ = N - N^T."""
     n = axial(N)
     t = times(transposed(trace_minus(N)), d)
     return (-t[0], -t[1], -t[2]), (-n[0], -n[1], -n[2]), n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
@@ -116,11 +111,8 @@ def relative_twist(
 
 @inlined
 def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Three, Three]:
-    """Moment and force with which the damper resists (thesis Eq. 4)."""
-    return (
-        (do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]),
-        (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]),
-    )
+    """Moment and force of the damper against the motion (thesis Eq. 4)."""
+    return ((do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]), (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]))
 
 
 @inlined
@@ -151,11 +143,11 @@ def connect(
     dissipated: Array,
     stored: Array,
 ) -> None:
-    """Add spring and damper wrenches to both bodies; power lost in dampers and energy in springs go to the lanes.
+    """Add spring and damper wrenches to both bodies; add up the power lost in dampers and the energy of springs.
 
     K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling
-    [C, 9, W]: the symmetric K_c between them, row by row, and ``more`` [C, 6, W]: another wrench on the second body,
-    both empty where there is none.
+    [C, 9, W]: the symmetric K_c between them, row by row, and ``more`` [C, 6, W]: another wrench on the second body;
+    both may be empty.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -208,7 +200,7 @@ def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, 
 def add_turned(
     first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, X: Array, out: Array
 ) -> None:
-    """Add to ``out`` [C, 6, W] how the relative twists change with the pose, for bodies' displacements X: B J X."""
+    """Add to ``out`` [C, 6, W] the change of the relative twists with the pose, for bodies' displacements X: B J X."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -227,7 +219,7 @@ def add_turned(
 
 @kernel
 def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
-    """Subtract J^T times ``push`` [C, 6, W] from the wrenches: ``push`` resists on the second body."""
+    """Subtract J^T times ``push`` [C, 6, W], a wrench against the second body's motion, from the bodies' wrenches."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)

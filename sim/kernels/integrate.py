@@ -1,17 +1,17 @@
 """Rosenbrock integration of the wing over its beats, eight individuals at a time.
 
 The method is RODAS4P2 (Steinebach, *Improvement of Rosenbrock-Wanner Method RODASP*, 2020): six stages, fourth order,
-L-stable, stiffly accurate, made to keep its order on stiff problems and to lose little when the Jacobian is not quite
-exact. Ours is exact but for the air, of which it has the damping along the normal. Driving rods are bodies with a
-prescribed acceleration, so that stiff roots see consistent stages; their pose is set to the exact profile at each
-step's start.
+L-stable, stiffly accurate, without order reduction on stiff problems and robust to an inexact Jacobian. The Jacobian is
+exact except for the air, of which it contains the damping along the normal. Driving rods are bodies with prescribed
+acceleration, so that the stages are consistent for the stiff connectors at the root; their pose is set to the exact
+profile at the start of each step.
 """
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.air import strip_flow, strip_forces
 from wingfit.sim.kernels.arrays import (
@@ -38,21 +38,19 @@ from wingfit.sim.kernels.lanes.vector import load, load0, load1, load3, store, s
 from wingfit.sim.kernels.laws import AFTER, BEFORE, call
 from wingfit.sim.kernels.linear import factor, solve, subtract_column
 from wingfit.sim.kernels.masses import add_energies, add_mass_blocks, add_mass_terms, add_momentum
-from wingfit.sim.kernels.motor import give_way, rods_of
+from wingfit.sim.kernels.motor import motor_rates, rods_of
 from wingfit.sim.kernels.points import add_point_blocks, add_point_terms, add_point_wrenches, follow_points
 from wingfit.sim.kernels.stages import combine, coupled_rates, keep_stage, place_rod
 from wingfit.sim.kernels.states import combine_states, finish_states, keep_tangents, start_states
 from wingfit.sim.kernels.tangents import add_connectors, add_own_terms, start_blocks
 
-Array = npt.NDArray[np.float64]
-
 GAMMA = 0.25
 NODES = np.array([0.0, 0.75, 0.321448134013046, 0.519745732277726, 1.0, 1.0])
-# Sum of the gammas of each stage: how much of the drive's change of acceleration it sees.
+# Sum of the gammas of each stage: factor on the time derivative of the drive's acceleration.
 SLOPES = np.array([0.25, -0.5, -0.189532918363016, 0.085612108792769, 0.0, 0.0])
-# In the variables U = Gamma k (Hairer and Wanner, Solving ODEs II, IV.7) no product with the Jacobian is needed: one is
-# at y + sum of STAGE U, its right-hand side has sum of COUPLING U / h. The last two stages and the result each
-# add the U before to the state before.
+# In the variables U = Gamma k (Hairer and Wanner, Solving ODEs II, IV.7) no product with the Jacobian is needed: a
+# stage is at y + sum of STAGE U, and its right-hand side contains the sum of COUPLING U / h. The last two stages and
+# the result are the state of the stage before plus its U.
 STAGE = np.array(
     [
         [0.0, 0.0, 0.0, 0.0, 0.0],
@@ -74,15 +72,15 @@ COUPLING = np.array(
     ]
 )
 
-MAX_ROTATION = 1.0  # rad in one step; beyond, the individual has diverged
+MAX_ROTATION = 1.0  # rad in one step; above, the individual has diverged
 
 
 @kernel
 def set_rods(rods: Array, hinge: Array, state: State) -> None:
     """Put the driving rods at angle and rate ``rods`` [2, 3, W] (angle, rate, acceleration) about the hinge.
 
-    R = c I + s u~ + (1 - c) u u^T about the axis u; with the hinge ``off`` from where the rods have it, that point
-    circles round the hinge's true place: p = place - R off, v = -u rate x off.
+    R = c I + s u~ + (1 - c) u u^T about the axis u; with the hinge at an offset ``off`` in the rods'
+    frame, that frame moves on a circle about the hinge: p = place - R off, v = -u rate x off.
     """
     n = len(state.R) - 2
     u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
@@ -155,7 +153,7 @@ def point_forces(lanes: Lanes, work: Work) -> None:
 
 @kernel
 def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Flow and loads of all strips."""
+    """Compute flow and loads of all strips."""
     laws = lanes.laws
     work.induced[:] = 0.0
     for k in range(len(laws.strip)):
@@ -170,10 +168,10 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 
 
 @allocating
-def note(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
-    """Write down the motion, the rods' load, the air's force, powers and energies at the start of step ``t``.
+def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
+    """Store motion, rods' load, air force, powers and energies at the start of step ``t`` in ``trace``.
 
-    Powers are taken here and not at the stages, where stiff springs are far from their values at the step's ends.
+    Not at the stages, where stiff springs are far from their values at the ends of the step.
     """
     n, power = len(wiring.mass), trace.power[t]
     store1(power, DAMPERS, -load0(work.lost))
@@ -288,15 +286,15 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
-    """Tell the laws where in the beat a stage of step ``t`` is, a step being ``turn`` (rad)."""
+    """Set the drive phase of a stage of step ``t`` for the laws; a step is ``turn`` (rad)."""
     clock[NOW] = turn * (t + NODES[stage])
     clock[START] = turn * t
     clock[SHARE] = turn * SLOPES[stage]
 
 
 @allocating
-def finish_step(work: Work, state: State, alive: npt.NDArray[np.bool_]) -> None:
-    """Take the step; a lane that turned too far or is no number any more is dead."""
+def finish_step(work: Work, state: State, alive: Mask) -> None:
+    """Complete the step; lanes that rotated too far or are NaN are marked in ``alive``."""
     _to_stage(work, state, STAGES)
     state.R[:] = work.R
     state.p[:] = work.p
@@ -318,14 +316,14 @@ def advance(
     work: Work,
     state: State,
     trace: Trace,
-    alive: npt.NDArray[np.bool_],
+    alive: Mask,
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 
-    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (two more
-    derivatives for a drive that gives way); angle and
-    rate are taken at its start only, in between they follow from the acceleration. A lane whose bodies turn more than
-    MAX_ROTATION in a step, or become NaN, is marked dead in ``alive`` and runs on, ignored.
+    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (six rows for
+    a compliant drive). Angle and rate are used at the start of the step only; within it they follow from the
+    acceleration. Lanes whose bodies rotate more than MAX_ROTATION in a step, or become NaN, are set to False in
+    ``alive``; they are computed further but not used.
     """
     for t in range(len(drive)):
         rods = drive[t, 0]
@@ -344,9 +342,9 @@ def advance(
             _set_clock(work.clock, 2.0 * np.pi / len(drive), t, stage)
             forces(wiring, setting, lanes, work)
             if len(lanes.laws.motor):
-                give_way(lanes.laws.motor, work)
+                motor_rates(lanes.laws.motor, work)
             if stage == 0:
-                note(wiring, setting, lanes, work, trace, t)
+                record_step(wiring, setting, lanes, work, trace, t)
                 linearise(wiring, setting, lanes, work)
             rods = drive[t, stage]
             if len(lanes.laws.motor):

@@ -1,8 +1,7 @@
-"""How kernels are compiled: cached on disk, fused multiply-add allowed, no other liberty with the arithmetic.
+"""Compilation of kernels: cached on disk; fused multiply-add is allowed, but no other change of the arithmetic.
 
-Numba's cache looks at the file of the cached function alone, but a kernel contains what it calls from other files:
-after an edit there, the old physics would run on. So what is compiled goes to a folder named after the content of all
-kernels, and another content finds that folder empty.
+Numba's cache checks only the file of the cached function, although a kernel contains functions of other files: after a
+change there, outdated code would run. The cache folder is therefore named after a hash of the source of all kernels.
 """
 
 from __future__ import annotations
@@ -22,21 +21,21 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., object])
 
-_KEPT = 8  # contents of the kernels whose compiled code is kept
+_MAX_VERSIONS = 8  # versions of the kernels whose compiled code is stored
 
 
 def kernel(function: F) -> F:
-    """Compile a function over groups of lanes that makes no array, cached on disk by the content of all kernels.
+    """Compile a function over groups of lanes that allocates no array; cached on disk by the source of all kernels.
 
-    Such a function need not count references to the arrays it is given, which would take a third of a small wing's
-    step; one that makes or copies whole arrays does not compile so, and is :func:`allocating`. OSError where no folder
-    for the cache can be written; RuntimeError where numba puts it elsewhere.
+    It is compiled without reference counting, which would take a third of the time of a small wing's step. Functions
+    that allocate or copy whole arrays need :func:`allocating`. OSError if no folder for the cache is writable;
+    RuntimeError if numba uses another folder.
     """
     return _compiled(function, counting=False)
 
 
 def allocating(function: F) -> F:
-    """The same for a function that makes arrays or copies whole ones."""
+    """As :func:`kernel`, for a function that allocates or copies whole arrays."""
     return _compiled(function, counting=True)
 
 
@@ -51,16 +50,16 @@ def _compiled(function: F, *, counting: bool) -> F:
 
 
 def _check(function: Callable[..., object], path: str, folder: Path) -> None:
-    """RuntimeError where numba does not cache in the folder it was told to."""
+    """RuntimeError if numba does not use the requested cache folder."""
     if not Path(path).is_relative_to(folder):
         raise RuntimeError(
             f"numba {numba.__version__} caches {function.__qualname__!r} in {path} instead of {folder}: "
-            "code compiled from older kernels could run; use a numba that heeds numba.config.CACHE_DIR"
+            "code compiled from older kernels could run; use a version of numba that respects numba.config.CACHE_DIR"
         )
 
 
 def callback(function: F, signature: Any) -> Any:
-    """Compile a function to be called by address, cached on disk by the content of its own file and of all kernels."""
+    """Compile a function that is called by address; cached on disk by the source of its file and of all kernels."""
     folder = _cache_folder(Path(inspect.getfile(function)).resolve())
     with _cached_in(folder):
         compiled = numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
@@ -75,9 +74,10 @@ def inlined(function: F) -> F:
 
 @cache
 def _cache_folder(source: Path) -> Path:
-    """Where the kernels of ``source`` are cached: named after its content and this folder's.
+    """Cache folder for the kernels of ``source``, a file or folder, named after a hash of the sources.
 
-    Of a folder all files count; beside a file those that it may share code with, whose names start with an underscore.
+    The hash includes this folder, and ``source``: all files of a folder; for a file also those next to it whose names
+    start with an underscore, which contain shared code.
     """
     digest = hashlib.sha256()
     alone = source.is_file()
@@ -107,9 +107,9 @@ def _cache_folder(source: Path) -> Path:
 
 
 def _start_with(shipped: Path, folder: Path) -> None:
-    """Fill a ``folder`` that does not exist yet with the kernels that a read-only installation brings along.
+    """Copy the compiled kernels ``shipped`` with a read-only installation to a ``folder`` that does not exist yet.
 
-    They are copied under another name and renamed, because another process may look into the folder at any time.
+    They are copied to another name and renamed, since other processes may read the folder at any time.
     """
     if folder.exists() or not shipped.is_dir():
         return
@@ -118,17 +118,17 @@ def _start_with(shipped: Path, folder: Path) -> None:
     try:
         shutil.copytree(shipped, copy, dirs_exist_ok=True)
         copy.rename(folder)
-    except OSError:  # the other process was first, or the disk is full: then they are compiled
+    except OSError:  # another process was first, or the disk is full: then the kernels are compiled
         shutil.rmtree(copy, ignore_errors=True)
 
 
 def _forget_old(place: Path) -> None:
-    """Remove all but the last used folders; a process that still needs one makes it again.
+    """Remove all but the most recently used folders; a process that still needs one creates it again.
 
-    Another process may be doing the same: a folder that is gone meanwhile is old.
+    Other processes may do the same: a folder that has disappeared counts as oldest.
     """
     folders = sorted(place.glob("kernels-*"), key=_last_used)
-    for folder in folders[:-_KEPT]:
+    for folder in folders[:-_MAX_VERSIONS]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -141,7 +141,7 @@ def _last_used(folder: Path) -> float:
 
 @contextmanager
 def _cached_in(folder: Path) -> Iterator[None]:
-    """Numba's setting NUMBA_CACHE_DIR, which it reads where a function is decorated."""
+    """Set NUMBA_CACHE_DIR, which numba reads when a function is decorated."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:

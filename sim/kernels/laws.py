@@ -1,11 +1,11 @@
 """Compiled laws of effects, called by address: the integrator is compiled once, whichever effects are on.
 
-A law is a function ``law(frame, moment)`` that is compiled by itself, cached by the content of its own file and of the
-kernels, and only where it is used (:func:`address`). ``strip_port(frame)``, ``connector_port(frame)`` or
-``point_port(frame)`` opens what it may read and add to; arrays end in the lanes, to be used with the functions of
-:mod:`wingfit.sim.kernels.lanes.vector`. Laws of the air are called at two moments of every stage: BEFORE the flow of
-the strips is known, when they may set the induced velocity from their states, and AFTER it, when they change the loads
-and give the rates of their states. Laws of connectors and of points are called once, AFTER.
+A law is a function ``law(frame, moment)``. It is compiled separately, when it is first used (:func:`address`), and
+cached by the source of its file and of the kernels. ``strip_port(frame)``, ``connector_port(frame)`` or
+``point_port(frame)`` gives the arrays that it reads and adds to; their last axis is the lanes, to be used with the
+functions of :mod:`wingfit.sim.kernels.lanes.vector`. Laws of the air are called at two moments of every stage: BEFORE
+the flow of the strips is known, when they may set the induced velocity from their states, and AFTER, when they change
+the loads and set the rates of their states. Laws of connectors and of points are called once, AFTER.
 """
 
 from __future__ import annotations
@@ -14,17 +14,15 @@ import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from llvmlite import ir
 from numba import carray, types
 from numba.extending import intrinsic
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CLOCK, FLOW, GEOMETRY, LOADS
 from wingfit.sim.kernels.jit import callback, inlined
 
-Array = npt.NDArray[np.float64]
 Law = Callable[[Any, int], None]
 
 BEFORE, AFTER = 0, 1
@@ -32,11 +30,11 @@ SIGNATURE = types.void(types.CPointer(types.int64), types.int64)
 
 
 class StripPort(NamedTuple):
-    """What a law of the air sees. S strips; parameters [P, S, W] and states [K, S, W] are its own.
+    """Inputs and outputs of a law of the air. S strips; parameters [P, S, W] and states [K, S, W] are its own.
 
     Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s),
-    ``clock`` [CLOCK, W] (rad): a load that time itself brings is f(NOW) + SHARE f'(START), f' by the phase. Add to or
-    change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Give,
+    ``clock`` [CLOCK, W] (rad): a load f that depends on the phase itself is f(NOW) + SHARE f'(START). Add to or
+    change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Set,
     AFTER: ``rate`` [K, S, W] of the states, and ``decay`` [K, S, W], minus its derivative by the state itself (1/s).
     """
 
@@ -55,12 +53,12 @@ class StripPort(NamedTuple):
 
 
 class ConnectorPort(NamedTuple):
-    """What a law of the connectors sees. C connectors; parameters [P, C, W] and states [K, C, W] are its own.
+    """Inputs and outputs of a law of connectors. C connectors; parameters [P, C, W] and states [K, C, W] are its own.
 
     Read: ``Q`` [C, 9, W] and ``d`` [C, 3, W], the pose of the second frame in the first; ``twist`` [C, 6, W] of the
     second relative to the first (rad/s, m/s), about the axes of the first. Add to: ``wrench`` [C, 6, W] on the second
     body in the axes of the first; ``stiffness`` and ``damping`` [C, 6, W], minus its derivatives by displacement and
-    twist; ``lost`` and ``stored`` [W], power lost (W) and energy kept (J). Give of each state its ``rate``, ``decay``
+    twist; ``lost`` and ``stored`` [W], power lost (W) and energy stored (J). Set for each state its ``rate``, ``decay``
     as for a strip, ``drive``, the derivative of the rate by the twist along the state's axis, and ``pull``, minus the
     derivative of the wrench along that axis by the state.
     """
@@ -193,12 +191,12 @@ def point_port(frame: Any) -> PointPort:
     )
 
 
-_COMPILED: dict[Law, Any] = {}  # kept for ever: their addresses are in use
+_COMPILED: dict[Law, Any] = {}  # never removed: their addresses are in use
 _LOCK = threading.Lock()
 
 
 def address(law: Law) -> int:
-    """Where the law is in this process; compiled, or taken from the cache, when it is first asked for."""
+    """Address of the law in this process; it is compiled, or read from the cache, on the first call."""
     with _LOCK:
         if law not in _COMPILED:
             _COMPILED[law] = callback(law, SIGNATURE)

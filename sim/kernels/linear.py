@@ -1,23 +1,17 @@
 """The block-sparse linear system of a step, solved by block LU.
 
-The exact linearisation of the wing is not symmetric: dampers turn with the bodies, wrenches have moments. Pivots are
-whole 6 x 6 blocks, inverted without exchanges: inertia over the step and dissipation make them dominate. ``blocks``
+The exact linearisation of the wing is not symmetric: dampers rotate with the bodies, wrenches have moments. Pivots are
+6 x 6 blocks without pivoting: inertia over the step and dissipation make the diagonal dominant. ``blocks``
 [NB, 36, W] holds the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as
-many above it, in the same order, and last the columns of the driving rods, which are known and never factored.
-``wingfit.sim.solver.elimination`` lists, in the bodies' order of elimination, the blocks and which products to
-subtract.
+many above it, in the same order, and last the columns of the driving rods, which are known and not factored.
+``wingfit.sim.solver.elimination`` lists the blocks and the products to subtract, in the order of elimination.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 @kernel
@@ -44,7 +38,7 @@ def _invert(A: Array) -> None:
 
 @kernel
 def _times_inverse(A: Array, D: Array) -> None:
-    """A <- A D for 6 x 6 blocks [36, W], a row of A at a time in registers."""
+    """A <- A D for 6 x 6 blocks [36, W], one row of A at a time."""
     for i in range(0, 36, 6):
         a0, a1, a2 = load1(A, i), load1(A, i + 1), load1(A, i + 2)
         a3, a4, a5 = load1(A, i + 3), load1(A, i + 4), load1(A, i + 5)
@@ -56,7 +50,7 @@ def _times_inverse(A: Array, D: Array) -> None:
 
 @kernel
 def _subtract_product(A: Array, B: Array, C: Array) -> None:
-    """C <- C - A B for 6 x 6 blocks [36, W], two rows of C at a time: twelve sums in registers keep both units busy."""
+    """C <- C - A B for 6 x 6 blocks [36, W], two rows of C at a time, to use both arithmetic units."""
     for i in range(0, 36, 12):
         c0, c1, c2 = load1(C, i), load1(C, i + 1), load1(C, i + 2)
         c3, c4, c5 = load1(C, i + 3), load1(C, i + 4), load1(C, i + 5)

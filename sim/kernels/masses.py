@@ -1,24 +1,22 @@
-"""Masses that effects add: weight fixed to a body, and air that the bodies of a strip move together.
+"""Masses of effects: masses fixed to a body, and added mass of the air, which couples the bodies of a strip.
 
-**Weight.** The kinetic energy is V . M V / 2, M constant in the body's frame. With (h, p) = M V the law of motion is
-h' = h x omega + p x v, p' = p x omega, which keeps the energy exactly.
+**Fixed masses.** The kinetic energy is V . M V / 2, M constant in the body's frame. With (h, p) = M V the law of motion
+is h' = h x omega + p x v, p' = p x omega, which keeps the energy exactly.
 
-**Air.** A thin plate moves air by the motion of its points along the normal alone: by q = (omega_x, omega_y, v_z) of
-its bodies, v_z relative to the wind. The kinetic energy is the sum of q_i . N_ij q_j / 2 over pairs of bodies of a
+**Added mass.** A thin plate accelerates air by its motion along the normal only: q = (omega_x, omega_y, v_z) of its
+bodies, v_z relative to the wind. The kinetic energy is the sum of q_i . N_ij q_j / 2 over pairs of bodies of a
 strip and the wrench of the air is -N q', along the same three: pressure pushes along the normal. Kirchhoff's equations
-of a body in a perfect fluid have a pair of terms more, a force along the chord and the moment of Munk, which together
-do no work. At a section's edges they are suction; on a wing that carries circulation the moment is what puts the lift
-at the quarter of the chord (Theodorsen 1935, NACA Report 496), which strips do by where they place their lift. So what
-is left is the noncirculatory part of thin airfoils: in a stream U, m (h'' + U alpha') along the normal.
+of a body in a perfect fluid have two more terms, a force along the chord and Munk's moment, which together do no work.
+They are omitted here: the force is edge suction, and with circulation the moment shifts the lift to the quarter chord
+(Theodorsen 1935, NACA Report 496), where strips apply it anyway. The remainder is the noncirculatory part of thin
+airfoil theory: in a stream U, m (h'' + U alpha') along the normal.
 
-All of it enters as inertia: fed back as a force, air that outweighs the wing would make the step unstable.
+Both kinds enter as inertia: as explicit forces, air heavier than the wing would make the step unstable.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.connectors import add_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
@@ -39,13 +37,10 @@ from wingfit.sim.kernels.lanes.matrices import (
 )
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-
 
 @inlined
 def _across(masses: Array, k: int) -> Nine:
-    """Of air: rows and columns of rotation about x and y and of translation along z; all others are zero."""
+    """Nonzero 3 x 3 part of an added mass: rotation about x and y, translation along z."""
     return (
         load(masses, k, 0), load(masses, k, 1), load(masses, k, 5),
         load(masses, k, 6), load(masses, k, 7), load(masses, k, 11),
@@ -72,7 +67,7 @@ def _in_body(R: Array, n: int, wind: Array) -> Three:
 
 @inlined
 def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
-    """Velocity of body n, for air relative to the wind."""
+    """Velocity of body n; for added mass relative to the wind."""
     v = load_vector(V, n, 3)
     if air:
         w = _in_body(R, n, wind)
@@ -84,7 +79,7 @@ def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
 def add_momentum(
     pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, wrench: Array
 ) -> None:
-    """Add what turning does to the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
+    """Add the gyroscopic terms of the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
         M, omega = load_block(masses, k), load_vector(V, i, 0)
@@ -96,14 +91,14 @@ def add_momentum(
     for k in range(weighing, len(pairs)):
         j, N = pairs[k, 1], _across(masses, k)
         turn, w = load_vector(V, j, 0), _in_body(R, j, wind)
-        a = turn[1] * w[0] - turn[0] * w[1]  # the wind turns in the frame of the body
+        a = turn[1] * w[0] - turn[0] * w[1]  # the wind rotates in the frame of the body
         zero = 0.0 * a
         add_wrench(wrench, pairs[k, 0], (N[2] * a, N[5] * a, zero), (zero, zero, N[8] * a))
 
 
 @inlined
 def _first_moment(M: Six) -> Three:
-    """Mass times place, from the coupling of moment and velocity, which is its cross product."""
+    """Mass times position, from the block of moment and velocity, which is its cross product matrix."""
     return M[1][7], M[1][2], M[1][3]
 
 
@@ -208,11 +203,7 @@ def add_mass_terms(
         add_wrench(
             wrench,
             i,
-            (
-                a[0] + e[0] + f[0] - q[0] - r[0],
-                a[1] + e[1] + f[1] - q[1] - r[1],
-                a[2] + e[2] + f[2] - q[2] - r[2],
-            ),
+            (a[0] + e[0] + f[0] - q[0] - r[0], a[1] + e[1] + f[1] - q[1] - r[1], a[2] + e[2] + f[2] - q[2] - r[2]),
             (b[0] + g[0] - s[0], b[1] + g[1] - s[1], b[2] + g[2] - s[2]),
         )
     for k in range(weighing, len(pairs)):
@@ -220,7 +211,7 @@ def add_mass_terms(
         N, w = _across(masses, k), _in_body(R, j, wind)
         x = (load(X, j, 0), load(X, j, 1), load(X, j, 5))
         u = (load(lead, j, 0), load(lead, j, 1), load(lead, j, 5))
-        blown = w[0] * x[1] - w[1] * x[0]  # what the wind does as the body turns
+        blown = w[0] * x[1] - w[1] * x[0]  # change of the wind in the rotating frame of the body
         a = times(N, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2] - blown))
         zero = 0.0 * blown
         add_wrench(wrench, i, (a[0], a[1], zero), (zero, zero, a[2]))
@@ -239,7 +230,7 @@ def add_energies(
     kinetic: Array,
     potential: Array,
 ) -> None:
-    """Add the kinetic energy of all pairs and the height of those of weight."""
+    """Add the kinetic energy of all pairs and the potential energy of those with weight."""
     for k in range(len(pairs)):
         i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
         M, own = load_block(masses, k), _relative(V, R, i, wind, air)

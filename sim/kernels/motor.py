@@ -1,25 +1,21 @@
-"""A motor that gives way to its load: speed drops where power is drawn, and the rods come late.
+"""A compliant drive: the motor slows down under load, so the rods lag.
 
-Its crank runs the time tau ahead of an even one: tau' = sigma, the relative error of its speed, with
+The crank leads uniform rotation by the time tau: tau' = sigma, the relative error of its speed, with
 
     sigma' = -(d (P - P_m) + sigma) / T - k tau,     P_m' = (P - P_m) a,
 
-P being the power drawn, d the speed lost per power (1/W), T the time in which the motor follows (s), k how fast what
-holds the mean speed takes back a lead (1/s^2), a the rate at which it learns the mean load P_m, of which nothing is
-seen. The rods follow the same profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the
+with the power P, the loss of speed per power d (1/W), the time constant of the motor T (s), the gain k of the control
+of the mean speed (1/s^2), and the rate a at which the control adapts to the mean load P_m, to which it does not
+respond. The rods follow the profile at the time t + tau, by its Taylor series. The states (tau, sigma, P_m) are the
 last three.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import DECAY, Work
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
 
 DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 
@@ -28,8 +24,8 @@ DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> None:
     """Angle, rate and acceleration ``out`` [2, 3, W] of both rods from ``profile`` [2, 6, W].
 
-    That is the angle and four derivatives by time, then the stage's share of the acceleration's change. ``tau_sigma``
-    [Z, W]: all states; ``turning`` [Z, W]: their rates.
+    The profile is the angle and four time derivatives, then the method's term for explicit time dependence.
+    ``tau_sigma`` [Z, W]: all states; ``turning`` [Z, W]: their rates.
     """
     z = len(tau_sigma) - 3
     tau, pace, quickening = load1(tau_sigma, z), load1(tau_sigma, z + 1) + 1.0, load1(turning, z + 1)
@@ -44,7 +40,7 @@ def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> Non
 
 
 @kernel
-def give_way(motor: Array, work: Work) -> None:
+def motor_rates(motor: Array, work: Work) -> None:
     """Rates of the motor's states under the load of the rods; ``motor`` [MOTOR, W]."""
     n, z = len(work.V) - 2, len(work.z) - 3
     tau, sigma, mean = load1(work.z, z), load1(work.z, z + 1), load1(work.z, z + 2)
@@ -52,10 +48,10 @@ def give_way(motor: Array, work: Work) -> None:
     for rod in range(n, n + 2):
         for i in range(6):
             drawn -= load(work.wrench, rod, i) * load(work.V, rod, i)
-    more, following = drawn - mean, load1(motor, FOLLOWING)
+    excess, following = drawn - mean, load1(motor, FOLLOWING)
     store1(work.z_rate, z, sigma)
-    store1(work.z_rate, z + 1, -(load1(motor, DROOP) * more + sigma) * following - load1(motor, HOLDING) * tau)
-    store1(work.z_rate, z + 2, more * load1(motor, AVERAGING))
+    store1(work.z_rate, z + 1, -(load1(motor, DROOP) * excess + sigma) * following - load1(motor, HOLDING) * tau)
+    store1(work.z_rate, z + 2, excess * load1(motor, AVERAGING))
     store(work.z_tangent, DECAY, z, tau * 0.0)
     store(work.z_tangent, DECAY, z + 1, following)
     store(work.z_tangent, DECAY, z + 2, load1(motor, AVERAGING))

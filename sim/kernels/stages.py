@@ -1,16 +1,12 @@
-"""Sums over the stages of a step, a body at a time in registers."""
+"""Sums over the stages of a step, one body at a time."""
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.bodies import body_rate
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.matrices import cross, load_vector
 from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel
@@ -61,7 +57,8 @@ def place_rod(
 ) -> None:
     """Y of a driving rod that turns about the hinge with the acceleration ``turning``; l is ``length``.
 
-    Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in :func:`keep_stage`; about one axis, A leaves rotations be.
+    Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in :func:`keep_stage`; A has no effect on rotation about a
+    fixed axis.
     """
     u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
     sweep, v = cross(u, off), load_vector(V, rod, 3)

@@ -1,23 +1,19 @@
-"""Internal states of effects within a step: solved beside the motion, and eliminated where they pull on a connector.
+"""Internal states of effects within a step: solved with the motion; those of connectors by elimination.
 
-A state z of a connector's axis grows with the relative twist r along it, z' = g(z, r), and pulls on it with a wrench
--f(z). With u = dg/dr, b = -dg/dz, k = df/dz at the start of the step and theta = 1 / (1 / (h gamma) + b), its stage is
-U_z = theta (r_z + u U_r), r_z being its rate with the coupling to earlier stages. Put into the equation of motion that
-is a damper k theta u, and a wrench k theta r_z against the axis. States of the air act through forces that change
-little within a step: theirs is U_z = theta r_z.
+A state z of a connector's axis depends on the relative twist r along it, z' = g(z, r), and causes a wrench -f(z). With
+u = dg/dr, b = -dg/dz, k = df/dz at the start of the step and theta = 1 / (1 / (h gamma) + b), its stage is U_z = theta
+(r_z + u U_r), with its rate r_z, the coupling to earlier stages included. In the equation of motion this is a damper k
+theta u and a wrench -k theta r_z. States of the air act through forces that change little within a step; for them U_z =
+theta r_z.
 """
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import DECAY, DRIVE, PULL, Laws, Wiring, Work
 from wingfit.sim.kernels.connectors import add_turned, push_apart, twists
 from wingfit.sim.kernels.jit import allocating, kernel
 from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
-
-Array = npt.NDArray[np.float64]
 
 
 @kernel
@@ -32,7 +28,7 @@ def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: A
 
 @allocating
 def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None:
-    """Keep the states' derivatives at the start of the step; DECAY becomes theta. Add the dampers that they make."""
+    """Store the states' derivatives at the start of the step, with theta in place of DECAY, and add their dampers."""
     work.z_tangent0[:] = work.z_tangent
     for i in range(len(work.z)):
         store(work.z_tangent0, DECAY, i, 1.0 / (load(work.z_tangent, DECAY, i) + 1.0 / length))
@@ -48,7 +44,7 @@ def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None
 
 @kernel
 def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage: int, work: Work) -> None:
-    """The known part of the states' stage, and what it pulls with."""
+    """Compute the known part of the states' stage, and add its wrenches."""
     for i in range(len(work.z)):
         total = load1(work.z_rate, i)
         for s in range(stage):
@@ -69,7 +65,7 @@ def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage
 
 @kernel
 def finish_states(wiring: Wiring, laws: Laws, work: Work, stage: int) -> None:
-    """The states' stage, the motion's being known."""
+    """Complete the states' stage, given that of the motion."""
     for i in range(len(work.z)):
         store(work.U_z, stage, i, load(work.z_tangent0, DECAY, i) * load1(work.z_known, i))
     if len(laws.connector) == 0:

@@ -1,4 +1,4 @@
-"""The linearised connectors: how the wrenches of springs and dampers change with the bodies' poses and twists.
+"""The linearised connectors: derivatives of the wrenches of springs and dampers by the bodies' poses and twists.
 
 In the axes of frame A, a displacement of the bodies moves B by eta = (phi, delta) = J xi and changes the relative twist
 r = J V by B eta. With the wrench (t, f) on B, the wrenches on the bodies change by
@@ -6,9 +6,9 @@ r = J V by B eta. With the wrench (t, f) on B, the wrenches on the bodies change
     second: -J_2^T (D J dV + K_2 eta),    K_2 = K + D B - [[t~, 0], [f~, 0]],
     first:       E (D J dV + K_1 eta),    K_1 = K + D B + [[0, f~], [0, 0]],
 
-K being minus the derivative of the spring's wrench. The last terms turn the wrench with the body and move it with the
-spring's end: the geometric stiffness. Nothing is left out, so the matrix is not symmetric. E = [[I, e~], [0, I]] with
-e = a + d takes a wrench at o_B to the first body, F the same with e = Q b to the second.
+K being minus the derivative of the spring's wrench. The last terms are the geometric stiffness: the wrench rotates with
+the body and moves with the end of the spring. The derivative is exact, so the matrix is not symmetric. E = [[I, e~],
+[0, I]] with e = a + d takes a wrench at o_B to the first body, F the same with e = Q b to the second.
 
 The step solves for the change of the local coordinates xi, of rate xi' = V + A xi, A = [[-omega~ / 2, 0], [-v~, 0]] in
 each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gamma. A connector has J A = B_k J.
@@ -16,9 +16,7 @@ each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gam
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
@@ -51,13 +49,10 @@ from wingfit.sim.kernels.lanes.matrices import (
 )
 from wingfit.sim.kernels.lanes.vector import load, load1, store
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
-
 
 @inlined
 def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
-    """Minus the derivative of the spring's wrench on B by eta."""
+    """K: minus the derivative of the spring's wrench on B by eta."""
     S = product(columns_scaled(Q, kt), transposed(Q))
     P = scaled(0.5, plus(times_skew(S, d), scaled(-1.0, skew(times(S, d)))))
     oo = plus(trace_minus(columns_scaled(Q, co_stiffness(ko))), scaled(-1.0, skew_times(d, P)))
@@ -66,7 +61,7 @@ def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
 
 @inlined
 def coupling_tangent(N: Nine, d: Three) -> Six:
-    """The part of the coupling stiffness, with N = Q G_c."""
+    """Contribution of the coupling stiffness to K, with N = Q G_c."""
     L = trace_minus(N)
     turned = plus(outer(d, axial(N)), times_skew(transposed(N), d))
     return scaled(-1.0, turned), transposed(L), L, scaled(0.0, L)
@@ -75,12 +70,7 @@ def coupling_tangent(N: Nine, d: Three) -> Six:
 @inlined
 def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
     """B: g and ``turning`` are B's velocity and angular velocity, ``omega`` A's angular velocity, all in A's axes."""
-    return (
-        scaled(-1.0, skew(turning)),
-        scaled(0.0, skew(g)),
-        scaled(-1.0, skew(g)),
-        scaled(-1.0, skew(omega)),
-    )
+    return (scaled(-1.0, skew(turning)), scaled(0.0, skew(g)), scaled(-1.0, skew(g)), scaled(-1.0, skew(omega)))
 
 
 @inlined
@@ -110,14 +100,9 @@ def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
 
 @inlined
 def moved(e: Three, A: Six, g: Three) -> Six:
-    """E(e) A E(g)^T: both sides taken to other points."""
+    """E(e) A E(g)^T: A with both sides transferred to other points."""
     a, c = plus(A[0], skew_times(e, A[2])), plus(A[1], skew_times(e, A[3]))
-    return (
-        plus(a, scaled(-1.0, times_skew(c, g))),
-        c,
-        plus(A[2], scaled(-1.0, times_skew(A[3], g))),
-        A[3],
-    )
+    return (plus(a, scaled(-1.0, times_skew(c, g))), c, plus(A[2], scaled(-1.0, times_skew(A[3], g))), A[3])
 
 
 @inlined

@@ -1,1 +1,1 @@
-"""From initial conditions to a periodic beat of stated accuracy, for a batch of individuals."""
+"""Computes the periodic motion of a batch of individuals to a requested accuracy."""

@@ -1,7 +1,7 @@
-"""In which order to eliminate the bodies from the step's linear system, and the work that this makes.
+"""Order in which the bodies are eliminated from the step's linear system, and the operations that follow from it.
 
-Minimum degree (Rose 1972): always the body with the fewest neighbours left, of these the one that joins the fewest
-pairs of them anew. On a wing of four bodies along the chord this saves a fifth of the products of strip by strip.
+Minimum degree (Rose 1972): the next body is the one with the fewest remaining neighbours and, among these, with the
+least fill. With four bodies along the chord this saves a fifth of the products of an elimination strip by strip.
 """
 
 from __future__ import annotations
@@ -9,10 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Index = npt.NDArray[np.int64]
-
+from wingfit.records.array_types import ArrayLike, Index
 
 _NONE: frozenset[tuple[int, int]] = frozenset()
 
@@ -22,14 +20,14 @@ class Elimination:
     """Blocks and products of the factorisation, numbered as in ``wingfit.sim.kernels.linear``.
 
     Attributes:
-        order: bodies as they are eliminated.
+        order: bodies in the order of elimination.
         start: below[start[k]:start[k + 1]] are the blocks under the diagonal of order[k].
-        below: their numbers.
-        row: the body in whose row each of them is.
-        products: (target, left, right) to subtract.
+        below: numbers of the blocks below the diagonal.
+        row: the body of the row of each of these.
+        products: (target, left, right) of products to subtract.
         product_start: rows product_start[k]:product_start[k + 1] of ``products`` follow the elimination of order[k].
-        fill: blocks that no connector writes.
-        position: number of the block (row, column) of two joined bodies.
+        fill: blocks that do not belong to a connector.
+        position: number of the block (row, column).
     """
 
     order: Index
@@ -43,10 +41,10 @@ class Elimination:
 
 
 def eliminate(
-    n: int, pairs: set[tuple[int, int]], beside: frozenset[tuple[int, int]] | set[tuple[int, int]] = _NONE
+    n: int, pairs: set[tuple[int, int]], extra: frozenset[tuple[int, int]] | set[tuple[int, int]] = _NONE
 ) -> Elimination:
-    """Elimination of n bodies of which ``pairs`` are joined by connectors (either way round), and others ``beside``."""
-    columns = _minimum_degree(n, pairs | beside)
+    """Elimination of n bodies with blocks for the ``pairs`` joined by connectors and for the pairs in ``extra``."""
+    columns = _minimum_degree(n, pairs | extra)
     count = sum(len(rows) for _, rows in columns)
     position = {(k, k): k for k in range(n)}
     for column, rows in columns:
@@ -69,26 +67,26 @@ def eliminate(
 
 
 def _minimum_degree(n: int, pairs: set[tuple[int, int]]) -> list[tuple[int, list[int]]]:
-    """Bodies in the order of elimination, each with the neighbours it still has then."""
-    left: dict[int, set[int]] = {k: set() for k in range(n)}
+    """Bodies in the order of elimination, each with its neighbours at that point."""
+    neighbours: dict[int, set[int]] = {k: set() for k in range(n)}
     for a, b in pairs:
-        left[a].add(b)
-        left[b].add(a)
+        neighbours[a].add(b)
+        neighbours[b].add(a)
 
-    def price(body: int) -> tuple[int, int, int]:
-        around = sorted(left[body])
-        anew = sum(b not in left[a] for k, a in enumerate(around) for b in around[k + 1 :])
-        return len(around), anew, body
+    def cost(body: int) -> tuple[int, int, int]:
+        around = sorted(neighbours[body])
+        fill = sum(b not in neighbours[a] for k, a in enumerate(around) for b in around[k + 1 :])
+        return len(around), fill, body
 
     columns = []
-    while left:
-        body = min(left, key=price)
-        around = left.pop(body)
+    while neighbours:
+        body = min(neighbours, key=cost)
+        around = neighbours.pop(body)
         for neighbour in around:
-            left[neighbour] = (left[neighbour] | around) - {neighbour, body}
+            neighbours[neighbour] = (neighbours[neighbour] | around) - {neighbour, body}
         columns.append((body, sorted(around)))
     return columns
 
 
-def _index(values: npt.ArrayLike) -> Index:
+def _index(values: ArrayLike) -> Index:
     return np.asarray(values, np.int64)

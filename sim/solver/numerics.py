@@ -1,4 +1,4 @@
-"""How well to solve: the accuracy that a user states, and the ladder of steps that leads to it."""
+"""Settings of the solver: the requested accuracy, and the sequence of step numbers that is tried to reach it."""
 
 from __future__ import annotations
 
@@ -9,28 +9,27 @@ import numpy as np
 from wingfit.records import Condition
 
 ACCURACY = 1e-4
-# Steps of a beat to try, one after the other: each half as many again, so that successive motions share instants.
+# Steps per beat to try in turn: each 1.5 times the one before, so that successive motions share instants.
 LADDER = (64, 96, 144, 216, 324, 486, 729)
-STEPS_PER_HZ = 21.0  # no beat starts below: the faster a wing flaps, the nearer its harmonics come to its resonances
+STEPS_PER_HZ = 21.0  # least steps per beat: the faster a wing flaps, the closer its harmonics are to its resonances
 KINKS = 2e-5  # m
-SAFETY = 1.5  # soft wings with hardly any damping have been seen to need it
+SAFETY = 1.5  # needed by soft wings with little damping
 _ORDER = 4
 _GROWTH = 1.5
 
 
 @dataclass(frozen=True)
 class Numerics:
-    """How well to solve.
+    """Settings of the solver.
 
     Attributes:
-        accuracy: largest distance (m) of any marker at any instant from where the exact periodic motion of the model
-            has it. The number of steps is raised, individual by individual, until the estimated error is below.
-        steps: per beat; given, it is taken as it is and no error is estimated.
-        ramp_beats: the drive's amplitude grows from rest over these first beats.
-        max_beats: after which a wing that is still not periodic is reported.
-        periodic: distance (m) to the periodic motion at which a beat counts as periodic; None takes a quarter of the
-            accuracy.
-        window: beats that the acceleration towards the periodic motion learns from; 0 waits for transients to die.
+        accuracy: largest error (m) of any marker at any instant, relative to the exact periodic motion of the model.
+            The number of steps is raised, for each individual, until the estimated error is smaller.
+        steps: per beat. If given, it is not changed and no error is estimated.
+        ramp_beats: number of beats over which the amplitude of the drive grows from zero.
+        max_beats: number of beats after which a motion that is not periodic counts as failed.
+        periodic: distance (m) to the periodic motion at which a beat counts as periodic; None: a quarter of accuracy.
+        window: number of past beats that Anderson acceleration uses; 0: no acceleration.
     """
 
     accuracy: float = ACCURACY
@@ -52,27 +51,27 @@ class Numerics:
                 f"periodic is {self.periodic!r} m; it must be positive, such as 2.5e-5 (0.025 mm), or None"
             )
         if self.window < 0:
-            raise ValueError(f"window is {self.window} beats; it must be at least 0, which learns nothing from them")
+            raise ValueError(f"window is {self.window} beats; it must be at least 0 (no acceleration)")
 
     def ladder(self, condition: Condition) -> tuple[int, ...]:
-        """Steps of a beat to try under a condition, coarsest first."""
+        """Steps per beat to try under a condition, coarsest first."""
         if self.steps is not None:
             return (self.steps,)
         least = STEPS_PER_HZ * condition.flap_frequency
-        # an error is what two rungs differ by
+        # two are needed to estimate an error
         return tuple(n for n in LADDER if n >= least or n in LADDER[-2:])
 
     @property
     def settled(self) -> float:
-        """Distance (m) to the periodic motion that counts as periodic."""
+        """Distance (m) to the periodic motion below which a beat counts as periodic."""
         return 0.25 * self.accuracy if self.periodic is None else self.periodic
 
 
 def estimated_error(changes: list[float]) -> float:
-    """Error (m) of the latest motion from what each refinement changed (m), as a geometric series.
+    """Error (m) of the finest motion, from the ``changes`` (m) of successive refinements, by Richardson extrapolation.
 
-    One change tells no order: the second is assumed. With more it is what is seen, up to one above the method's.
-    Below KINKS a change may come from the corners in the law of the air, which fall with the second order only.
+    The order is estimated from the last two changes and limited to 2...5; with one change it is taken as 2. Changes
+    below KINKS may come from the kinks in the law of the air, where convergence is of order 2 only.
     """
     least = _GROWTH**2
     ratio = least

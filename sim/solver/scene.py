@@ -1,13 +1,13 @@
-"""What the kernels are given for a condition: the drive, the start, the setting, and room for what a beat leaves."""
+"""Inputs of the kernels for a condition: drive, initial state and setting; and arrays for the results of a beat."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.atmosphere import density
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import PORTS, STAGES, Setting, State, Trace
@@ -17,25 +17,23 @@ from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.wing.drive import RodDrive
 from wingfit.sim.wing.structure import Structure
 
-Array = npt.NDArray[np.float64]
-
 
 def drive_table(
-    rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, giving_way: bool = False
+    rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, compliant: bool = False
 ) -> Array:
     """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
 
-    The acceleration carries the stage's share of its rate of change, as the method asks where time enters by itself.
-    A drive that gives way asks for two more derivatives, and for that share by itself, in the last row. The table is
-    shared by all that are driven alike, and only read.
+    The acceleration includes the Rosenbrock method's term for the explicit dependence on time. For a compliant drive
+    (``compliant``) the table has six rows instead of three: two more derivatives, and that term by itself. Tables are
+    cached and must not be changed.
     """
     ramp = numerics.ramp_beats
-    return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), giving_way)
+    return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), compliant)
 
 
 @lru_cache(maxsize=16)
 def _table(
-    series: bytes, shape: tuple[int, ...], frequency: float, ramp_beats: int, n: int, beat: int, giving_way: bool
+    series: bytes, shape: tuple[int, ...], frequency: float, ramp_beats: int, n: int, beat: int, compliant: bool
 ) -> Array:
     rods = RodDrive(np.frombuffer(series, np.complex128).reshape(shape))
     omega = 2 * np.pi * frequency
@@ -45,9 +43,9 @@ def _table(
         angle[..., :4, :] = _ramped(angle, (beat + phases)[..., None, None] / ramp_beats, frequency / ramp_beats)
         angle[..., 4, :] = 0.0
     slope = SLOPES[:, None, None] / (n * frequency)
-    share = slope * angle[:, :1, :, 3]  # of the change at the start of the step
-    table = zeros((n, STAGES, 2, 6 if giving_way else 3, LANES))
-    if giving_way:
+    share = slope * angle[:, :1, :, 3]  # explicit dependence on time, at the start of the step
+    table = zeros((n, STAGES, 2, 6 if compliant else 3, LANES))
+    if compliant:
         table[..., :5, :], table[..., 5, :] = angle, share
     else:
         table[...] = angle[..., :3, :]
@@ -56,7 +54,7 @@ def _table(
 
 
 def _ramped(angle: Array, x: Array, rate: float) -> Array:
-    """Start from rest: 0 at x = 0, 1 from x = 1 on, without rate and acceleration at both; x grows at ``rate``."""
+    """``angle`` times a smooth step from 0 at x = 0 to 1 at x = 1, with its derivatives; x grows at ``rate``."""
     x = np.minimum(x, 1.0)
     e = x**3 * (10 - 15 * x + 6 * x**2)
     e1 = rate * 30 * x**2 * (1 - x) ** 2
@@ -69,7 +67,7 @@ def _ramped(angle: Array, x: Array, rate: float) -> Array:
 
 
 def at_rest(structure: Structure, states: int = 0) -> State:
-    """All bodies at their rest pose, not moving, the rods horizontal, the effects' ``states`` zero."""
+    """Initial state: bodies in their rest pose, rods horizontal, no motion, ``states`` effects' states of zero."""
     n = len(structure.bodies)
     motion = (zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
     state = State(*motion, zeros((states, LANES)))
@@ -81,7 +79,7 @@ def at_rest(structure: Structure, states: int = 0) -> State:
 
 
 def setting(condition: Condition, steps: int) -> Setting:
-    """The kernel's view of a condition, with ``steps`` a beat."""
+    """A condition as input of the kernels, with ``steps`` per beat."""
     a = condition.angle_of_attack
     wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
     step = 1.0 / (condition.flap_frequency * steps)
@@ -90,16 +88,16 @@ def setting(condition: Condition, steps: int) -> Setting:
 
 
 def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
-    """Empty arrays for one beat; those of the motion have no room unless asked for."""
-    kept, bodies = steps if with_motion else 0, len(structure.bodies) + 2
+    """Arrays for the results of one beat; those of the motion are empty unless ``with_motion``."""
+    rows, bodies = steps if with_motion else 0, len(structure.bodies) + 2
     return Trace(
         tracks=zeros((steps, len(structure.wing.markers), 3, LANES)),
         rods=zeros((steps, 2, 6, LANES)),
         air=zeros((steps, 3, LANES)),
         power=zeros((steps, PORTS, LANES)),
         energy=zeros((steps, 3, LANES)),
-        R=zeros((kept, bodies, 9, LANES)),
-        p=zeros((kept, bodies, 3, LANES)),
-        V=zeros((kept, bodies, 6, LANES)),
-        z=zeros((kept, states, LANES)),
+        R=zeros((rows, bodies, 9, LANES)),
+        p=zeros((rows, bodies, 3, LANES)),
+        V=zeros((rows, bodies, 6, LANES)),
+        z=zeros((rows, states, LANES)),
     )

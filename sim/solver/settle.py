@@ -1,4 +1,4 @@
-"""Running a group of individuals side by side, beat after beat, until each is periodic."""
+"""Runs a group of individuals side by side, beat after beat, until each is periodic."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import State, Trace, new_work
@@ -20,32 +20,30 @@ from wingfit.sim.solver.periodic import Secants
 from wingfit.sim.solver.scene import at_rest, drive_table, new_trace
 from wingfit.sim.wing.structure import Structure
 
-Array = npt.NDArray[np.float64]
-
-GROWING = 16  # beats after which the fastest growing part of what is left stands out
-ROUND_OFF = 1e-12  # m: what is left of a transient that has died, and neither grows nor falls
+GROWTH_BEATS = 16  # after which the fastest growing mode dominates the transient
+ROUND_OFF = 1e-12  # m: size of transients that consist of round-off
 DIVERGED = "a body turned more than 1 rad within one step"
 
 
 @dataclass
 class Course:
-    """One individual on its way: up the ladder of steps, beat after beat.
+    """State of the solution for one individual, over increasing numbers of steps.
 
     Attributes:
-        genome: its genes.
-        state: from where its next beat starts; None at rest.
-        secants: what its beats have told about its map.
-        tracks: of the rung before, [n, M, 3].
-        changes: of the tracks from rung to rung, m.
-        beats: simulated in all.
-        failures: rungs on which it failed.
-        trace: of its periodic beat on the present rung.
-        reason: why it failed on the present rung.
+        genome: [G].
+        state: at the start of the next beat; None at rest.
+        secants: of the map of its beats.
+        tracks: [n, M, 3] with the previous number of steps, m.
+        changes: of the tracks from each number of steps to the next, m.
+        beats: total number of simulated beats.
+        failures: how many numbers of steps failed.
+        trace: of the periodic beat with the present number of steps.
+        reason: of a failure with the present number of steps.
         distance: to the periodic motion, m.
-        growth: of a disturbance of the periodic motion in a beat.
-        error: estimated, m.
-        done: accurate, or given up.
-        before: as it was on the rung before.
+        growth: factor by which a disturbance of the periodic motion grows in a beat.
+        error: estimated error, m.
+        done: whether the motion is accurate, or has failed finally.
+        before: copy from the previous number of steps.
     """
 
     genome: Array
@@ -64,13 +62,13 @@ class Course:
     before: Course | None = None
 
     def copy(self) -> Course:
-        """As it is now, whatever becomes of it; arrays are never written into, and are shared."""
+        """A copy; the arrays are shared, since they are never modified."""
         known = self.secants and replace(self.secants, columns=list(self.secants.columns), target=None)
         return replace(self, secants=known, changes=list(self.changes), before=None)
 
 
 class Subject(NamedTuple):
-    """What is simulated: a structure under a condition, and how up to LANES genomes make a scene of it."""
+    """What is simulated: a structure, a condition, and the function that makes a scene of up to LANES genomes."""
 
     structure: Structure
     condition: Condition
@@ -78,7 +76,7 @@ class Subject(NamedTuple):
 
 
 class _Group:
-    """Up to LANES individuals side by side under a condition, all at rest or all under way."""
+    """Up to LANES individuals side by side under a condition, all starting from rest or all from a known state."""
 
     def __init__(self, subject: Subject, courses: list[Course], steps: int, with_motion: bool = False) -> None:
         structure, self.courses = subject.structure, courses
@@ -94,18 +92,18 @@ class _Group:
         self.alive = np.ones(LANES, bool)
 
     def table(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """The drive of a beat."""
-        frequency, giving_way = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
-        return drive_table(self.scene.rods, frequency, numerics, steps, beat, giving_way=giving_way)
+        """The drive table of a beat."""
+        frequency, compliant = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
+        return drive_table(self.scene.rods, frequency, numerics, steps, beat, compliant=compliant)
 
     def beat(self, table: Array) -> State:
-        """One beat under a drive; the state from which it started."""
+        """Simulate one beat; returns the state at its start."""
         start = State(*(array.copy() for array in self.state))
         advance(self.wiring, self.here, self.lanes, table, self.work, self.state, self.trace, self.alive)
         return start
 
-    def learn(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
-        """What a beat means for an individual: it diverged, it is periodic, or it goes on from a better start."""
+    def evaluate(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
+        """Evaluate the beat of one individual: failed, periodic, or to be continued from an improved start."""
         course = self.courses[lane]
         course.beats += 1
         if not self.alive[lane]:
@@ -123,13 +121,13 @@ class _Group:
                 course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
 
 
-def beside(near: Course, genome: Array, states: int) -> Course:
-    """A course for ``genome`` that begins at the periodic motion of ``near`` and with what that knows of its map.
+def warm_start(near: Course, genome: Array, states: int) -> Course:
+    """A course for ``genome`` that starts at the periodic motion of ``near``, with its secants.
 
-    ``states`` of effects begin at rest where ``near`` has others; what it knows of the map is then of no use.
+    If the number of effects' ``states`` differs, they start at zero and the secants are not used.
     """
     if near.state is None or near.secants is None:
-        raise ValueError("only a settled individual can be begun beside")
+        raise ValueError("a warm start needs an individual with a periodic motion")
     state = State(*(array.copy() for array in near.state))
     if len(state.z) != states:
         return Course(genome, state._replace(z=np.zeros(states)))
@@ -139,7 +137,7 @@ def beside(near: Course, genome: Array, states: int) -> Course:
 
 
 def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: int, with_motion: bool) -> None:
-    """Run up to LANES individuals with ``steps`` a beat until each is periodic, whatever its neighbours do."""
+    """Run up to LANES individuals with ``steps`` per beat until each is periodic or has failed."""
     group = _Group(subject, courses, steps, with_motion)
     first = 0 if courses[0].state is None else numerics.ramp_beats
     tables = {beat: group.table(numerics, steps, beat) for beat in range(first, numerics.ramp_beats + 1)}
@@ -147,15 +145,15 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
         course.reason, course.trace = None, None
         if course.secants is not None:
             course.secants.restart()
-    open_ = list(range(len(courses)))
+    running = list(range(len(courses)))
     for beat in range(first, numerics.max_beats):
         start = group.beat(tables[min(beat, numerics.ramp_beats)])
-        for lane in open_:
-            group.learn(lane, start, beat, numerics)
-        open_ = [lane for lane in open_ if courses[lane].reason is None and courses[lane].trace is None]
-        if not open_:
+        for lane in running:
+            group.evaluate(lane, start, beat, numerics)
+        running = [lane for lane in running if courses[lane].reason is None and courses[lane].trace is None]
+        if not running:
             return
-    for lane in open_:
+    for lane in running:
         courses[lane].reason = (
             f"not periodic after {courses[lane].beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
             "periodic motion; it may flutter"
@@ -163,24 +161,24 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
 
 
 def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
-    """Let up to LANES settled individuals go on for GROWING beats, and see whether what is left of transients grows.
+    """Measure the growth of the transients of up to LANES periodic individuals over GROWTH_BEATS more beats.
 
-    What the secants tell of it is mixed with the beats on which the motion was still far from periodic.
+    The secants' estimate is less reliable: it includes beats on which the motion was far from periodic.
     """
     group, numerics = _Group(subject, courses, steps), Numerics(steps=steps)
     table = group.table(numerics, steps, numerics.ramp_beats)
-    watched = [Secants(_lane(group.state, k), group.angular_rate, 0, group.sizes) for k in range(len(courses))]
-    left = np.zeros((GROWING, len(courses)))
-    for beat in range(GROWING):
+    monitors = [Secants(_lane(group.state, k), group.angular_rate, 0, group.sizes) for k in range(len(courses))]
+    distances = np.zeros((GROWTH_BEATS, len(courses)))
+    for beat in range(GROWTH_BEATS):
         start = group.beat(table)
-        left[beat] = [w.add(_lane(start, k), _lane(group.state, k))[1] for k, w in enumerate(watched)]
+        distances[beat] = [w.add(_lane(start, k), _lane(group.state, k))[1] for k, w in enumerate(monitors)]
     for k, course in enumerate(courses):
-        course.growth = _mean_growth(left[:, k]) if group.alive[k] else np.inf
+        course.growth = _mean_growth(distances[:, k]) if group.alive[k] else np.inf
 
 
 def _recover(course: Course, lane: int, state: State) -> bool:
-    """Go back to before the leap that made an individual diverge; False when there was none."""
-    if course.secants is None or not course.secants.leapt:
+    """Revert the extrapolation that made an individual diverge; False if there was none."""
+    if course.secants is None or not course.secants.extrapolated:
         return False
     _put(state, lane, course.secants.step_back())
     return True
@@ -195,13 +193,13 @@ def _put(into: State, lane: int, state: State) -> None:
         array[..., lane] = value
 
 
-def _mean_growth(left: Array) -> float:
-    """Factor per beat of the latter half of a series, by least squares in its logarithm: two modes may beat."""
-    tail = np.log(np.maximum(left[len(left) // 2 :], ROUND_OFF))
+def _mean_growth(distances: Array) -> float:
+    """Growth per beat over the latter half of a series, by a straight line through its logarithm."""
+    tail = np.log(np.maximum(distances[len(distances) // 2 :], ROUND_OFF))
     return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
 
 
 def _stacked(states: list[State]) -> State:
-    """States of single individuals side by side in lanes; spare lanes repeat the last."""
+    """States of single individuals as one state with lanes; spare lanes repeat the last individual."""
     filled = [states[min(k, len(states) - 1)] for k in range(LANES)]
     return State(*(aligned(np.stack(parts, axis=-1)) for parts in zip(*filled, strict=True)))

@@ -1,24 +1,22 @@
-"""Motion of a batch of wings to its periodic state, as accurately as asked: the one door to the kernels."""
+"""Periodic motion of a batch of wings to a requested accuracy. Only this module runs the kernels of the wing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import State, Trace
 from wingfit.sim.solver.numerics import LADDER, Numerics, estimated_error
 from wingfit.sim.solver.scene import new_trace
-from wingfit.sim.solver.settle import Course, Subject, beside, measure_growth, settle
+from wingfit.sim.solver.settle import Course, Subject, measure_growth, settle, warm_start
 from wingfit.sim.wing.structure import Structure
 
-Array = npt.NDArray[np.float64]
-
-FLUTTER = 1.02  # growth of a disturbance in a beat beyond which a periodic motion is none that a wing keeps
-MORE = 1.5  # times as many steps, for individuals that fail beside another and from rest
-_TRIES = 4  # rungs on which an individual may fail before it is given up
+FLUTTER = 1.02  # growth of a disturbance in a beat above which a periodic motion counts as unstable
+RETRY_FACTOR = 1.5  # on the steps of individuals that fail from a warm start and from rest
+_MAX_FAILURES = 4  # numbers of steps that may fail before an individual counts as failed
 
 
 @dataclass(frozen=True)
@@ -28,15 +26,15 @@ class Beat:
     Attributes:
         tracks: [n, M, 3] marker positions in the world, m.
         rods: [n, 2, 6] wrench (moment, force) of the wing on the front and rear driving rod, rod frame at the hinge.
-        air: [n, 3] force of the air on the wing in the world, N; without the inertia of air it moves along.
+        air: [n, 3] force of the air on the wing in the world, N; without the inertia of added mass.
         energy: [n, 3] kinetic, elastic, gravitational, J.
         power: [n, 4] into the wing through dampers, front motor, rear motor and air, W.
-        beats: simulated in all.
-        error: estimated largest error of a marker, of the steps and of the distance to the periodic motion, m; NaN when
-            the steps were given.
-        growth: of a disturbance of the periodic motion in a beat, as far as the beats told; below 1 it dies out.
-        reason: why the individual failed, else None.
-        motion: pose and twist of all bodies and the two rods [n, N+2, .], when asked for.
+        beats: total number of simulated beats.
+        error: estimated largest error of a marker, m, from the steps and from the distance to the periodic motion; NaN
+            if the steps were given.
+        growth: estimated growth of a disturbance of the periodic motion in a beat; below 1 it decays.
+        reason: of a failure, else None.
+        motion: pose and twist of all bodies and the two rods [n, N+2, .], if requested.
     """
 
     tracks: Array
@@ -54,21 +52,21 @@ class Beat:
 def periodic_beats(
     subject: Subject, genomes: Array, numerics: Numerics, *, with_motion: bool = False, near: Course | None = None
 ) -> tuple[Beat, ...]:
-    """Simulate ``genomes`` [B, G] until each is periodic and accurate; groups of LANES at a time.
+    """Simulate ``genomes`` [B, G] until each is periodic and accurate, in groups of LANES.
 
-    An individual's numbers do not depend on its neighbours: each has its own steps, beats and end. Those that begin
-    ``near`` a settled individual take as many steps as that, and its error is taken for theirs.
+    The results of an individual do not depend on the others: each has its own steps and number of beats. With ``near``,
+    the individuals start at the motion of that one, with as many steps, and its error is taken as theirs.
     """
     if near is not None and near.trace is not None:
-        return _beats_beside(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
+        return _beats_near(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
     courses = [Course(genome) for genome in genomes]
     return _settled(subject, courses, numerics, with_motion)
 
 
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
-    """One individual settled, for others to begin beside; None where it fails.
+    """The solution for one individual, as a warm start for others; None if it fails.
 
-    Not with the steps that it took to know its error, but with those before, where it turns out that these would do.
+    With the previous number of steps if that turns out to be accurate enough.
     """
     course = Course(genome)
     _settled(subject, [course], numerics, with_motion=False)
@@ -82,12 +80,12 @@ def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Cours
     return course
 
 
-def _beats_beside(
+def _beats_near(
     subject: Subject, genomes: Array, numerics: Numerics, near: Course, steps: int, with_motion: bool
 ) -> tuple[Beat, ...]:
-    """Beats of individuals that begin beside another; those that fail so begin again from rest."""
+    """Beats of individuals that start at the motion of ``near``; those that fail start again from rest."""
     states = len(subject.scene(genomes[:1]).frozen().laws.size)
-    courses = [beside(near, genome, states) for genome in genomes]
+    courses = [warm_start(near, genome, states) for genome in genomes]
     for group in _groups(courses):
         settle(subject, group, numerics, steps, with_motion)
     failed = [k for k, course in enumerate(courses) if course.reason is not None or course.growth > FLUTTER]
@@ -99,9 +97,9 @@ def _beats_beside(
 
 
 def _from_rest(subject: Subject, genomes: Array, numerics: Numerics, steps: int, with_motion: bool) -> list[Course]:
-    """Individuals that begin at rest with ``steps`` a beat; those that fail so once more with more steps."""
+    """Solve from rest with ``steps`` per beat, and once more with more steps for those that fail."""
     courses = [Course(genome) for genome in genomes]
-    for tried in (steps, round(MORE * steps)):
+    for tried in (steps, round(RETRY_FACTOR * steps)):
         again = [k for k, course in enumerate(courses) if not course.done or course.reason is not None]
         fresh = [Course(genomes[k]) for k in again]
         _settled(subject, fresh, replace(numerics, steps=tried), with_motion)
@@ -126,23 +124,23 @@ def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_m
 
 
 def _groups(courses: list[Course]) -> list[list[Course]]:
-    """Those that start from rest apart from those that go on, LANES at a time."""
+    """Groups of up to LANES, those that start from rest separate from the others."""
     parts = [[c for c in courses if (c.state is None) == resting] for resting in (True, False)]
     return [part[k : k + LANES] for part in parts for k in range(0, len(part), LANES)]
 
 
 def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> None:
-    """Decide whether an individual is accurate, goes up a rung, or is given up."""
+    """Decide whether an individual is accurate, needs more steps, or has failed."""
     if course.reason is not None:
         course.failures += 1
         course.tracks, course.changes, course.error = None, [], np.nan  # one that diverged starts again from rest
-        course.done = last or course.failures >= _TRIES
+        course.done = last or course.failures >= _MAX_FAILURES
         return
     if numerics.steps is not None:
         course.done = True
         return
     if course.trace is None:
-        raise AssertionError("a settled individual has a trace")
+        raise AssertionError("a periodic individual has a trace")
     finer, coarser = course.trace.tracks, course.tracks
     course.tracks = finer
     if coarser is not None:
@@ -156,15 +154,15 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
     if last and not course.done:
         course.done = True
         estimate = (
-            f"estimated error {course.error * 1e3:.3g} mm" if course.changes else "no coarser motion to compare with"
+            f"estimated error {course.error * 1e3:.3g} mm" if course.changes else "no coarser motion for comparison"
         )
         course.reason = (
-            f"not accurate enough with {steps} steps a beat: {estimate}, asked for {numerics.accuracy * 1e3:g} mm"
+            f"not accurate enough with {steps} steps a beat: {estimate}, requested {numerics.accuracy * 1e3:g} mm"
         )
 
 
 def _refuse_flutter(group: list[Course]) -> None:
-    """A leap may find a periodic motion that no wing keeps."""
+    """Fail individuals whose periodic motion is unstable, which an extrapolation may find."""
     for course in group:
         if course.growth > FLUTTER:
             course.reason = (

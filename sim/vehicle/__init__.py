@@ -1,1 +1,1 @@
-"""Quasi-steady blade elements of wings that move as prescribed (Armanini et al. 2016)."""
+"""Quasi-steady blade elements of wings with prescribed motion (Armanini et al. 2016)."""

@@ -1,7 +1,7 @@
-"""A flapping vehicle as a model: genomes in, forces of its wings out, sampled and filtered like a recording.
+"""A flapping vehicle as a model: from genomes to forces of its wings, sampled and filtered like a recording.
 
-Quasi-steady blade elements with clap-and-peel (Armanini et al. 2016). Forces are sums of terms, each a coefficient
-times what depends on the motion alone; so a search over coefficients computes the elements once.
+Quasi-steady blade elements with clap-and-peel (Armanini et al. 2016). Forces are sums of coefficients times terms that
+depend on the motion alone; so a search over coefficients computes the elements once.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import EstimateError, Gene, Recording, Vehicle
+from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects import registry
 from wingfit.sim.effects.apply import apply, observed
@@ -31,20 +31,17 @@ from wingfit.sim.vehicle.rows import mirrored
 from wingfit.sim.vehicle.sampling import passed, passing, phases, series_of, turns
 from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
 
-Array = npt.NDArray[np.float64]
-Places = npt.NDArray[np.intp]
-
-ADDED_MASS_POINT = 0.5  # d, chords: where the added mass's acceleration is taken (Armanini et al. 2016, below Eq. 19)
-_KEPT = 64  # motions whose elements are remembered, per recording
+ADDED_MASS_POINT = 0.5  # d, chords: point whose acceleration the added mass has (Armanini et al. 2016, below Eq. 19)
+_MAX_MOTIONS = 64  # per recording, whose elements are cached
 _DEFINITION = ("vehicle", "terms", "elements", "instants", "peel_width", "effects")
 
 
 @dataclass(frozen=True)
 class BladeElementWing:
-    """Vehicle whose wings move as prescribed, for forces on a balance or in flight.
+    """Vehicle with prescribed motion of the wings, for forces on a balance or in flight.
 
     ``terms`` are names of :data:`wingfit.sim.vehicle.terms.TERMS`. A beat is computed at ``instants`` equal steps with
-    ``elements`` along each wing. ``peel_width`` in beats smooths the end of the peel (0: it switches, as printed).
+    ``elements`` along each wing. ``peel_width`` in beats smooths the end of the peel (0: a step, as printed).
     ``effects`` are names of :data:`wingfit.sim.effects.registry.EFFECTS` whose genes are appended.
     """
 
@@ -69,14 +66,14 @@ class BladeElementWing:
         _check_effects(self)
 
     def __getstate__(self) -> dict[str, object]:
-        """Pickle the definition only; whatever was computed from it is computed again."""
+        """Pickle the definition only; everything else is derived from it."""
         return {name: self.__dict__[name] for name in _DEFINITION}
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
         """Coefficients of the terms, parameters of the wings' motion, then genes of the effects.
 
-        EstimateError for an estimate of no use.
+        EstimateError for an invalid estimate.
         """
         coefficients = [gene for name in TERMS for gene in TERMS[name].genes if name in self.terms]
         if not self.vehicle.claps:
@@ -97,37 +94,37 @@ class BladeElementWing:
 
     @cached_property
     def searched(self) -> tuple[str, ...]:
-        """What the seed estimates: lift, rotational and fling coefficients; and all genes of effects.
+        """The genes estimated by Armanini et al. (2016): lift, rotational and fling coefficients; and genes of effects.
 
-        Drag and motion are fixed beforehand.
+        Drag and motion are fixed by default.
         """
         added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
 
     @one_blas_thread
-    def beat(self, genomes: npt.ArrayLike, recording: Recording) -> Array:
+    def beat(self, genomes: ArrayLike, recording: Recording) -> Array:
         """Forces [B, n, 2] along body x and z (N) over one beat from t* = 0, unfiltered, of ``genomes`` [B, G]."""
         batch = genome_batch(self.genes, genomes)
         out = np.empty((len(batch), 2, self.instants))
-        for effects, members in self._alike(batch):
+        for effects, members in self._by_active_effects(batch):
             for start in range(0, len(members), LANES):  # blocks that stay in the cache
                 block = members[start : start + LANES]
                 if effects:
-                    weights, rows, added = self._changed(effects, batch[block], recording)
+                    weights, rows, added = self._rows_with_effects(effects, batch[block], recording)
                     out[block] = [_sum(w, row) + more for w, row, more in zip(weights, rows, added, strict=True)]
                 else:
                     weights = self._weights(self._coefficients(batch[block]), len(block))
-                    found = self._remembered(batch[block], recording)
+                    found = self._cached_rows(batch[block], recording)
                     out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
         return out.transpose(0, 2, 1)
 
-    def term_forces(self, genome: npt.ArrayLike, recording: Recording) -> dict[str, Array]:
-        """Forces [n, 2] of each term (N), and of the effects beside them; together they are :meth:`beat`."""
+    def term_forces(self, genome: ArrayLike, recording: Recording) -> dict[str, Array]:
+        """Forces [n, 2] of each term (N), and of the effects; their sum is :meth:`beat`."""
         batch = genome_batch(self.genes, np.asarray(genome, float)[None])
-        ((effects, _),) = self._alike(batch)
+        ((effects, _),) = self._by_active_effects(batch)
         parts = dict[str, Array]()
         if effects:
-            weights, rows, added = self._changed(effects, batch, recording)
+            weights, rows, added = self._rows_with_effects(effects, batch, recording)
             parts["effects"] = added[0].T
         else:
             weights = self._weights(self._coefficients(batch), len(batch))
@@ -137,21 +134,21 @@ class BladeElementWing:
         return parts
 
     @one_blas_thread
-    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+    def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
         """Forces [B, T, C] of ``genomes`` [B, G] at the recording's instants and along its axes, low-passed like it."""
         if recording.kind != "forces":
             raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
         batch = genome_batch(self.genes, genomes)
         beat = self.beat(batch, recording)
-        watched, sampling = self._seen(batch, beat, recording)
-        beat[watched] = sampling.beat
+        affected, sampling = self._observed(batch, beat, recording)
+        beat[affected] = sampling.beat
         basis, wanted = self._basis(recording)
         axes = ["xz".index(axis) for axis in recording.forces]
         series = series_of(beat[:, :, axes].transpose(0, 2, 1), self._harmonics, recording)[:, :, wanted]
         series = np.ascontiguousarray(series)
         channels = np.empty((len(batch), len(recording.times), len(axes)))
         synthesise(basis, series, channels)
-        for k, times, added in zip(watched, sampling.times, sampling.added, strict=True):
+        for k, times, added in zip(affected, sampling.times, sampling.added, strict=True):
             if not np.array_equal(times, recording.times):
                 synthesise_at(phases(recording, times), series[k], channels[k])
             channels[k] += passed(added, recording)
@@ -160,8 +157,8 @@ class BladeElementWing:
 
     # -- effects -----------------------------------------------------------------------------------------------
 
-    def _alike(self, batch: Array) -> list[tuple[tuple[Effect, ...], Places]]:
-        """Individuals in groups for which the same effects on the vehicle are on."""
+    def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], Index]]:
+        """Indices of individuals grouped by the effects on the vehicle that are on."""
         acting = [effect for effect in self.chosen if effect.vehicle]
         on = [~effect.off(effect.values(self.genes, batch)) for effect in acting]
         groups: dict[tuple[Effect, ...], list[int]] = {}
@@ -169,8 +166,10 @@ class BladeElementWing:
             groups.setdefault(tuple(e for e, each in zip(acting, on, strict=True) if each[k]), []).append(k)
         return [(effects, np.array(members)) for effects, members in groups.items()]
 
-    def _changed(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> tuple[Array, Array, Array]:
-        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; others [B, 2, n]."""
+    def _rows_with_effects(
+        self, effects: tuple[Effect, ...], batch: Array, recording: Recording
+    ) -> tuple[Array, Array, Array]:
+        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; added forces [B, 2, n]."""
         moving = {} if recording.motion else self._moving(batch)
         scene = self._scene(moving | self._coefficients(batch), len(batch), recording)
         for effect in effects:
@@ -179,24 +178,24 @@ class BladeElementWing:
         scene.settle()
         return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
 
-    def _seen(self, batch: Array, beat: Array, recording: Recording) -> tuple[Places, Sampling]:
-        """Individuals for whom an effect on the observation is on, and what the balance makes of their ``beat``."""
+    def _observed(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
+        """Individuals for which an effect on the observation is on, and the balance's observation of their ``beat``."""
         effects = observed(self.chosen, self.genes, batch, "forces")
         on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
-        watched = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
-        times, added = (np.zeros((len(watched), *shape)) for shape in (recording.times.shape, recording.values.shape))
-        sampling = Sampling(self.vehicle, recording, beat[watched], times + recording.times, added)
-        apply(effects, self.genes, batch[watched], sampling)
-        return watched, sampling
+        affected = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
+        times, added = (np.zeros((len(affected), *shape)) for shape in (recording.times.shape, recording.values.shape))
+        sampling = Sampling(self.vehicle, recording, beat[affected], times + recording.times, added)
+        apply(effects, self.genes, batch[affected], sampling)
+        return affected, sampling
 
     # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
 
     def _coefficients(self, batch: Array) -> dict[str, Array]:
-        """Those of the terms that are on, [B]."""
+        """Coefficients [B] of the active terms, by name."""
         return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in _COEFFICIENTS}
 
     def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
-        """[B, rows]: what each row of ``count`` individuals is multiplied by."""
+        """Coefficients [B, rows] of the rows, for ``count`` individuals."""
         zero, one = np.zeros(count), np.ones(count)
 
         def value(name: str) -> Array:
@@ -219,11 +218,11 @@ class BladeElementWing:
 
     @cached_property
     def _active(self) -> tuple[str, ...]:
-        """Rows of the terms that are on."""
+        """Rows of the active terms."""
         return tuple(row for row, term in _ROWS.items() if term in self.terms)
 
     @cached_property
-    def _memory(self) -> WeakKeyDictionary[Recording, OrderedDict[bytes, Array]]:
+    def _cache(self) -> WeakKeyDictionary[Recording, OrderedDict[bytes, Array]]:
         return WeakKeyDictionary()
 
     def _moving(self, batch: Array) -> dict[str, Array]:
@@ -234,17 +233,17 @@ class BladeElementWing:
     def _motion_names(self) -> frozenset[str]:
         return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
 
-    def _remembered(self, batch: Array, recording: Recording) -> list[Array]:
-        """Forces of each active row [rows, 2, n] of every individual; those of the last few motions are remembered."""
-        kept = self._memory.setdefault(recording, OrderedDict())
+    def _cached_rows(self, batch: Array, recording: Recording) -> list[Array]:
+        """Forces of each active row [rows, 2, n] of every individual; those of recent motions are cached."""
+        cached = self._cache.setdefault(recording, OrderedDict())
         motions = np.stack(list(self._moving(batch).values()) or [np.zeros(len(batch))], axis=1)
         keys = [motion.tobytes() for motion in motions]
-        new = {key: row for row, key in enumerate(keys) if key not in kept}
+        new = {key: row for row, key in enumerate(keys) if key not in cached}
         found = dict(zip(new, self._rows(batch[list(new.values())], recording), strict=True)) if new else {}
-        answer = [found[key] if key in found else kept[key] for key in keys]
-        kept.update(found)
-        while len(kept) > _KEPT:
-            kept.popitem(last=False)
+        answer = [found[key] if key in found else cached[key] for key in keys]
+        cached.update(found)
+        while len(cached) > _MAX_MOTIONS:
+            cached.popitem(last=False)
         return answer
 
     def _rows(self, batch: Array, recording: Recording) -> Array:
@@ -254,7 +253,7 @@ class BladeElementWing:
         return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
 
     def _scene(self, genes: dict[str, Array], count: int, recording: Recording) -> VehicleScene:
-        """``count`` vehicles in the recording's condition; ``genes`` [count] of those that the scene depends on."""
+        """``count`` vehicles in the recording's condition; ``genes`` [count] are those on which the scene depends."""
         motion, r = recording.motion or self.vehicle.motion, self._span[0]
         setting = Setting(self.vehicle, self.terms, motion, recording.condition, self.instants, self.peel_width, r)
         return VehicleScene.of(setting, genes, count)
@@ -280,7 +279,7 @@ class BladeElementWing:
         out = np.empty((len(each), len(self._active), 2, n))
         for k, name in enumerate(self._active):
             factor = {"rotation": 1.0 - peel, "clap_and_peel": peel}.get(name)
-            row = each[:, _PLACES[name]]
+            row = each[:, _INDEX[name]]
             out[:, k] = row if factor is None else row * factor
         if scene.fling.any():
             scene.added -= scene.fling[:, None, None] * scene.angles.peel[:, None] * each[:, ROWS.index("rotation")]
@@ -301,8 +300,8 @@ class BladeElementWing:
     def _harmonics(self) -> int:
         return (self.instants - 1) // 2
 
-    def _basis(self, recording: Recording) -> tuple[Array, npt.NDArray[np.int64]]:
-        """Cosines and sines [K, T] at the recording's instants, and their places in a series: only what passes."""
+    def _basis(self, recording: Recording) -> tuple[Array, Index]:
+        """Cosines and sines [K, T] of the harmonics that the low-pass passes, and their indices in a series."""
         wanted = passing(recording, self._harmonics)
         if self._last_basis.get("recording") is not recording:
             basis = turns(wanted, self._harmonics, recording)
@@ -311,10 +310,10 @@ class BladeElementWing:
 
     @cached_property
     def _last_basis(self) -> dict[str, Any]:
-        return {}  # of one recording only: those of long unfiltered recordings fill memory
+        return {}  # of the last recording only, since those of long recordings are large
 
 
-# What each row of the elements belongs to.
+# The term to which each row of the elements belongs.
 _ROWS = {
     "inertial": "inertial",
     "translation": "translation",
@@ -327,27 +326,25 @@ _ROWS = {
     "lift_curve": "steady_curves",
     "drag_curve": "steady_curves",
 }
-# Where the elements put it: peel decides at which instants the circulation of a pitching wing counts as which.
-_PLACES = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
+# The row of the elements; clap_and_peel is that of rotation while the wings peel.
+_INDEX = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
 
 
-# Genes that the flow at the stations depends on; a scene without effects depends on the motion alone.
+# Genes on which the flow at the stations depends; a scene without effects depends on the motion alone.
 _COEFFICIENTS = ("C_l", "C_r", "C_F", "C_D0", "C_Dpi2", "K_l", "K_d")
 
 
 def _check_effects(model: BladeElementWing) -> None:
-    """Refuse effects that are unknown, or terms of the model already, or need wings that meet."""
+    """ValueError for effects that are unknown, already terms of the model, or need wings that meet."""
     for effect in registry.chosen(model.effects, model.vehicle):
         if effect.name in model.terms:
-            raise ValueError(
-                f"effect {effect.name!r} is a term of this model already; name no such effect, or leave out the term"
-            )
+            raise ValueError(f"effect {effect.name!r} is a term of this model already; remove the effect, or the term")
         if effect.name == "clap_and_peel" and not model.vehicle.claps:
-            raise ValueError("effect 'clap_and_peel' needs wings that meet, and vehicle.claps is false: leave it out")
+            raise ValueError("effect 'clap_and_peel' needs wings that meet, but vehicle.claps is false: remove it")
 
 
 def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
-    """Refuse estimates that no model of ``vehicle`` takes; those for terms that are off must be good as well."""
+    """EstimateError for estimates that no model of ``vehicle`` admits, those for inactive terms included."""
     known = {gene.name: gene for term in TERMS.values() for gene in term.genes} | {gene.name: gene for gene in genes}
     remedy = "change vehicle.estimates in dataset.yaml"
     for name, value in vehicle.estimates.items():
@@ -362,7 +359,7 @@ def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
 
 
 def _sum(weights: Array, rows: Array) -> Array:
-    """Weighted sum of ``rows`` [rows, ...], always in the same order, so that it does not depend on the batch."""
+    """Weighted sum of ``rows`` [rows, ...], in a fixed order, so that it does not depend on the batch."""
     total = np.zeros(rows.shape[1:])
     for weight, row in zip(weights, rows, strict=True):
         if weight != 0.0:

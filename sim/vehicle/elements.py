@@ -1,7 +1,7 @@
 """The forces of all blade elements, instant by instant, by physical term (Armanini et al. 2016, Eqs. 1-15, 18-19).
 
-Nothing here depends on a coefficient: each term is computed for a coefficient of one, so that a force is a weighted sum
-of these rows. Instants are independent of each other, and eight of them fill a vector of the processor.
+Each term is computed for a coefficient of one, so that forces are weighted sums of these rows. Instants are independent
+of each other; eight of them are computed at a time, in the vector registers of the processor.
 """
 
 from __future__ import annotations
@@ -10,13 +10,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import Vector, load, load3, root, store3
-
-Array = npt.NDArray[np.float64]
 
 ROWS = ("inertial", "translation", "rotation", "added_mass", "viscous_0", "viscous_90", "wing_acceleration")
 CURVE_ROWS = ("lift_curve", "drag_curve")
@@ -36,18 +34,18 @@ CURVE_ROWS = ("lift_curve", "drag_curve")
     FORWARD,  # speed of the stream along body x, induced inflow included, m/s
     DOWNWARD,  # speed of the stream along this side's z at zero dihedral, m/s
 ) = range(14)
-STILL = 1e-30  # m^2/s^2, keeps a direction defined without flow
+STILL = 1e-30  # m^2/s^2, avoids division by zero without flow
 CHUNK = 80
 DEGREE = math.pi / 180
 
 
 class Side(NamedTuple):
-    """The stream as the wings of one side meet it, in axes mirrored at the body's plane for the upper side.
+    """The stream relative to the wings of one side, in axes mirrored at the body's plane for the upper side.
 
     Attributes:
         stream: sign of the stream along the chord.
-        printed: 1 where the whole of the stream normal to the wing shrinks with the dihedral, as printed (Eqs. 18-19);
-            0 where only what comes from below does: so no work is gained or lost between velocities and forces.
+        printed: 1 if the whole normal component of the stream is multiplied by the cosine of the dihedral, as printed
+            (Eqs. 18-19); 0 if only the part from below is, which is consistent with the forces' power.
         sign: of this side's z in body axes.
     """
 
@@ -57,10 +55,10 @@ class Side(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """What is the same for all elements.
+    """Constants of all elements.
 
-    Thickness b and width dr of an element (m), share of the twist at the pitch station that the first element has and
-    its step to the next, d of the added mass (chords).
+    Thickness b and width dr of an element (m), twist of the first element and its increment to the next as fractions of
+    that at the pitch station, d of the added mass (chords).
     """
 
     thickness: float
@@ -145,20 +143,12 @@ def _element_forces(
             drag = vz * vz * per_speed * 0.5
             x5 -= drag * ub
             z5 -= drag * wb
-            # what Eqs. 12-14 leave out of the wing's own inertia
+            # the part of the wing's inertia that Eqs. 12-14 omit
             x6 -= (ax * st + az * ct) * mw
             z6 -= (ax * ct - az * st) * mw
             ct, st = ct * step_ct - st * step_st, st * step_ct + ct * step_st
         projection = load(motion, PROJECTION, g) * (side.sign * dr)  # Eq. 15
-        for row, x, z in (
-            (0, x0, z0),
-            (1, x1, z1),
-            (2, x2, z2),
-            (3, x3, z3),
-            (4, x4, z4),
-            (5, x5, z5),
-            (6, x6, z6),
-        ):
+        for row, x, z in ((0, x0, z0), (1, x1, z1), (2, x2, z2), (3, x3, z3), (4, x4, z4), (5, x5, z5), (6, x6, z6)):
             store3(out, row, 0, g, load3(out, row, 0, g) + x * dr)
             store3(out, row, 1, g, load3(out, row, 1, g) + z * projection)
 
@@ -171,7 +161,7 @@ def curve_lift(alpha: float) -> float:
 
 @inlined
 def curve_drag(alpha: float) -> float:
-    """C_D of the same."""
+    """C_D of the same wing at ``alpha`` degrees."""
     return 1.92 - 1.55 * math.cos((2.04 * alpha - 9.82) * DEGREE)
 
 
@@ -222,14 +212,14 @@ def wing_forces(
 
     Args:
         motion: [B, 14, n / 8, 8], rows as named above.
-        side: how the stream comes.
+        side: the stream relative to this side.
         r: [E] distances from the flapping axis in equal steps, m.
         chord: [E], m.
         mass: [B, E] of the wing per length, kg/m.
         density: [B] of the air, kg/m^3.
-        loading: [B, E], what circulation is multiplied by.
+        loading: [B, E], factor on the circulation.
         constants: of all elements.
-        out: is added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
+        out: added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
     """
     for b in range(len(motion)):
         _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
@@ -239,7 +229,7 @@ def wing_forces(
 
 @allocating
 def synthesise(basis: Array, series: Array, out: Array) -> None:
-    """Sum Fourier series: ``out`` [B, T, A] from ``basis`` [K, T] and ``series`` [B, A, K], in one order for any B."""
+    """Sum Fourier series: ``out`` [B, T, A] from ``basis`` [K, T] and ``series`` [B, A, K], in one order for all B."""
     K, T = basis.shape
     total = np.empty(CHUNK)
     for start in range(0, T, CHUNK):
@@ -258,7 +248,7 @@ def synthesise(basis: Array, series: Array, out: Array) -> None:
 def synthesise_at(psi: Array, series: Array, out: Array) -> None:
     """The same of one individual at its own phases ``psi`` [T] (rad): ``out`` [T, A] from ``series`` [A, 2 K + 1].
 
-    Turned from harmonic to harmonic, since sines of all would cost more than the rest of a beat.
+    Sines and cosines by recurrence over the harmonics, which is much faster than computing each.
     """
     A, K = len(series), (series.shape[1] - 1) // 2
     dc, ds, c, s = np.empty((4, CHUNK))

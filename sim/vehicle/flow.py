@@ -1,4 +1,4 @@
-"""The wings of a batch at eight stations each: the flow that they meet and the forces that it makes on them."""
+"""The wings of a batch at eight stations each: relative flow and the resulting forces."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import FORWARD, Side
 from wingfit.sim.vehicle.stations import (
@@ -18,8 +18,6 @@ from wingfit.sim.vehicle.stations import (
     station_turns,
     station_velocities,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass
@@ -32,7 +30,7 @@ class Flow:
     Attributes:
         along, normal: velocity of the wing through the air along its chord and normal to it, m/s.
         speed: m/s, never zero.
-        circulation: m^2/s, of all but fling, which comes on top as it is; its force per length is
+        circulation: m^2/s, without that of fling, which is added later; its force per length is
             -rho Gamma (normal, -along).
     """
 
@@ -44,18 +42,18 @@ class Flow:
 
 @dataclass(frozen=True)
 class StationedWings:
-    """Wings of B individuals that move in a prescribed way, at n instants.
+    """Wings of B individuals with prescribed motion, at n instants.
 
     Attributes:
         places: the stations.
-        sides: motion [B, 14, n] of each side that is computed, and how the stream meets it.
-        turning: [B, n], rad/s: what stands for C_R theta_w' in Eq. 2 at the pitch station, of a wing by itself.
-        fling: [B, n], rad/s: the same of what wings that peel apart add to it (Eq. 7).
-        loading: [B, 8]: what circulation is multiplied by.
+        sides: motion [B, 14, n] of each side that is computed, and the stream relative to it.
+        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or what replaces it, at the pitch station of a single wing.
+        fling: [B, n], rad/s: the contribution of wings that peel apart (Eq. 7).
+        loading: [B, 8]: factor on the circulation.
         density: [B] of the air, kg/m^3.
         lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
         drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve.
-        alike: wings for each side that is computed.
+        alike: number of wings per computed side.
     """
 
     places: Stations
@@ -69,7 +67,7 @@ class StationedWings:
     alike: float
 
     def every(self, k: int) -> StationedWings:
-        """The same at every ``k``-th instant."""
+        """The same wings at every ``k``-th instant."""
         sides = tuple((rows[:, :, ::k].copy(), side) for rows, side in self.sides)
         return replace(self, sides=sides, turning=self.turning[:, ::k].copy(), fling=self.fling[:, ::k].copy())
 
@@ -82,7 +80,7 @@ class StationedWings:
 
     @cached_property
     def rotation(self) -> Array:
-        """Quasi-steady circulation [B, n, 8] that pitching makes, m^2/s: a part of that of the flow."""
+        """Quasi-steady circulation [B, n, 8] due to pitching, m^2/s; included in that of the flow."""
         return self._turned(self.turning)
 
     def flow(self, forward: Array) -> Flow:
@@ -95,7 +93,7 @@ class StationedWings:
         return flow
 
     def gust(self, flow: Flow, air: Array) -> None:
-        """Let the wings meet ``air`` [sides, B, n, 8] (m/s) that moves along their r zeta'; circulation follows."""
+        """Update ``flow`` and its circulation for ``air`` [sides, B, n, 8] that moves along r zeta' (m/s)."""
         for k, moved in enumerate(air):
             station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
         self._circulate(flow)

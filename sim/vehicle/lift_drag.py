@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, ArrayLike
 
 
-def lift_drag(forces: npt.ArrayLike, pitch: float) -> Array:
+def lift_drag(forces: ArrayLike, pitch: float) -> Array:
     """Lift and drag [..., 2] of ``forces`` (x, z) [..., 2] in body axes at body pitch ``pitch`` (rad), level flight.
 
     L = X sin theta_b - Z cos theta_b, D = -X cos theta_b - Z sin theta_b (Armanini et al. 2016, Eq. 16).

@@ -1,6 +1,6 @@
-"""The prescribed motion of the wings: flap angle and pitch with their derivatives, whether recorded or by formula.
+"""The prescribed motion of the wings, measured or by formula: flap angle and pitch with their derivatives.
 
-Every flap law is a Fourier series in the end, so that all derivatives belong to one and the same smooth motion.
+Every flap angle is converted to a Fourier series, so that its derivatives are consistent.
 """
 
 from __future__ import annotations
@@ -10,12 +10,9 @@ from dataclasses import dataclass
 from itertools import zip_longest
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Flap, FourierFlap, FourierPitch, Gene, PassivePitch, Pitch, SplitCycleFlap, WingMotion
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
+from wingfit.records.array_types import Array, Complex
 
 HARMONICS = 100  # of the split cycle, before its smoothing
 SPLITS = (-12.0, 2.5)  # rad per beat: the wings open for 17 to 83 % of it
@@ -40,7 +37,7 @@ class Angles:
     """Over one beat in n equal steps from t* = 0, for B individuals; derivatives by time in s.
 
     ``flap`` [B, 3, n] and ``pitch`` [B, 3, n] (at the pitch station) with their first two derivatives; ``peel`` [B, n]
-    is 1 while the wings peel apart and 0 after, ``peeled`` [n] the part of the chord that has come apart.
+    is 1 while the wings peel apart and 0 after, ``peeled`` [n] the fraction of the chord that has come apart.
     """
 
     flap: Array
@@ -50,7 +47,7 @@ class Angles:
 
 
 def motion_genes(motion: WingMotion) -> tuple[Gene, ...]:
-    """Parameters of a motion given by formula; a motion given as a series has none."""
+    """Genes of a motion given by formula; a motion given as a series has none."""
     laws = ((motion.flap, SplitCycleFlap, _FLAP_GENES), (motion.pitch, PassivePitch, _PITCH_GENES))
     return tuple(
         Gene(name, unit, getattr(law, field), getattr(law, field) - half, getattr(law, field) + half, "linear", text)
@@ -70,9 +67,8 @@ def angles(
 ) -> Angles:
     """Flap angle, pitch and peel over one beat of ``instants`` equal steps at ``frequency`` (Hz), for B individuals.
 
-    ``values`` are genes [B] of the motion; a gene not named keeps the motion's own value. ``peel_width`` in beats is
-    the time in which fling circulation gives way to rotational circulation; at 0 it switches within one step, as
-    printed (Eq. 7).
+    ``values`` are genes [B] of the motion; other parameters have the motion's own values. ``peel_width`` is the time,
+    in beats, in which rotational circulation replaces fling circulation; at 0 it is one step, as printed (Eq. 7).
     """
     count = max((len(v) for v in values.values()), default=1)
     series = flap_series(motion.flap, values, count, instants)
@@ -88,7 +84,7 @@ def angles_of(
     claps: bool,
     peel_width: float = 0.0,
 ) -> Angles:
-    """The same of wings whose flap angle is a ``series`` [B, K + 1], as :func:`flap_series` gives it."""
+    """As :func:`angles`, for a flap angle given as a ``series`` [B, K + 1] (see :func:`flap_series`)."""
     flap = _derivatives(series, frequency, instants, 3)
     pitch = _pitch(motion.pitch, values, flap, frequency, instants)
     t_star = np.arange(instants) / instants
@@ -96,7 +92,7 @@ def angles_of(
     if claps:
         peel = _peel(pitch[:, 1], t_star, max(peel_width, 1.0 / instants), motion.peel_end)
         peeled = np.minimum(t_star / motion.peel_end, 1.0)
-        peeled[0] = np.sqrt(0.5)  # the chord closes in an instant: the mean of the squares before and after
+        peeled[0] = np.sqrt(0.5)  # discontinuous at t* = 0: root of the mean square of 1 and 0
     return Angles(flap[:, :3], pitch, peel, peeled)
 
 
@@ -157,9 +153,9 @@ def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: fl
 def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Array:
     """1 while the wings peel, 0 after: t* >= 0 and theta_fling' = -theta_w' >= 0 (Eq. 7), ``pitch_rate`` being [B, n].
 
-    That is from the first instant at which the wing pitches so, which must come before t* = ``latest``, until it stops.
-    The end is a smooth step of ``width`` beats about the zero of the pitch rate, which is found between instants:
-    forces are smooth in the genes, and with some width in time as well.
+    It starts at the first instant with such a pitch rate, which must be before t* = ``latest``, and ends where the rate
+    changes sign. The end is a smooth step of ``width`` beats about that zero, which is interpolated between instants,
+    so that forces are smooth functions of the genes.
     """
     n, rows = len(t_star), np.arange(len(pitch_rate))
     fling = pitch_rate < 0
@@ -174,7 +170,7 @@ def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Arra
     weight[~ended.any(axis=1)] = 1.0
     weight[np.arange(n) < start[:, None]] = 0.0
     weight[~fling.any(axis=1) | (t_star[start] >= latest)] = 0.0
-    weight[:, 0] *= 0.5  # it starts in an instant
+    weight[:, 0] *= 0.5  # discontinuous at t* = 0: the mean of both sides
     return np.asarray(weight)
 
 
@@ -188,7 +184,7 @@ def _derivatives(series: Complex, frequency: float, instants: int, orders: int) 
     last = series.shape[1] - 1
     if 2 * last >= instants:
         raise ValueError(
-            f"a motion of {last} harmonics needs more than {instants} instants of a beat; it must be 2 K + 1"
+            f"a motion of {last} harmonics needs at least {2 * last + 1} instants per beat, got {instants}"
         )
     k = np.arange(last + 1)
     order = np.arange(orders + 1)[:, None]

@@ -1,19 +1,16 @@
-"""From a periodic beat to the samples of a recording, low-passed like it."""
+"""Samples of a recording from a periodic beat, with the recording's low-pass."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.filtering import gain, low_passed, sampling_rate
 
-Array = npt.NDArray[np.float64]
-Places = npt.NDArray[np.int64]
-
-_NEGLIGIBLE = 1e-9  # of the largest: harmonics below are left out
+_NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
 
 
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
@@ -29,8 +26,8 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
     return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
 
 
-def passing(recording: Recording, harmonics: int) -> Places:
-    """Places in such a series of the harmonics up to the last that the recording's low-pass lets through."""
+def passing(recording: Recording, harmonics: int) -> Index:
+    """Indices, in the series of :func:`series_of`, of the harmonics up to the last that the low-pass passes."""
     k = np.arange(harmonics + 1)
     if recording.low_pass:
         rate = sampling_rate(recording)
@@ -44,17 +41,17 @@ def phases(recording: Recording, times: Array) -> Array:
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
-def turns(places: Places, harmonics: int, recording: Recording) -> Array:
-    """Cosines, then sines [K, T] at ``places`` of a series, at the recording's instants."""
+def turns(places: Index, harmonics: int, recording: Recording) -> Array:
+    """Cosines, then sines [K, T] at the recording's instants, for the indices ``places`` of a series."""
     psi = phases(recording, recording.times)
     cosines, sines = places[places <= harmonics], places[places > harmonics] - harmonics
     return np.concatenate([np.cos(cosines[:, None] * psi), np.sin(sines[:, None] * psi)])
 
 
 def passed(added: Array, recording: Recording) -> Array:
-    """What a balance ``added`` [T, C] to a recording, after the recording's low-pass.
+    """Forces ``added`` [T, C] by the balance, after the recording's low-pass.
 
-    The low-pass leaves no value near the ends of a recording, where nothing is compared: there it stays as added.
+    Near the ends of a recording, where the low-pass gives no values and nothing is compared, they are unfiltered.
     """
     if recording.low_pass is None or not added.any():
         return added

@@ -1,32 +1,30 @@
-"""States of the air with their memory, in the periodic state of a prescribed beat."""
+"""Periodic solutions, over a prescribed beat, of the differential equations of the air's states."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import Vector, greatest, least, load0, load1, magnitude, root, store0, store1
 from wingfit.sim.vehicle.elements import STILL
 
-Array = npt.NDArray[np.float64]
-
-_SLOWEST = 1e-9  # least decay of a state in a step: in still air it keeps the mean of what it follows
-_ROUNDS = 60  # for the mean inflow without its correlation with the force
-_SWEEPS = 6  # for what the correlation changes
+_MIN_DECAY = 1e-9  # of a state in a step: in still air the state is the mean of its target
+_ROUNDS = 60  # iterations for the mean inflow, without its correlation with the force
+_SWEEPS = 6  # iterations with the correlation
 
 
 @inlined
 def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
-    """Decay of a state in a step, what it gains of what it follows before and after, the latter being linear in time.
+    """Decay of a state in a step, and the weights of its target before and after, which is linear in between.
 
-    ``before`` and ``after`` are its rate times half the step. The decay is the Pade approximant (1, 2) of exp(-a),
-    which errs by a^4 / 72 and never exceeds one; the gains are those for which a constant is followed exactly.
+    ``before`` and ``after`` are its rate times half the step. The decay is the Pade approximant (1, 2) of exp(-a), with
+    an error of a^4 / 72 and never above one; with these weights a constant target is followed exactly.
     """
-    a = greatest(before + after, _SLOWEST)
+    a = greatest(before + after, _MIN_DECAY)
     below = 1.0 / (a * (a * (1.0 / 6.0) + 2.0 / 3.0) + 1.0)
     decay = (1.0 - a * (1.0 / 3.0)) * below
     slope = (a * (1.0 / 6.0) + 1.0) * below  # (1 - decay) / a
@@ -37,10 +35,10 @@ def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
 def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
     """Periodic solution x of x' = share speed (target - x) over one beat.
 
-    One sweep from zero, then another from where the first shows that the beat closes on itself: there is no transient.
+    One sweep from zero, which gives the periodic start, then another from there.
 
     Args:
-        speed: [sides, B, n, 8], m/s; its mean at the ends of a step counts in the step.
+        speed: [sides, B, n, 8], m/s; the mean over the ends of a step is used in the step.
         share: [B, 8], 1/m, not negative.
         target: [sides, B, n, 8], linear over a step.
         step: s.
@@ -128,8 +126,8 @@ def steady_attachment(
 def separate(attached: Array, share: Array, rotation: Array, circulation: Array) -> None:
     """Multiply ``circulation`` [sides, B, n, 8] by 1 - share (1 - ((1 + sqrt X) / 2)^2), ``share`` [B].
 
-    What separation leaves of the lift where the flow is ``attached`` along the part X of the chord: Kirchhoff's law. It
-    is one of the angle of attack: the part of the circulation that is of ``rotation`` [B, n, 8] stays.
+    Kirchhoff's law for the lift of a flow that is ``attached`` on the fraction X of the chord. It concerns the angle of
+    attack, so the circulation of ``rotation`` [B, n, 8] is not reduced.
     """
     for k in range(len(attached)):
         for b in range(len(share)):
@@ -142,9 +140,10 @@ def separate(attached: Array, share: Array, rotation: Array, circulation: Array)
 
 @kernel
 def overtake(wing: Array, share: Array, wake: Array) -> None:
-    """Turn the velocity of the ``wake`` w into share (w - k u), which ``wing``, moving at u along the same line, meets.
+    """Replace the velocity ``wake`` w by share (w - k u), that relative to ``wing``, which moves at u on the same line.
 
-    k u is what the wing takes along: w between none and all of u. All [sides, B, n, 8] in m/s, ``share`` [B].
+    k u is the part of w that moves with the wing: w limited to the interval between 0 and u. All [sides, B, n, 8] in
+    m/s, ``share`` [B].
     """
     for k in range(len(wake)):
         for b in range(len(share)):
@@ -180,7 +179,7 @@ def settled_inflow(
         mean = 0.0
         for _ in range(_ROUNDS):
             through = flux[b] * math.hypot(stream[b, 0] + mean, stream[b, 1]) + s
-            # halfway between the last guess and the next: it swings about the answer otherwise
+            # halfway to the next iterate, since it would oscillate otherwise
             mean = 0.5 * (mean + f / (through + flux[b] * 1e-3))
         for _ in range(_SWEEPS):
             through = flux[b] * math.hypot(stream[b, 0] + mean, stream[b, 1])
@@ -189,7 +188,7 @@ def settled_inflow(
 
 @inlined
 def _settle(force: Array, slope: Array, through: float, inertia: float, out: Array) -> float:
-    """One periodic solution for a given mass flow, kg/s; its mean is returned."""
+    """Periodic solution ``out`` for a given mass flow, kg/s; returns its mean."""
     n, start, total = len(force), 0.0, 0.0
     for again in range(2):
         v, product, total = start, 1.0, 0.0

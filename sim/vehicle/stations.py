@@ -1,7 +1,7 @@
-"""The flow at a few stations along each wing over the beat, for effects that act on it, and the forces it makes.
+"""The flow at eight stations along each wing over the beat, for effects that act on it, and the resulting forces.
 
-Eight stations fill a vector of the processor, so that states which follow the flow are swept through the beat for all
-stations at once. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
+Eight stations fill a vector register of the processor, so that states which depend on the flow are integrated for all
+stations at the same time. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
 """
 
 from __future__ import annotations
@@ -10,42 +10,25 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Vehicle, WingMotion
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.vector import load0, load1, root, store1
-from wingfit.sim.vehicle.elements import (
-    COSINE,
-    DEGREE,
-    DIHEDRAL,
-    DOWNWARD,
-    FLAP_RATE,
-    FORWARD,
-    PROJECTION,
-    SINE,
-    STEP_COSINE,
-    STEP_SINE,
-    STILL,
-    Side,
-    curve_drag,
-    curve_lift,
-    velocities,
-)
-
-Array = npt.NDArray[np.float64]
+from wingfit.sim.vehicle import elements
+from wingfit.sim.vehicle.elements import DEGREE, STILL, Side, curve_drag, curve_lift, velocities
 
 
 class Stations(NamedTuple):
-    """Eight places at the middles of equal parts of the span.
+    """Eight stations at the middles of equal parts of the span.
 
     Attributes:
         r: [8] distances from the flapping axis, m.
         chord: [8], m.
-        weight: [8], m: what a value per length is multiplied by to integrate it along the span.
-        twist: [8] shares of the twist at the pitch station.
-        mass: [8] of the wing per length, as a part of its whole mass, 1/m.
+        weight: [8], m: quadrature weights along the span.
+        twist: [8] as fractions of that at the pitch station.
+        mass: [8] of the wing per length, as a fraction of its mass, 1/m.
     """
 
     r: Array
@@ -56,10 +39,10 @@ class Stations(NamedTuple):
 
 
 def _weights() -> Array:
-    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly, as near to equal as can be."""
+    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly; the most equal ones."""
     powers = _MIDDLES ** np.arange(4)[:, None]
-    lacking = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
-    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, lacking)
+    defect = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
+    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, defect)
 
 
 _MIDDLES: Array = (np.arange(LANES) + 0.5) / LANES
@@ -90,8 +73,8 @@ def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
     """Cosine and sine [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
-            c, s = motion[b, COSINE, t], motion[b, SINE, t]
-            dc, ds = motion[b, STEP_COSINE, t], motion[b, STEP_SINE, t]
+            c, s = motion[b, elements.COSINE, t], motion[b, elements.SINE, t]
+            dc, ds = motion[b, elements.STEP_COSINE, t], motion[b, elements.STEP_SINE, t]
             for e in range(cosine.shape[2]):
                 cosine[b, t, e], sine[b, t, e] = c, s
                 c, s = c * dc - s * ds, s * dc + c * ds
@@ -105,13 +88,13 @@ def station_velocities(
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             ct, st = load1(cosine[b], t), load1(sine[b], t)
-            lam, w = motion[b, DIHEDRAL, t], motion[b, DOWNWARD, t]
+            lam, w = motion[b, elements.DIHEDRAL, t], motion[b, elements.DOWNWARD, t]
             whole = lam * side.printed + (1.0 - side.printed)
             w *= lam * (1.0 - side.printed) + side.printed
             nothing = ct * 0.0
-            swing = load0(r) * motion[b, FLAP_RATE, t]
+            swing = load0(r) * motion[b, elements.FLAP_RATE, t]
             vx, vz = velocities(
-                ct, st, swing, nothing + motion[b, FORWARD, t], nothing + w, nothing + whole, side.stream
+                ct, st, swing, nothing + motion[b, elements.FORWARD, t], nothing + w, nothing + whole, side.stream
             )
             store1(along[b], t, vx)
             store1(normal[b], t, vz)
@@ -150,11 +133,11 @@ def station_circulation(
     Args:
         along: [B, n, 8], m/s.
         normal: [B, n, 8], m/s.
-        turning: [B, n], C_R theta_w' at the pitch station or what takes its place in Eq. 2, rad/s.
+        turning: [B, n], C_R theta_w' at the pitch station, or what replaces it in Eq. 2, rad/s.
         coefficient: [B, 2], C_l of the sine law and the factor on the measured curve.
-        twist: [8], shares of that turning.
+        twist: [8], fractions of that value.
         chord: [8], m.
-        loading: [B, 8], what circulation is multiplied by.
+        loading: [B, 8], factor on the circulation.
         speed: is set.
         circulation: is set.
     """
@@ -192,7 +175,8 @@ def station_forces(
 ) -> None:
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
-    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; else as above.
+    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; others as in the
+    functions above.
     """
     part = np.empty((2, LANES))
     curve = np.empty(LANES)
@@ -217,4 +201,4 @@ def station_forces(
                 x += part[0, e]
                 z += part[1, e]
             out[b, 0, t] += x
-            out[b, 1, t] += z * motion[b, PROJECTION, t] * side.sign
+            out[b, 1, t] += z * motion[b, elements.PROJECTION, t] * side.sign

@@ -1,4 +1,4 @@
-"""The physical terms of the quasi-steady force, each of which can be left out, and named models made of them."""
+"""The physical terms of the quasi-steady force, each of which can be omitted, and published models composed of them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SANE = "Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002)"
 
 @dataclass(frozen=True)
 class Term:
-    """One term: the genes that scale it, where it stands in print, and what it is."""
+    """One term: the genes that scale it, its equation and source, and a description."""
 
     name: str
     genes: tuple[Gene, ...]
@@ -27,81 +27,53 @@ def _coefficient(name: str, nominal: float, upper: float, text: str) -> Gene:
     return Gene(name, "1", nominal, 0.0, upper, "linear", text)
 
 
-# Nominal values are the initial guesses of Table 6; the one of C_Dpi2 cannot be read there, 2 is a flat plate's.
+# Nominal values are the initial guesses of Table 6. That of C_Dpi2 is illegible there; 2 is the value of a flat plate.
 TERMS = {
-    term.name: term
-    for term in (
-        Term(
-            "inertial",
+    name: Term(name, genes, equation, source, text)
+    for name, source, equation, text, genes in (
+        (
+            "inertial", ARMANINI, "Eqs. 12-14, the terms with theta_w'",
+            "wing mass and added mass in axes that rotate with the wing",
             (),
-            "Eqs. 12-14, the parts with theta_w'",
-            ARMANINI,
-            "wing and added mass carried round by the turning of the wing's axes",
-        ),
-        Term(
-            "translation",
+        ), (
+            "translation", ARMANINI, "Eqs. 2, 3, 8",
+            "circulation of a wing in translation, leading-edge vortex included",
             (_coefficient("C_l", 1.0, 5.0, "coefficient of lift, C_L = C_l sin 2 alpha (Eq. 3)"),),
-            "Eqs. 2, 3, 8",
-            ARMANINI,
-            "circulation of a wing that moves through the air, leading-edge vortex included",
-        ),
-        Term(
-            "rotation",
-            (_coefficient("C_r", 1.6, 8.0, "coefficient of rotational circulation, C_R = C_r (0.75 - x0) (Eq. 4)"),),
-            "Eqs. 2, 4, 8",
-            ARMANINI,
+        ), (
+            "rotation", ARMANINI, "Eqs. 2, 4, 8",
             "circulation of a wing that pitches (Kramer effect)",
-        ),
-        Term(
-            "clap_and_peel",
+            (_coefficient("C_r", 1.6, 8.0, "coefficient of rotational circulation, C_R = C_r (0.75 - x0) (Eq. 4)"),),
+        ), (
+            "clap_and_peel", ARMANINI, "Eq. 7",
+            "circulation of two wings that peel apart; replaces rotational circulation until they stop pitching",
             (_coefficient("C_F", 1.0, 5.0, "fling coefficient, of circulation while the wings peel (Eq. 7)"),),
-            "Eq. 7",
-            ARMANINI,
-            "circulation of two wings that peel apart, instead of rotational circulation, until they stop pitching",
-        ),
-        Term(
-            "added_mass",
-            (),
-            "Eqs. 9, 10",
-            ARMANINI,
-            "air accelerated with the wing",
-        ),
-        Term(
-            "effective_chord",
-            (),
-            "below Eqs. 10 and 19",
-            ARMANINI,
+        ), (
+            "added_mass", ARMANINI, "Eqs. 9, 10", "air accelerated with the wing", (),
+        ), (
+            "effective_chord", ARMANINI, "below Eqs. 10 and 19",
             "only the part of the chord that has come apart carries added mass",
-        ),
-        Term(
-            "viscous",
+            (),
+        ), (
+            "viscous", ARMANINI, "Eq. 11", "friction and pressure drag of the plate",
             (
                 _coefficient("C_D0", 0.0, 1.0, "drag coefficient at zero angle of attack (Eq. 11)"),
                 _coefficient("C_Dpi2", 2.0, 5.0, "drag coefficient at 90 degrees angle of attack (Eq. 11)"),
             ),
-            "Eq. 11",
-            ARMANINI,
-            "friction and pressure drag of the plate",
-        ),
-        Term(
-            "wing_acceleration",
+        ), (
+            "wing_acceleration", ARMANINI, "derived: the acceleration that Eqs. 12-14 omit from the wing's inertia",
+            "with this term, the mean force of the wing's own mass over a beat is zero",
             (),
-            "the acceleration that Eqs. 12-14 leave out of the wing's inertia; derived",
-            ARMANINI,
-            "with it, the wing's own mass gives no force on average over a beat, as it must",
-        ),
-        Term(
-            "steady_curves",
+        ), (
+            "steady_curves", DICKINSON,
+            "C_L = 0.225 + 1.58 sin(2.13 alpha - 7.20), C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82), degrees",
+            "lift and drag measured on a revolving model wing, in place of translation and viscous",
             (
                 _coefficient("K_l", 1.0, 5.0, "factor on the lift measured on a revolving wing"),
                 _coefficient("K_d", 1.0, 5.0, "factor on the drag measured on a revolving wing"),
             ),
-            "C_L = 0.225 + 1.58 sin(2.13 alpha - 7.20), C_D = 1.92 - 1.55 cos(2.04 alpha - 9.82), degrees",
-            DICKINSON,
-            "lift and drag of a revolving model wing, instead of translation and viscous",
         ),
     )
-}
+}  # fmt: skip
 SEARCHED = ("C_l", "C_r", "C_F", "K_l", "K_d")
 
 
@@ -116,28 +88,21 @@ class Preset:
 
 
 PRESETS = {
-    preset.name: preset
-    for preset in (
-        Preset(
-            "proposed",
+    name: Preset(name, terms, source, text)
+    for name, source, terms, text in (
+        (
+            "proposed", ARMANINI,
             ("inertial", "translation", "rotation", "clap_and_peel", "added_mass", "effective_chord", "viscous"),
-            ARMANINI,
             "with clap-and-peel",
-        ),
-        Preset(
-            "berman_wang",
-            ("inertial", "translation", "rotation", "added_mass", "viscous"),
-            BERMAN,
+        ), (
+            "berman_wang", BERMAN, ("inertial", "translation", "rotation", "added_mass", "viscous"),
             "single wings that do not meet; the baseline of Armanini et al. (2016)",
-        ),
-        Preset(
-            "dickinson",
-            ("steady_curves", "rotation", "added_mass"),
-            f"{DICKINSON}; {SANE}",
+        ), (
+            "dickinson", f"{DICKINSON}; {SANE}", ("steady_curves", "rotation", "added_mass"),
             "measured steady curves, rotational circulation and added mass (Table 2 of Armanini et al.)",
         ),
     )
-}
+}  # fmt: skip
 
 
 def chosen(preset: str, without: tuple[str, ...] = ()) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 """A virtual wind-tunnel balance: force recordings of a DelFly-like vehicle whose coefficients are known.
 
 Vehicle, conditions and coefficients are those of Armanini, Caetano, de Croon, de Visser and Mulder (2016), Tables 3-5
-and 8. Their measured forces are not public; these are what their model says, with the faults of a real balance added.
+and 8. Their measured forces are not public; these are predictions of their model with the errors of a real balance
+added.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
 
 from wingfit.records import (
@@ -27,22 +27,21 @@ from wingfit.records import (
     WingMotion,
     save_dataset,
 )
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 
-Array = npt.NDArray[np.float64]
-
-AIR = (101_325.0, 293.15)  # Pa, K: of the tunnel; the source does not say
+AIR = (101_325.0, 293.15)  # Pa, K: assumed for the tunnel
 DRAG = {"C_D0": 0.0, "C_Dpi2": 2.0}
-"""Drag coefficients, which the source fixes: 0 at zero angle (Table 6); that at 90 degrees cannot be read there, and is
-taken as a flat plate's, 2. It hardly acts on X, to which the coefficients are fitted."""
-LEAD_IN = 4  # beats before the recording begins and after it ends, in which filters settle
-ELEMENTS, INSTANTS = 80, 1600  # the truth is computed more finely than a calibration computes
+"""Fixed drag coefficients: 0 at zero angle of attack (Table 6), and 2 at 90 degrees, the value of a flat plate, since
+Table 6 is illegible there. It hardly affects X, to which the coefficients are fitted."""
+LEAD_IN = 4  # beats before and after the recording, in which transients of the filters decay
+ELEMENTS, INSTANTS = 80, 1600  # finer than in a calibration
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One condition of the source's Table 4, the coefficients found there (Table 8), and the vehicle's mass (kg)."""
+    """One condition of Table 4, the coefficients estimated for it (Table 8), and the vehicle's mass (kg)."""
 
     name: str
     condition: Condition
@@ -69,12 +68,12 @@ _TABLES = (
     (2.00, 31, 10.3, 2.02, 1.57, 0.67),
 )
 TRIALS = tuple(_trial(k + 1, row) for k, row in enumerate(_TABLES))
-HELD_OUT = ("test-3", "test-7")  # of the example: one amid the others, one off them
+HELD_OUT = ("test-3", "test-7")  # of the example: an interpolation and an extrapolation
 
 
 @dataclass(frozen=True)
 class Balance:
-    """How forces are recorded, and what a balance does to them. Noise is per force axis.
+    """How forces are recorded, and the errors of the balance. Noise is per force axis.
 
     Attributes:
         rate: samples per second, Hz; the source's (3.2.2).
@@ -116,11 +115,11 @@ EXAMPLE = Balance(every=10, beats=28, decimals=4)
 
 
 def delfly() -> Vehicle:
-    """The source's vehicle (Table 3) with the wing motion of Table 5 and Eqs. 17, 20, 21.
+    """The vehicle of Armanini et al. (2016, Table 3) with the wing motion of Table 5 and Eqs. 17, 20, 21.
 
-    Root and tip chord as printed; the chord half-way out makes the surface of a pair of wings the 2.11 dm^2 of Table 3.
-    ``root_pitch`` is pi/2, a chord along the body: with the zero that is printed, the lift at 2 m/s is a third of the
-    vehicle's weight.
+    Root and tip chord as printed; the chord at half span is chosen so that a pair of wings has the area of Table 3,
+    2.11 dm^2. ``root_pitch`` is pi/2 (chord along the body): with the printed 0, the lift at 2 m/s is a third of the
+    weight.
     """
     stations = (ChordStation(0.0, 0.085), ChordStation(0.0685, 0.0835), ChordStation(0.137, 0.056))
     return Vehicle(
@@ -168,7 +167,7 @@ def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator
     forces = np.stack([np.interp(phase, grid, force, period=1.0) for force in beat.T], axis=1)
     forces = forces * (1.0 + balance.scatter * _by_beat(at, balance.memory, rng)[:, None])
     measured = np.stack([_measured(force, k, balance, rng) for k, force in enumerate(forces.T)], axis=1)
-    kept = _thinned(measured, balance.every)[lead : lead + samples : balance.every]
+    kept = _decimation_filtered(measured, balance.every)[lead : lead + samples : balance.every]
     return Recording(
         name=trial.name,
         rig="wind_tunnel",
@@ -182,10 +181,7 @@ def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator
 
 
 def campaign(
-    seed: int = 1,
-    balance: Balance | None = None,
-    trials: Sequence[Trial] = TRIALS,
-    held_out: tuple[str, ...] = (),
+    seed: int = 1, balance: Balance | None = None, trials: Sequence[Trial] = TRIALS, held_out: tuple[str, ...] = ()
 ) -> Dataset:
     """Record ``trials`` on the balance; the same seed gives the same noise."""
     vehicle = delfly()
@@ -198,16 +194,16 @@ def campaign(
 
 
 def write_campaign(path: Path, seed: int = 1, balance: Balance = EXAMPLE) -> Path:
-    """Write the small campaign to ``path`` (folder, .zip or .nc) and the truth beside it; returns the truth's path."""
+    """Write the small campaign to ``path`` (folder, .zip or .nc); returns the path of the true coefficients."""
     save_dataset(campaign(seed, balance, held_out=HELD_OUT), path)
-    beside = path.with_name(path.stem + ".truth.json")
+    truth_path = path.with_name(path.stem + ".truth.json")
     truth = {trial.name: DRAG | trial.coefficients for trial in TRIALS}
-    beside.write_text(json.dumps({"seed": seed, "coefficients": truth}, indent=2) + "\n", encoding="utf-8")
-    return beside
+    truth_path.write_text(json.dumps({"seed": seed, "coefficients": truth}, indent=2) + "\n", encoding="utf-8")
+    return truth_path
 
 
 def read_truth(path: Path) -> dict[str, dict[str, float]]:
-    """Coefficients by recording that :func:`write_campaign` left beside a dataset."""
+    """True coefficients by recording, which :func:`write_campaign` wrote next to a dataset."""
     truth: dict[str, dict[str, float]] = json.loads(path.read_text(encoding="utf-8"))["coefficients"]
     return truth
 
@@ -222,16 +218,16 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generator) -> Array:
-    """What the transducer makes of a force [T] along an axis: resonance, drift and white noise added."""
+    """The measured force [T] along an axis: the true one with resonance, drift and white noise."""
     b, a = _resonator(balance.resonance[axis], balance.damping, balance.rate)
-    felt = lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
+    spring_force = lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
     rattle = lfilter(b, a, rng.standard_normal(len(force)))
     rattle *= balance.rattle / max(float(rattle.std()), 1e-300)
     slow = math.exp(-1 / (balance.rate * balance.drift_time))
     start = [slow * rng.standard_normal()]  # stationary from the beginning
     drift, _ = lfilter([math.sqrt(1 - slow**2)], [1.0, -slow], rng.standard_normal(len(force)), zi=start)
     white = balance.sensor * rng.standard_normal(len(force))
-    return np.asarray(force + balance.participation * (felt - force) + rattle + balance.drift * drift + white)
+    return np.asarray(force + balance.participation * (spring_force - force) + rattle + balance.drift * drift + white)
 
 
 def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Array]:
@@ -241,8 +237,8 @@ def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Ar
     return np.asarray(b), np.asarray(a)
 
 
-def _thinned(forces: Array, every: int) -> Array:
-    """Anti-aliasing filter without phase for keeping every so many samples; ``forces`` [T, C]."""
+def _decimation_filtered(forces: Array, every: int) -> Array:
+    """Zero-phase anti-aliasing filter of ``forces`` [T, C] for decimation by ``every``."""
     if every == 1:
         return forces
     return np.asarray(sosfiltfilt(butter(6, 0.8 / every, output="sos"), forces, axis=0))

@@ -1,8 +1,9 @@
-"""The virtual rig: the thesis's experiment (Appendix A) on a simulated wing, written as a dataset.
+"""The virtual rig: the experiment of the thesis (Appendix A) on a simulated wing, written as a dataset.
 
-Strobed frames a little faster than the flapping, each from another beat; markers lost for good, gaps within the beat;
-tracking noise that is coloured because the tracker's Kalman filter remembers. The trigger of the cameras is unknown to
-whoever reads the dataset: the beat must be placed from the tracks.
+The cameras take stroboscopic frames at slightly more than a multiple of the flap frequency, so that each frame is from
+another phase; some markers are missing throughout, others for some frames; the noise is coloured by the tracker's
+Kalman filter. The trigger of the cameras is not part of the dataset, so the start of the beat must be determined from
+tracks.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import (
     Condition,
@@ -30,14 +30,13 @@ from wingfit.records import (
     Wing,
     save_dataset,
 )
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import Rig
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
-Array = npt.NDArray[np.float64]
-
-# How the true wing is simulated: far better than a calibration asks for, periodic to 2 micrometres.
+# Settings for the true wing: far more accurate than in a calibration, periodic to 2 micrometres.
 REFERENCE = Numerics(steps=480, max_beats=60, periodic=2e-6)
 FRAMES_PER_BEAT = 30
 LOST_MARKERS = 9
@@ -67,7 +66,7 @@ class Tracking:
     Attributes:
         noise: standard deviation along x, y, z, m (stereo depth is the worst).
         memory: correlation of the noise from frame to frame.
-        gap_rate: probability per frame that a marker is lost for a while.
+        gap_rate: probability per frame that a gap of a marker starts.
         gap_frames: mean length of such a gap.
         beats: apparent beats recorded.
     """
@@ -92,7 +91,7 @@ def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
 VACUUM = tuple(vacuum(p, lag, f) for p in (1000.0, 100.0, 10.0) for lag in _LAGS for f in _FREQUENCIES)
 WIND_TUNNEL = tuple(tunnel(lag, f, v) for lag in _LAGS for f in _FREQUENCIES for v in _SPEEDS)
 
-# The small campaign: (condition, held out). The held-out ones change frequency, lag, pressure or speed.
+# The small campaign: (condition, held out). The held-out ones differ in frequency, lag, pressure or speed.
 SMALL: tuple[tuple[Condition, bool], ...] = (
     (vacuum(10.0, _LAGS[0], 2.0), False),
     (vacuum(10.0, _LAGS[1], 3.0), False),
@@ -151,7 +150,7 @@ def true_genome(model: FlexibleWing, seed: int) -> Genome:
 
 
 def read_truth(path: Path) -> Genome:
-    """The true genome that :func:`write_campaign` left beside a dataset."""
+    """The true genome that :func:`write_campaign` wrote next to a dataset."""
     values: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))["genome"]
     return Genome.nominal(FlexibleWing(robird_wing()).genes).replace(values)
 
@@ -176,7 +175,7 @@ def name_of(condition: Condition) -> str:
 def record(
     model: FlexibleWing, genome: Genome, condition: Condition, tracking: Tracking, rng: np.random.Generator
 ) -> Recording:
-    """Film the wing of ``genome`` under ``condition``."""
+    """Record tracks of the wing of ``genome`` under ``condition``."""
     blank = blank_recording(model.wing, condition)
     beat = model.beat(genome.values, blank)
     if beat.reason:
@@ -189,14 +188,14 @@ def record(
     tracks = np.round(tracks + _noise(tracks.shape, tracking, rng), 5)
     tracks[_gaps(tracks.shape[:2], tracking, rng)] = np.nan
     names = [m.name for m in model.wing.markers]
-    kept = np.sort(rng.permutation(len(names))[: len(names) - LOST_MARKERS])
+    visible = np.sort(rng.permutation(len(names))[: len(names) - LOST_MARKERS])
     return Recording(
         name_of(condition),
         blank.rig,
         condition,
         np.round(times, 7),
-        tuple(names[k] for k in kept),
-        tracks[:, kept].reshape(frames, -1),
+        tuple(names[k] for k in visible),
+        tracks[:, visible].reshape(frames, -1),
     )
 
 
@@ -220,7 +219,7 @@ def _noise(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator)
     return np.asarray(noise * per_marker * np.array(tracking.noise))
 
 
-def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> npt.NDArray[np.bool_]:
+def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> Mask:
     """True where a marker is hidden: bursts of geometrically distributed length."""
     lost = np.zeros(shape, bool)
     for t, m in zip(*np.nonzero(rng.uniform(size=shape) < tracking.gap_rate), strict=True):
@@ -244,7 +243,7 @@ def campaign(
     tracking: Tracking | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Dataset, Genome]:
-    """Record a campaign; the true genome comes beside it. ``small`` is ten recordings, else all 72 of the thesis."""
+    """Record a campaign; returns it with the true genome. ``small``: ten recordings, else all 72 of the thesis."""
     model = FlexibleWing(robird_wing(), division, numerics=REFERENCE)
     truth = true_genome(model, seed)
     plan, recordings, held_out = list(_plan(small)), [], []
@@ -267,11 +266,11 @@ def write_campaign(
     seed: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Write a campaign to ``path`` (folder, .zip or .nc) and the truth beside it; returns the truth's path."""
+    """Write a campaign to ``path`` (folder, .zip or .nc); returns the path of the true genome next to it."""
     dataset, truth = campaign(division=division, small=small, seed=seed, progress=progress)
     save_dataset(dataset, path)
-    beside = path.with_name(path.stem + ".truth.json")
-    beside.write_text(
+    truth_path = path.with_name(path.stem + ".truth.json")
+    truth_path.write_text(
         json.dumps({"division": division, "seed": seed, "genome": truth.as_dict()}, indent=2) + "\n", encoding="utf-8"
     )
-    return beside
+    return truth_path

@@ -1,8 +1,8 @@
 """The start of the beat: where the reference markers cross the horizontal on the upstroke (thesis IV-A), interpolated.
 
-Tracks are compared at equal phase of the beat, so the crossing must be known far better than one frame: at the tip a
-phase error of 0.01 rad is millimetres. Heights are reduced to a few harmonics of the beat, averaged over the reference
-markers, and the crossing is found in that series; recording and simulation go through the same reduction.
+Tracks are compared at equal phase of the beat, so the crossing must be known to a fraction of a frame: at the tip, a
+phase error of 0.01 rad is millimetres. A Fourier series of a few harmonics is fitted to the heights of the reference
+markers and averaged; its crossing is the start of the beat, in recordings and in simulations alike.
 """
 
 from __future__ import annotations
@@ -10,24 +10,21 @@ from __future__ import annotations
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording, Wing
+from wingfit.records.array_types import Array, Complex
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 REFERENCE_HARMONICS = 4
 _NEWTON_STEPS = 30
-_CROSSINGS = WeakKeyDictionary[Recording, dict[tuple[tuple[str, ...], float], float]]()
-"""Of recordings, by what of a wing they depend on: every evaluation asks."""
+_CACHE = WeakKeyDictionary[Recording, dict[tuple[tuple[str, ...], float], float]]()
+"""Cached crossings of recordings, by the attributes of the wing on which they depend."""
 
 
 def reference_columns(wing: Wing, recording: Recording) -> list[int]:
-    """Columns (markers of the recording) of the reference markers with enough samples to place the beat.
+    """Indices of those reference markers of the recording that have enough samples to determine the start of the beat.
 
-    Of a recording without any data, all.
+    All reference markers for a recording without data. ValueError if there are none.
     """
     needed = 2 * (2 * REFERENCE_HARMONICS + 1) if recording.valid.any() else 0
     found = [
@@ -39,7 +36,7 @@ def reference_columns(wing: Wing, recording: Recording) -> list[int]:
     if not found:
         raise ValueError(
             f"recording {recording.name!r}: none of the reference markers ({', '.join(wing.reference_markers)}) has at "
-            f"least {needed} tracked frames, so the start of the beat cannot be placed; name other reference_markers"
+            f"least {needed} tracked frames, so the start of the beat is unknown; name other reference_markers"
         )
     return found
 
@@ -48,9 +45,9 @@ def reference_columns(wing: Wing, recording: Recording) -> list[int]:
 def recorded_crossing(wing: Wing, recording: Recording) -> float:
     """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke.
 
-    A recording without any data, made to see what it would show, begins there.
+    0 for a recording without data, which is made to simulate a condition.
     """
-    known, key = _CROSSINGS.setdefault(recording, {}), (wing.reference_markers, wing.hinge.z)
+    known, key = _CACHE.setdefault(recording, {}), (wing.reference_markers, wing.hinge.z)
     if key not in known:
         known[key] = _crossing(wing, recording) if recording.valid.any() else 0.0
     return known[key]

@@ -1,4 +1,4 @@
-"""How a wing is cut into rigid bodies: strips along the span, each into bodies along the chord (thesis Fig. 7)."""
+"""Discretisation of a wing: strips along the span, divided into rigid bodies along the chord (thesis Fig. 7)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MAX_STRIPS, MAX_CHORDWISE, MAX_BODIES = 64, 16, 128
 
 @dataclass(frozen=True)
 class Division:
-    """Bodies along the chord in each strip, root first."""
+    """A discretisation: number of bodies along the chord in each strip, root first."""
 
     bodies: tuple[int, ...]
 
@@ -33,7 +33,7 @@ class Division:
         good = good and sum(counts) <= MAX_BODIES
         if not good:
             raise ValueError(
-                f"division {text!r} is not understood; give a preset ({', '.join(PRESETS)}), strips x bodies along the "
+                f"division {text!r} is not valid; give a preset ({', '.join(PRESETS)}), strips x bodies along the "
                 f"chord such as 6x4, or bodies per strip from the root such as 3,3,3,2 "
                 f"(2 to {MAX_STRIPS} strips of 1 to {MAX_CHORDWISE} bodies, at most {MAX_BODIES} bodies in all)"
             )
@@ -45,5 +45,5 @@ class Division:
         return sum(self.bodies)
 
     def index(self, strip: int, chordwise: int) -> int:
-        """Number of a body: strips from the root, in each from the leading edge."""
+        """Index of a body: strips from the root, within a strip from the leading edge."""
         return sum(self.bodies[:strip]) + chordwise

@@ -1,4 +1,4 @@
-"""Flap angle of the driving rods over the beat, with its first three derivatives."""
+"""Flap angle of the driving rods over the beat, with its derivatives."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Drive, FourBarDrive, FourierDrive
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, ArrayLike, Complex
 
 _SAMPLES = 512
 _HARMONICS = 40
@@ -20,14 +18,14 @@ _HARMONICS = 40
 class RodDrive:
     """Flap angles of the front and the rear rod for W individuals, as series of the drive phase.
 
-    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi); the rear rod's lag is in it.
+    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi), with the lag of the rear rod included.
     """
 
-    series: npt.NDArray[np.complex128]
+    series: Complex
 
     @classmethod
     def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
-        """The drive of a wing, its rear rod ``lag`` (rad) late, the same for all ``lanes``."""
+        """The drive of a wing whose rear rod lags by ``lag`` (rad); the same for all ``lanes``."""
         own = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
         k = max(len(own.cosine), len(own.sine))
         series = np.array([own.mean, *(_padded(own.cosine, k) - 1j * _padded(own.sine, k))], np.complex128)
@@ -35,14 +33,14 @@ class RodDrive:
         return cls(np.repeat(both[:, :, None], lanes, axis=2))
 
     def lengthened(self, harmonics: int) -> None:
-        """Make room for ``harmonics`` of the flap frequency."""
-        lacking = max(harmonics + 1 - len(self.series), 0)
-        self.series = np.concatenate([self.series, np.zeros((lacking, *self.series.shape[1:]))])
+        """Extend the series with zeros to at least ``harmonics`` harmonics."""
+        added = max(harmonics + 1 - len(self.series), 0)
+        self.series = np.concatenate([self.series, np.zeros((added, *self.series.shape[1:]))])
 
     def angles(self, psi: Array) -> Array:
         """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad).
 
-        One individual at a time, and those that are driven alike once: nobody's numbers depend on his neighbours.
+        Each distinct series is evaluated once and separately, so that results do not depend on the other individuals.
         """
         phases = np.asarray(psi, float).tobytes()
         lanes = [self.series[:, :, w].tobytes() for w in range(self.series.shape[2])]
@@ -52,12 +50,12 @@ class RodDrive:
 
 @lru_cache(maxsize=64)
 def _angles(phases: bytes, both: bytes) -> Array:
-    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Remembered: a batch asks for few, many times."""
+    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Cached, since batches use few of them."""
     series = np.frombuffer(both, np.complex128).reshape(-1, 2)
     turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
     derived = (series[:, :, None] * order.T[:, None]).reshape(len(series), -1)
-    # sums and not matrix products, whose threads would cost more than they do
+    # not matrix products, for which starting the threads takes longer than the sums
     found = np.einsum("tk,kc->tc", turn.real, derived.real) - np.einsum("tk,kc->tc", turn.imag, derived.imag)
     angles = np.asarray(found.reshape(len(turn), 2, 5))
     angles.setflags(write=False)
@@ -65,36 +63,30 @@ def _angles(phases: bytes, both: bytes) -> Array:
 
 
 @lru_cache(maxsize=4)
-def _turns(phases: bytes, terms: int) -> npt.NDArray[np.complex128]:
+def _turns(phases: bytes, terms: int) -> Complex:
     """exp(i k psi) [T, terms]."""
     return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
 
 
-def flap_angle(drive: Drive, psi: npt.ArrayLike) -> Array:
+def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
     """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
-    phase = np.asarray(psi, float)
-    series = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
-    k = np.arange(1, max(len(series.cosine), len(series.sine)) + 1)
-    a, b = _padded(series.cosine, len(k)), _padded(series.sine, len(k))
-    c, s = np.cos(phase[..., None] * k), np.sin(phase[..., None] * k)
-    angle = series.mean + c @ a + s @ b
-    first = c @ (k * b) - s @ (k * a)
-    second = -(c @ (k**2 * a) + s @ (k**2 * b))
-    third = s @ (k**3 * a) - c @ (k**3 * b)
-    return np.stack([angle, first, second, third], axis=-1)
+    series = RodDrive.of(drive, 0.0, 1).series[:, 0, 0]
+    order = 1j * np.arange(len(series))
+    wave = series * np.exp(order * np.asarray(psi, float)[..., None])
+    return np.stack([(order**d * wave).sum(axis=-1).real for d in range(4)], axis=-1)
 
 
-def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:
+def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
     """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
 
-    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is where the circles of the coupler
-    about the crank pin and of the rocker about its pivot meet, on the side that the open linkage keeps.
+    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is an intersection of the
+    circles of the coupler about the crank pin and of the rocker about its pivot, that of the open linkage.
     """
     phase = np.asarray(psi, float)
     px, py = linkage.crank * np.cos(phase), linkage.crank * np.sin(phase)
     dx, dy = px - linkage.ground, py
     diagonal2 = dx**2 + dy**2
-    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # the crank stays on the far side of the rocker's pivot
+    along = np.mod(np.arctan2(dy, dx), 2 * np.pi)  # continuous, since the crank stays on one side of the rocker's pivot
     cosine = (linkage.rocker**2 + diagonal2 - linkage.coupler**2) / (2 * linkage.rocker * np.sqrt(diagonal2))
     if np.any(np.abs(cosine) > 1):
         raise ValueError(
@@ -106,7 +98,7 @@ def four_bar_angle(linkage: FourBarDrive, psi: npt.ArrayLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _four_bar_series(linkage: FourBarDrive) -> FourierDrive:
-    """The rocker angle as a Fourier series, exact to round-off for the linkages at hand (coefficients fall fast)."""
+    """The rocker angle as a Fourier series, exact to round-off for usual linkages (coefficients decrease fast)."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     angle = four_bar_angle(linkage, psi)
     coefficients = np.fft.rfft(angle) / _SAMPLES

@@ -1,4 +1,4 @@
-"""The flexible wing as a model: genomes in, marker tracks out, sampled and aligned like a recording."""
+"""The flexible wing as a model: from genomes to marker tracks, sampled and aligned like a recording."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition, Gene, Recording, Wing
+from wingfit.records.array_types import Array, ArrayLike, Complex, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects.apply import apply, observed
 from wingfit.sim.effects.contract import Effect
@@ -30,32 +30,30 @@ from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import FACTOR, lanes, wing_genes
 from wingfit.sim.wing.structure import Structure, build
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Places = npt.NDArray[np.intp]
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-LARGEST_SHIFT = 0.05  # rad, about 3 degrees of the beat
+MAX_SHIFT = 0.05  # rad, about 3 degrees of the beat
 _DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near")
-_MOST_SETTLED = 256
-# Individuals that others begin beside, by wing and condition: models that differ in their effects alone share them.
-_SETTLED: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
-_MOST_BEATS = 64
-# Beats of wings without effects: what cameras make of one and the same is tried over and over.
+_MAX_STARTS = 256
+# Solutions used as warm starts, by wing and condition; shared by models that differ only in their effects.
+_STARTS: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
+_MAX_BEATS = 64
+# Beats of wings without effects on the wing, which are reused when only effects of the cameras differ.
 _BEATS: OrderedDict[tuple[bytes, Condition, bytes], Beat] = OrderedDict()
-_GRID = 96  # instants of a beat that effects of the observation see
-_HARMONICS = 30  # of the periodic tracks that are kept; the rest is below the integrator's error
+_GRID = 96  # instants of a beat at which effects of the observation act
+_HARMONICS = 30  # of the periodic tracks; higher ones are below the integrator's error
 
 
 @dataclass(frozen=True)
 class FlexibleWing:
     """Multi-body wing driven by two rods (thesis III) for markers seen by cameras.
 
-    ``division`` as :meth:`wingfit.sim.wing.division.Division.parse` reads it; genes are bounded by ``bounds_factor``
-    around the wing's estimates. ``effects`` are names of :data:`wingfit.sim.effects.registry.EFFECTS` whose genes are
-    appended. ``probe`` is a known load that acts besides; its genes follow theirs. ``near``, values of the wing's own
-    genes, says where individuals will be: their search for the periodic motion begins at that of this genome.
+    ``division`` is the discretisation, as text for :meth:`wingfit.sim.wing.division.Division.parse`; genes are bounded
+    by ``bounds_factor`` around the wing's estimates. ``effects`` are names of
+    :data:`wingfit.sim.effects.registry.EFFECTS`; their genes are appended, then those of ``probe``, a known load.
+    ``near`` are values of the wing's own genes: the periodic motion of that genome is the warm start for all
+    individuals.
     """
 
     wing: Wing
@@ -70,7 +68,7 @@ class FlexibleWing:
         chosen(self.effects, self.wing)
 
     def __getstate__(self) -> dict[str, object]:
-        """Pickle the definition only; whatever was built from it is built again."""
+        """Pickle the definition only; everything else is derived from it."""
         return {name: self.__dict__[name] for name in _DEFINITION}
 
     @cached_property
@@ -81,22 +79,22 @@ class FlexibleWing:
 
     @cached_property
     def chosen(self) -> tuple[Effect, ...]:
-        """The effects, in the order in which they act."""
+        """The effects in the order in which they act, that of the probe included."""
         known = self.probe.effects() if self.probe else ()
         return (*chosen(self.effects, self.wing), *known)
 
     def with_effects(self, *names: str) -> FlexibleWing:
         """The same wing with more effects; their genes are appended, switched off."""
-        return self._cut_alike(replace(self, effects=(*self.effects, *names)))
+        return self._share_structure(replace(self, effects=(*self.effects, *names)))
 
-    def beside(self, genome: npt.ArrayLike) -> FlexibleWing:
-        """The same wing, which begins its search for a periodic motion at that of ``genome`` [G], without effects."""
+    def beside(self, genome: ArrayLike) -> FlexibleWing:
+        """The same wing with the periodic motion of ``genome`` [G], without effects, as warm start."""
         own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
-        return self._cut_alike(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
+        return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
 
-    def _cut_alike(self, other: FlexibleWing) -> FlexibleWing:
-        """``other``, of the same wing and division, with the bodies that were cut already."""
-        for name in ("structure", "_immersed"):
+    def _share_structure(self, other: FlexibleWing) -> FlexibleWing:
+        """``other``, which has the same wing and division, with the structures that have been built already."""
+        for name in ("structure", "_structure_in_air"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
         return other
@@ -112,14 +110,14 @@ class FlexibleWing:
         return build(self.wing, Division.parse(self.division))
 
     @cached_property
-    def _immersed(self) -> Structure:
-        """The same, with room in the matrix for air that the bodies of a strip move together."""
+    def _structure_in_air(self) -> Structure:
+        """The same with matrix blocks between all bodies of a strip, for the added mass that they share."""
         return build(self.wing, Division.parse(self.division), whole_strips=True)
 
     def subject(self, effects: tuple[Effect, ...], condition: Condition) -> Subject:
-        """What is simulated where some of the effects are on."""
+        """The subject of a simulation with these effects on."""
         moves_air = any(effect.port == "inertia" and effect.family == "aerodynamics" for effect in effects)
-        structure = self._immersed if moves_air else self.structure
+        structure = self._structure_in_air if moves_air else self.structure
 
         def scene(genomes: Array) -> WingScene:
             found = WingScene.of(structure, condition, lanes(structure, self.genes, genomes))
@@ -132,66 +130,66 @@ class FlexibleWing:
         return Subject(structure, condition, scene)
 
     def switched_on(self, genome: Array) -> tuple[Effect, ...]:
-        """The effects on the wing itself that are on in ``genome`` [G]."""
+        """The effects on the wing itself, not on the observation, that are on in ``genome`` [G]."""
         return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
 
     @one_blas_thread
-    def beats(self, genomes: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
+    def beats(self, genomes: ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
         """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
 
-        Individuals with the same effects on are simulated together: one that is off costs nothing and changes nothing.
-        Those whose wings are the same, whatever the cameras make of them, are simulated once and share a beat.
+        Individuals with the same effects on are simulated together; effects that are off are omitted. Individuals that
+        differ only in effects of the observation share one beat.
         """
         beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion)
         return tuple(beats[k] for k in wing)
 
-    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Places]:
-        """A beat of each wing that is unlike the others, and which of them [B] an individual is."""
+    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
+        """A beat of each distinct wing, and the index of the wing of each individual [B]."""
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings = batch[first]
-        alike: dict[tuple[str, ...], list[int]] = {}
+        groups: dict[tuple[str, ...], list[int]] = {}
         for k, one in enumerate(wings):
-            alike.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
+            groups.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
         found: dict[int, Beat] = {}
         keys = (
-            {k: self._key(wings[k], recording.condition) for k in alike.get((), ())}
+            {k: self._key(wings[k], recording.condition) for k in groups.get((), ())}
             if self.near and not with_motion
             else {}
         )
         found.update({k: _BEATS[key] for k, key in keys.items() if key in _BEATS})
-        for rows in ([k for k in rows if k not in found] for rows in alike.values()):
+        for rows in ([k for k in rows if k not in found] for rows in groups.values()):
             if not rows:
                 continue
             subject = self.subject(self.switched_on(wings[rows[0]]), recording.condition)
-            near = self._settled_near(recording.condition) if self.near else None
+            near = self._start_near(recording.condition) if self.near else None
             beats = periodic_beats(subject, wings[rows], self.numerics, with_motion=with_motion, near=near)
             found.update(zip(rows, beats, strict=True))
         for k, key in keys.items():
-            _remember(_BEATS, key, found[k], _MOST_BEATS)
+            _remember(_BEATS, key, found[k], _MAX_BEATS)
         return [found[k] for k in range(len(wings))], wing
 
     def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
         own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
-        return self._bare_key, condition, genome[:own].tobytes()
+        return self._plain_key, condition, genome[:own].tobytes()
 
-    def _settled_near(self, condition: Condition) -> Course | None:
-        """The individual ``near`` under ``condition``, settled; None where it fails."""
-        bare, key = self._bare, (self._bare_key, condition)
-        if key not in _SETTLED:
-            found = settled_course(bare.subject((), condition), np.array(self.near), self.numerics)
-            _remember(_SETTLED, key, found, _MOST_SETTLED)
-        return _SETTLED[key]
-
-    @cached_property
-    def _bare(self) -> FlexibleWing:
-        return self._cut_alike(replace(self, effects=(), probe=None))
+    def _start_near(self, condition: Condition) -> Course | None:
+        """The solution for ``near`` under ``condition``; None if it fails."""
+        wing, key = self._plain_wing, (self._plain_key, condition)
+        if key not in _STARTS:
+            found = settled_course(wing.subject((), condition), np.array(self.near), self.numerics)
+            _remember(_STARTS, key, found, _MAX_STARTS)
+        return _STARTS[key]
 
     @cached_property
-    def _bare_key(self) -> bytes:
-        return pickle.dumps(self._bare, 5)
+    def _plain_wing(self) -> FlexibleWing:
+        return self._share_structure(replace(self, effects=(), probe=None))
+
+    @cached_property
+    def _plain_key(self) -> bytes:
+        return pickle.dumps(self._plain_wing, 5)
 
     def _acting(self, batch: Array, effects: Sequence[Effect]) -> Array:
-        """``batch`` [B, G] with zeros for genes that change nothing: of other effects, and of those that are off."""
+        """``batch`` [B, G] with zeros for genes of other effects and of effects that are off."""
         own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
         plain = np.zeros_like(batch)
         plain[:, :own] = batch[:, :own]
@@ -203,43 +201,43 @@ class FlexibleWing:
                 plain[on, column] = batch[on, column]
         return plain
 
-    def beat(self, genome: npt.ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
-        """The same for a single genome [G]."""
+    def beat(self, genome: ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
+        """As :meth:`beats`, for a single genome [G]."""
         (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
         return found
 
     @one_blas_thread
-    def observe(self, genomes: npt.ArrayLike, recording: Recording) -> Observation:
+    def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
         """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
 
-        Beats are aligned by the upstroke crossing; what tracking noise leaves of a phase error is then fitted, the
-        trigger of the cameras being unknown (docs/decisions/0001).
+        Beats are aligned by the upstroke crossing. Tracking noise makes a small error of that phase, which is then
+        fitted, since the trigger of the cameras is unknown (docs/decisions/0001).
         """
         whole = genome_batch(self.genes, genomes)
         first, same = _distinct(self._acting(whole, self.chosen))
         batch = whole[first]
         beats, wing = self._beats(batch, recording, with_motion=False)
-        series, times, added = self._seen(batch, recording, beats, wing)
+        series, times, added = self._observed(batch, recording, beats, wing)
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
-        shift = (times - recording.times).mean(axis=1, keepdims=True)  # of the clock: alignment takes it, however large
+        shift = (times - recording.times).mean(axis=1, keepdims=True)  # mean clock error, which alignment removes
         angles = 2 * np.pi * recording.condition.flap_frequency * (times - shift)
         since = angles - recorded_crossing(self.wing, recording)
         reasons = [
             beats[k].reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
             for k, phase in zip(wing, own, strict=True)
         ]
-        channels = _laid_over(series, since, own, recording.values)
+        channels = _aligned_values(series, since, own, recording.values)
         channels += added
         solutions = [Solution(len(beats[k].tracks), beats[k].beats, beats[k].error) for k in wing]
         return Observation(channels[same], tuple(reasons[k] for k in same), tuple(solutions[k] for k in same))
 
-    def _seen(
-        self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Places
+    def _observed(
+        self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Index
     ) -> tuple[Complex, Array, Array]:
-        """What the cameras make of the beats: series [B, K + 1, C], instants [B, T] (s), what is added [B, T, C].
+        """Observation of the beats by the cameras: series [B, K + 1, C], instants [B, T] (s), added errors [B, T, C].
 
-        ``wing`` [B] says which of the ``beats`` an individual has.
+        ``wing`` [B] are the indices of the individuals' ``beats``.
         """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
@@ -261,35 +259,34 @@ class FlexibleWing:
         return series, times, added
 
 
-def _distinct(rows: Array) -> tuple[Places, Places]:
-    """Numbers of the first of each kind of row, and for every row which kind it is; alike is equal bit for bit."""
+def _distinct(rows: Array) -> tuple[Index, Index]:
+    """Indices of the distinct rows, and for every row the position of its equal among them; compared bit for bit."""
     first = dict[bytes, int]()
     kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]
     return np.unique(kinds, return_index=True)[1], np.array(kinds, np.intp)
 
 
 def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int) -> None:
-    """Keep ``value``, and forget what was kept longest ago beyond ``most``."""
+    """Store ``value``, and remove the oldest values beyond ``most``."""
     known[key] = value
     while len(known) > most:
         known.popitem(last=False)
 
 
 def _on_grid(tracks: Array) -> Array:
-    """Periodic tracks [n, M, 3] at _GRID equal steps, by the harmonics that are kept."""
+    """Periodic tracks [n, M, 3] at _GRID equal steps, from their first _HARMONICS harmonics."""
     series = _series(tracks.reshape(len(tracks), -1))
     series[1:] *= 0.5
     return np.asarray(np.fft.irfft(series * _GRID, _GRID, axis=0)).reshape(_GRID, *tracks.shape[1:])
 
 
-def _laid_over(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
+def _aligned_values(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
     """Values [B, T, C] of ``series`` [B, K + 1, C] at phases ``since`` [B, T] plus ``own`` [B].
 
-    Each individual's phases are moved together to where they fit ``recorded`` [T, C] best: least squares in the common
-    phase by Gauss-Newton; one step is exact to second order in a shift that noise makes about a thousandth of a radian.
-    A shift beyond LARGEST_SHIFT is a misfit and not noise, and is left to be seen.
+    A common phase shift of each individual is fitted to ``recorded`` [T, C] by two Gauss-Newton steps; noise makes a
+    shift of about a thousandth of a radian. It is limited to MAX_SHIFT, so that a larger one remains visible as misfit.
 
-    A common phase turns the series, and the frames' own sines and cosines stay: most individuals share them.
+    The shift is applied to the series, so that the sines and cosines of the frames can be shared by individuals.
     """
     weight = np.isfinite(recorded).astype(float)
     target = np.where(np.isfinite(recorded), recorded, 0.0)
@@ -303,7 +300,7 @@ def _laid_over(series: Complex, since: Array, own: Array, recorded: Array) -> Ar
 
 
 def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Array:
-    """Values [T, C] of one ``series`` [K + 1, C], moved to where it fits ``target`` [T, C] under a ``weight`` [T, C].
+    """Values [T, C] of one ``series`` [K + 1, C], shifted in phase to fit ``target`` [T, C] with ``weight`` [T, C].
 
     ``waves`` [T, 2 (K + 1)]: cosines, then sines, of the frames' phases.
     """
@@ -312,25 +309,25 @@ def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Arra
         slope = weight * (waves @ _parts(order * series))
         power = float((slope * slope).sum())
         shift = -float((slope * (waves @ _parts(series) - target)).sum()) / power if power > 0 else 0.0
-        series = _turned(series, np.clip(shift, -LARGEST_SHIFT, LARGEST_SHIFT))
+        series = _turned(series, np.clip(shift, -MAX_SHIFT, MAX_SHIFT))
     return waves @ _parts(series)
 
 
 def _turned(series: Complex, phase: float) -> Complex:
-    """The series [K + 1, C] of what is ``phase`` (rad) ahead."""
+    """The ``series`` [K + 1, C] shifted ahead by ``phase`` (rad)."""
     return np.asarray(series * np.exp(1j * np.arange(len(series)) * phase)[:, None])
 
 
 def _parts(series: Complex) -> Array:
-    """What cosines, then sines, are multiplied by [2 (K + 1), C]: Re s exp(i x) = Re s cos x - Im s sin x."""
+    """Coefficients [2 (K + 1), C] of cosines, then sines: Re s exp(i x) = Re s cos x - Im s sin x."""
     return np.concatenate([series.real, -series.imag])
 
 
 def _series(samples: Array) -> Complex:
     """Fourier series [_HARMONICS + 1, C] of periodic samples [n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
     n = len(samples)
-    kept = min(_HARMONICS, (n - 1) // 2) + 1
+    used = min(_HARMONICS, (n - 1) // 2) + 1
     series = np.zeros((_HARMONICS + 1, samples.shape[1]), np.complex128)
-    series[:kept] = np.fft.rfft(samples, axis=0)[:kept] / n
+    series[:used] = np.fft.rfft(samples, axis=0)[:used] / n
     series[1:] *= 2
     return series

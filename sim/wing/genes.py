@@ -1,4 +1,4 @@
-"""The genes of the flexible wing (thesis Eqs. 18 and 19) and what they set in the lanes of the kernel."""
+"""The genes of the flexible wing (thesis Eqs. 18 and 19) and the inputs of the kernel that follow from them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,18 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import EstimateError, Gene
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes, Laws
 from wingfit.sim.kernels.lanes.memory import aligned
 from wingfit.sim.wing.structure import QUARTERS, Structure, spring_constants
 
-Array = npt.NDArray[np.float64]
 Group = Literal["structure", "aerodynamics"]
 
-UNIT_SLIP = 1e4  # an estimate further than this from the typical value is taken for a wrong unit
-FACTOR = 5.0  # the thesis's box: a fifth to five times the estimate (IV-E)
+UNIT_SLIP = 1e4  # ratio of an estimate to the typical value beyond which its unit must be wrong
+FACTOR = 5.0  # bounds of the thesis: a fifth to five times the estimate (IV-E)
 
 # name, unit, default estimate, description
 _STRUCTURE = (
@@ -26,8 +25,8 @@ _STRUCTURE = (
     ("E_r", "Pa", 1.2e11, "Young's modulus of the carbon rods with their glue"),
     ("G_f", "Pa", 2.2e6, "shear modulus of the foam with its skin"),
     ("G_r", "Pa", 3.0e9, "shear modulus of the carbon rods with their glue"),
-    ("D_E", "Pa s", 6.0e4, "damping that goes with Young's modulus of the foam"),
-    ("D_G", "Pa s", 2.5e4, "damping that goes with the shear modulus of the foam"),
+    ("D_E", "Pa s", 6.0e4, "damping associated with Young's modulus of the foam"),
+    ("D_G", "Pa s", 2.5e4, "damping associated with the shear modulus of the foam"),
 )
 _AERODYNAMICS = (
     ("L_a", "1/rad", 4.0, "slope of the lift coefficient with angle of attack"),
@@ -118,10 +117,10 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
 
 
 def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
-    """Share [N, W] of the strip's force on each body, and where along the chord [N, W] it acts in the body's frame.
+    """Share [N, W] of the strip's force on each body, and its point of action along the chord [N, W] in the body frame.
 
-    The shares belong to the quarters of the chord, whatever the division: a body takes what its stretch of chord
-    covers, at the centroid of what it takes.
+    Shares are given for the quarters of the chord, for any discretisation: a body bears the part that it covers, at the
+    centroid of that part.
     """
     share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
     for body, quarter, width, x in structure.stretches:

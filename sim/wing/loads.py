@@ -1,4 +1,4 @@
-"""Loads of a wing under a condition, solved well enough for loads (``wingfit.sim.wing.outputs`` says what they are)."""
+"""Loads of a wing under a condition, from a simulation that is accurate enough for loads."""
 
 from __future__ import annotations
 
@@ -6,31 +6,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.solver.numerics import LADDER
 from wingfit.sim.solver.simulate import Beat
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, reference_columns, upstroke_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-from wingfit.sim.wing.outputs import Outputs, from_motion
-
-Array = npt.NDArray[np.float64]
+from wingfit.sim.wing.load_recovery import from_motion
+from wingfit.sim.wing.outputs import Outputs
 
 LOAD_ACCURACY = 1e-5  # m, of the tracks that loads are computed from
-CLOSING = 0.01  # of what enters: in near vacuum that is a thousandth of what swings to and fro
+CLOSING = 0.01  # largest error of the energy balance, relative to the energy supplied in a beat
 
 
 @one_blas_thread
 def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
-    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason when that fails.
+    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason if that fails.
 
-    The steps are raised until the balance of the beat closes to CLOSING, unless somebody has chosen them.
+    The number of steps is raised until the energy balance of the beat closes to CLOSING, unless it was given.
     """
     beat = _fine(model).beat(genome, recording, with_motion=True)
-    if beat.reason is not None:  # what cannot be had that well can perhaps be had as well as tracks
+    if beat.reason is not None:  # perhaps with the accuracy that tracks need
         beat = model.beat(genome, recording, with_motion=True)
     if beat.reason is not None:
         raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
@@ -56,10 +55,10 @@ def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording,
 
 
 def _fine(model: FlexibleWing) -> FlexibleWing:
-    """The model solved to LOAD_ACCURACY or better, unless somebody has chosen the steps.
+    """The model with LOAD_ACCURACY or better, unless the steps are given.
 
-    Loads are differences of stiff springs' ends, and losses are small beside what swings to and fro: they need more
-    than tracks that are a tenth of a millimetre right.
+    Loads are small displacements times large stiffnesses, and losses are small compared to the energy exchanged in a
+    beat: both need a higher accuracy than tracks.
     """
     if model.numerics.steps is not None:
         return model
@@ -70,8 +69,7 @@ def _fine(model: FlexibleWing) -> FlexibleWing:
 def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
     """Drive phase (beats) of the upstroke crossing of ``tracks`` [n, M, 3]; 0 where there is none.
 
-    By the markers that place the recording, so that both phases agree; by all reference markers where nothing was
-    recorded.
+    From the same markers as for the recording, so that both phases agree; from all reference markers without data.
     """
     names = [marker.name for marker in model.wing.markers]
     try:

@@ -1,4 +1,4 @@
-"""Geometry and mass of the wing and of the panels it is cut into."""
+"""Geometry and mass properties of the wing and of its panels."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Marker, Wing
+from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.sections import round_area
-
-Array = npt.NDArray[np.float64]
 
 _CELLS = 24  # quadrature cells along each side of a panel: mass and inertia to about 1e-4
 _ROD_CELLS = 2000
@@ -50,15 +48,15 @@ class Planform:
         self._chord = np.array([s.chord for s in wing.stations])
         self._thickness = np.array([s.thickness for s in wing.stations])
 
-    def leading_edge(self, y: npt.ArrayLike) -> Array:
+    def leading_edge(self, y: ArrayLike) -> Array:
         """x of the leading edge at span position y, m."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._le))
 
-    def chord(self, y: npt.ArrayLike) -> Array:
+    def chord(self, y: ArrayLike) -> Array:
         """Chord at span position y, m."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._chord))
 
-    def thickness(self, y: npt.ArrayLike) -> Array:
+    def thickness(self, y: ArrayLike) -> Array:
         """Thickness at span position y, m."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._thickness))
 
@@ -84,8 +82,8 @@ class Planform:
         return np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
 
 
-def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> npt.NDArray[np.int64]:
-    """Numbers of the panels under many points; edges belong to the outer and rear neighbour."""
+def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> Index:
+    """Indices of the panels that contain the points (``x``, ``y``) [N]; edges belong to the outer and rear panel."""
     edges = np.unique([panel.y0 for panel in panels])
     strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(edges) - 1)
     first = np.searchsorted([panel.y0 for panel in panels], edges)
@@ -137,7 +135,7 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
     inertia = np.eye(3) * (masses @ (r**2).sum(axis=1)) - (r * masses[:, None]).T @ r
     # thickness: foam through it, skin half on each face
     through = float((foam * h**2 / 12 + skin * h**2 / 4).sum())
-    # extent of the cells themselves in the plane
+    # the cells' own moments of inertia in the plane
     deep, wide = np.repeat(chord, _CELLS) * (panel.s1 - panel.s0) / _CELLS, (panel.y1 - panel.y0) / _CELLS
     along_x, along_y = float((foam + skin) @ deep**2) / 12, float((foam + skin).sum()) * wide**2 / 12
     inertia += np.diag([through + along_y, through + along_x, along_x + along_y])
@@ -145,7 +143,7 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
     return Body(total, centre, inertia, area, cell @ points / area)
 
 
-def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> npt.NDArray[np.int64]:
-    """Which body carries each marker."""
+def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> Index:
+    """Indices of the bodies that carry the markers."""
     places = np.array([marker.position for marker in markers])
     return carriers(planform, panels, places[:, 0], places[:, 1])

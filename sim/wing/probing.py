@@ -1,13 +1,13 @@
-"""What a flexible wing answers to known loads, and how it moves where they act: what a missing load is found by."""
+"""Responses of a flexible wing to known loads, and its motion where they act; used to estimate missing loads."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
+from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.sim.atmosphere import density
 from wingfit.sim.effects.probe import Probe, strip_middles
 from wingfit.sim.kernels.arrays import State
@@ -16,27 +16,25 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.loads import crossing
 from wingfit.sim.wing.structure import Structure
 
-Array = npt.NDArray[np.float64]
-
-MOVES = 2e-3  # of the span: how far a load should move the marker that it moves most
-FAR = 4.0  # times that, or a part of it as small, which is still taken
-CLOSE = 2e-3  # of that: how near to the periodic motion
+MOVES = 2e-3  # spans: intended largest displacement of a marker by a load
+TOLERANCE = 4.0  # ratio to that, either way, up to which a displacement is accepted
+CLOSE = 2e-3  # of that displacement: distance to the periodic motion
 _MOST_BEATS = 60
-_PART_OF_WEIGHT = 0.5  # of the wing: a load to begin with
+_INITIAL_LOAD = 0.5  # weights of the wing
 _GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
 class StationMotion:
-    """How the wing moves at J stations of the span over N instants of a beat, from its start on.
+    """Motion of the wing at J stations of the span at N instants of a beat, from its start.
 
     Attributes:
-        stations: [J] parts of the span.
-        phase: [N] beats from the start of the beat, as recordings are placed.
+        stations: [J] fractions of the span.
+        phase: [N] beats from the start of the beat, as in recordings.
         velocity: [J, N] of the wing through the air along its normal (upward), m/s.
         forward: [J, N] of the wing through the air along its chord, from trailing to leading edge, m/s.
         acceleration: [J, N] along the normal, m/s^2.
-        deflection: [J, N] along the normal, from where the rods would carry a rigid wing, m.
+        deflection: [J, N] along the normal, relative to a rigid wing on the rods, m.
         pitch_rate: [J, N] nose up, rad/s.
         chord: [J] m.
         mass: [J] of the wing per metre of span, kg/m.
@@ -61,7 +59,7 @@ class StationMotion:
 
 @dataclass(frozen=True)
 class Probed:
-    """``responses`` [T, C, P] of a recording to the P unit loads of a probe, m per N/m or N; NaN where one fails.
+    """``responses`` [T, C, P] of a recording to the P unit loads of a probe, m per N/m or N; NaN if a simulation fails.
 
     ``crossing``: drive phase (beats) at which the recorded beat starts; ``motion`` at the stations of the probe.
     """
@@ -71,13 +69,11 @@ class Probed:
     motion: StationMotion
 
 
-def probed(
-    model: FlexibleWing, genome: npt.ArrayLike, recording: Recording, probe: Probe, instants: int = 72
-) -> Probed:
-    """Responses and motion about ``genome`` [G]; ValueError with the reason where that cannot be simulated.
+def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: Probe, instants: int = 72) -> Probed:
+    """Responses and motion about ``genome`` [G]; ValueError with the reason if that cannot be simulated.
 
-    One-sided differences, all with the steps of the wing without loads, so that the integrator's errors cancel. A load
-    that moves the wing far more or less than MOVES is tried once more in proportion.
+    One-sided differences, with the same steps as for the wing without loads, so that the integrator's errors cancel. A
+    load that moves the wing far more or less than MOVES is scaled and simulated again.
     """
     base = genome_batch(model.genes, genome)
     near = model.beside(base[0])
@@ -94,9 +90,9 @@ def probed(
         change, reasons = _changes(probing, base[0], recording, tried, sizes[tried])
         good = np.array([reason is None for reason in reasons])
         found[tried[good]] = change[good] / sizes[tried[good], None, None]
-        moved = np.where(good, np.abs(change).max(axis=(1, 2)), FAR**2 * aim)
-        off = (moved > FAR * aim) | (moved < aim / FAR)
-        sizes[tried] *= aim / np.maximum(moved, aim / FAR**4)
+        moved = np.where(good, np.abs(change).max(axis=(1, 2)), TOLERANCE**2 * aim)
+        off = (moved > TOLERANCE * aim) | (moved < aim / TOLERANCE)
+        sizes[tried] *= aim / np.maximum(moved, aim / TOLERANCE**4)
         tried = tried[off]
         if not len(tried):
             break
@@ -110,12 +106,12 @@ def _span(model: FlexibleWing) -> float:
 
 
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
-    """Loads [stations], or twice as many, to begin with, N/m and N: a part of the wing's weight. Turns of rods, deg.
+    """Initial loads: forces [stations] (N/m), then moments (N) if the probe has any, and rotations of the rods (deg).
 
-    More where forces have little lever; moments as of forces at a quarter of the chord.
+    Forces are larger near the root, where their lever is small; moments are those of a force times the chord.
     """
     weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
-    forces = _PART_OF_WEIGHT * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1)
+    forces = _INITIAL_LOAD * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1)
     edges = model.structure.planform.strips(model.structure.division)
     chord = float(np.mean(model.structure.planform.chord(edges)))
     turning = np.full(len(forces), forces.min() * chord)
@@ -124,9 +120,9 @@ def _sizes(model: FlexibleWing, probe: Probe) -> Array:
 
 
 def _changes(
-    model: FlexibleWing, genome: Array, recording: Recording, which: npt.NDArray[np.int64], sizes: Array
+    model: FlexibleWing, genome: Array, recording: Recording, which: Index, sizes: Array
 ) -> tuple[Array, tuple[str | None, ...]]:
-    """What loads of ``sizes`` [B] change in the channels [B, T, C], and why one failed."""
+    """Changes [B, T, C] of the channels by loads of ``sizes`` [B], and the reasons of failures."""
     batch = np.zeros((len(which) + 1, len(model.genes)))
     batch[:, : len(genome)] = genome
     batch[np.arange(1, len(batch)), len(genome) + which] = sizes
@@ -141,7 +137,7 @@ def station_motion(
 ) -> StationMotion:
     """The motion of a beat at ``stations`` and at equal steps from drive phase ``start`` (beats) on.
 
-    A station moves as the strips on both sides of it do, in proportion; beyond the last middle of a strip likewise.
+    The motion is interpolated linearly between the middles of the strips, and extrapolated beyond the last.
     """
     structure, condition = model.structure, recording.condition
     a, frequency = condition.angle_of_attack, condition.flap_frequency
@@ -182,7 +178,7 @@ def station_motion(
 
 
 def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, Array, Array]:
-    """Place, normal, chord direction [n, S, 3] and pitch rate [n, S] of each strip, and where rigid rods carry it."""
+    """Position, normal, chord direction [n, S, 3], pitch rate [n, S] and position on a rigid wing, of each strip."""
     w, count = structure.wiring, len(structure.bodies)
     starts = w.strip_start[:-1]
     R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
@@ -205,7 +201,7 @@ def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, A
 
 
 def _between(middles: Array, stations: Array) -> Array:
-    """Weights [J, S] of strips whose middles are on both sides of each station."""
+    """Weights [J, S] of the strips for interpolation at the stations."""
     inner = np.clip(np.searchsorted(middles, stations) - 1, 0, len(middles) - 2)
     part = (stations - middles[inner]) / (middles[inner + 1] - middles[inner])
     weights = np.zeros((len(stations), len(middles)))
@@ -215,7 +211,7 @@ def _between(middles: Array, stations: Array) -> Array:
 
 
 def _derivative(series: Array, frequency: float) -> Array:
-    """By time, of periodic values [n, ...] over a beat."""
+    """Time derivative of periodic values [n, ...] over a beat."""
     n = len(series)
     order = 2j * np.pi * frequency * np.arange(n // 2 + 1)
     order[n // 2 :] *= n % 2  # the highest of an even number has no derivative

@@ -1,4 +1,4 @@
-"""From a wing and a division to bodies, connectors and the matrix structure: everything that no gene changes."""
+"""Bodies, connectors and sparsity pattern of a wing for a discretisation: all that does not depend on genes."""
 
 from __future__ import annotations
 
@@ -7,24 +7,22 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Rod, Wing
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.arrays import Wiring
 from wingfit.sim.solver.elimination import eliminate
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.planform import Body, Panel, Planform, bodies, marker_carriers
 from wingfit.sim.wing.sections import Rectangle, round_area, round_second_moment
 
-Array = npt.NDArray[np.float64]
-
 # Rows of Connector.foam and .rods: rotation about x, y, z, then translation along x, y, z, each a rigidity per modulus.
-# Which foam modulus governs each row, for a connection along the span (y) and along the chord (x): thesis Eqs. 15-17.
+# The foam modulus of each row, for connections along the span (y) and along the chord (x): thesis Eqs. 15-17.
 YOUNG, SHEAR = 0, 1
 SPANWISE_MODULUS = (YOUNG, SHEAR, YOUNG, SHEAR, YOUNG, SHEAR)
 CHORDWISE_MODULUS = (SHEAR, YOUNG, YOUNG, YOUNG, SHEAR, SHEAR)
-QUARTERS = 4  # of the chord, to which shares of lift and induced drag belong
-_DRIVEN_GAP = 0.02  # m between the root and the start of a driven rod, at most
+QUARTERS = 4  # number of parts of the chord with their own shares of lift and induced drag
+_DRIVEN_GAP = 0.02  # m, largest distance between the root and the start of a driven rod
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class Connector:
 
     ``foam`` [6] and ``rods`` [S, 6] are second moments (m^4) and areas (m^2) divided by the distance between the
     bodies' centroids; times the modulus named by ``modulus`` they are stiffnesses (thesis Eqs. 15-16 over a length).
-    ``parts`` [S] are the parts of that distance, from its inner end, over which ``rods`` lie beside the foam.
+    ``parts`` [S] are consecutive fractions of that distance, from its inner end, each with its own ``rods``.
     """
 
     first: int
@@ -48,14 +46,13 @@ class Connector:
 def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array) -> Array:
     """Stiffness [C, 6, W] in N m/rad and N/m, from Young's and the shear modulus [2, W] of foam and of rods (Pa).
 
-    Thesis Eqs. 15-16 over each part of the distance, and the parts one after the other: all bear the same moment, so
-    that it is their compliances that add. Adding stiffnesses by length would treat a rod ten times as stiff as the foam
-    as if it nearly closed the gap beyond its end: of first order, where this is of second (docs/beams.md).
+    Thesis Eqs. 15-16 for each part of the distance. The parts are in series: their compliances add. A mean stiffness
+    would overestimate a rod that ends between the bodies and converge with the first order only (docs/beams.md).
     """
     beside = np.array([c.foam for c in connectors])[:, :, None] * foam[np.array([c.modulus for c in connectors])]
     modulus = np.repeat(rod, 3, axis=0)
     compliance = np.zeros_like(beside)
-    with np.errstate(divide="ignore"):  # where neither foam nor rod is, there is no spring
+    with np.errstate(divide="ignore"):  # without foam and rod there is no spring
         for k in range(len(connectors[0].parts)):
             part = np.array([c.parts[k] for c in connectors])[:, None, None]
             stiffness = beside + np.array([c.rods[k] for c in connectors])[:, :, None] * modulus
@@ -65,7 +62,7 @@ def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array)
 
 @dataclass(frozen=True)
 class Structure:
-    """A wing cut into bodies. ``position``: number of the matrix's block for two bodies that it joins."""
+    """A discretised wing. ``position``: number of the matrix block for a pair of bodies."""
 
     wing: Wing
     division: Division
@@ -78,9 +75,9 @@ class Structure:
 
     @cached_property
     def stretches(self) -> tuple[tuple[int, int, float, float], ...]:
-        """Which bodies lie under which quarters of the chord.
+        """Overlaps of bodies and quarters of the chord.
 
-        Each as body, quarter, part of the chord that they share, and x (m) of its middle in the body's frame.
+        Each as body, quarter, overlap as a fraction of the chord, and x (m) of its middle in the body's frame.
         """
         edges = np.linspace(0, 1, QUARTERS + 1).tolist()
         return tuple(
@@ -92,9 +89,9 @@ class Structure:
 
 
 def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Structure:
-    """Cut ``wing``; ValueError when a driven rod does not reach the root.
+    """Discretise ``wing``; ValueError if a driven rod does not reach the root.
 
-    With ``whole_strips`` the matrix joins all bodies of a strip, as the air that they move together does.
+    With ``whole_strips`` the matrix has blocks for all pairs of bodies of a strip, which added mass couples.
     """
     planform = Planform(wing)
     panels = planform.panels(division)
@@ -109,17 +106,16 @@ def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Stru
 
 
 def _twisting(planform: Planform, y: float) -> float:
-    """Torsion constant per width (m^3) of the whole chord at ``y``: cuts make no new edges."""
+    """Torsion constant per width (m^3) of the whole chord at ``y``, independent of its discretisation."""
     chord = float(planform.chord(y))
     return Rectangle(chord, float(planform.thickness(y))).torsion / chord
 
 
 def _spanwise_share(count: int) -> float:
-    """Part of the torsion constant that spanwise connectors bear where the chord is cut into ``count`` bodies.
+    """Share of the torsion constant of spanwise connectors for ``count`` bodies along the chord.
 
-    Of any section's torque the shear along the section gives half and the shear across it the other half, so that
-    spanwise and chordwise connectors twist with half of the constant each, and only chordwise ones at (count - 1)/count
-    of the chord: the spanwise ones take the rest. One body along the chord: all.
+    Half of the torque of a section is due to shear along it, half due to shear across it. Chordwise connectors bear the
+    second half, but exist at only (count - 1) / count of the chord; spanwise ones bear the remainder, and all for 1.
     """
     return 0.5 * (1 + 1 / count)
 
@@ -132,7 +128,7 @@ def _rigidities(section: Rectangle, torsion: float, along_span: bool) -> Array:
 
 
 def _rod_rigidities(diameter: float) -> Array:
-    """Per modulus: E_r I_r about x and z, G_r A_r along x and z; nothing along or about the span: the rod slides."""
+    """Per modulus: E_r I_r about x and z, G_r A_r along x and z; 0 along and about the span, where the rod slides."""
     second, A = round_second_moment(diameter), round_area(diameter)
     return np.array([second, 0.0, second, A, 0.0, A])
 
@@ -143,28 +139,28 @@ def _x_of(rod: Rod, y: float) -> float:
 
 
 def _piece(planform: Planform, rod: Rod, y: float, count: int) -> int:
-    """Which of ``count`` pieces of the chord at ``y`` holds the rod."""
+    """Index of the piece of the chord at ``y``, of ``count``, that contains the rod."""
     return min(int(planform.fraction(_x_of(rod, y), y) * count), count - 1)
 
 
-def _lying(planform: Planform, through: list[Rod], y0: float, y1: float) -> tuple[Array, Array]:
-    """``Connector.parts`` and ``.rods`` of some rods between y0 and y1; equally many parts for every connector."""
+def _rod_parts(planform: Planform, through: list[Rod], y0: float, y1: float) -> tuple[Array, Array]:
+    """``Connector.parts`` and ``.rods`` of rods between y0 and y1; the same number of parts for every connector."""
     ends = [end for rod in planform.wing.rods for end in (rod.y_root, rod.y_tip)]
-    cuts = np.sort(np.clip([y0, *ends, y1], y0, y1))
-    middle = 0.5 * (cuts[1:] + cuts[:-1])
+    ends_between = np.sort(np.clip([y0, *ends, y1], y0, y1))
+    middle = 0.5 * (ends_between[1:] + ends_between[:-1])
     rods = np.zeros((len(middle), 6))
     for rod in through:
         rods += np.outer((rod.y_root <= middle) & (middle <= rod.y_tip), _rod_rigidities(rod.diameter))
-    return np.diff(cuts) / (y1 - y0), rods / (y1 - y0)
+    return np.diff(ends_between) / (y1 - y0), rods / (y1 - y0)
 
 
 def _through(
     planform: Planform, division: Division, strip: int, y0: float, y1: float
 ) -> dict[tuple[int, int], list[Rod]]:
-    """Rods between the centroids y0, y1 of a strip and the next, by the bodies that hold them there.
+    """Rods between the centroids y0, y1 of a strip and the next, by the pair of bodies that contain them.
 
-    So a rod that moves from one piece of the chord to the next is a chain from body to body, never broken. One that
-    ends or begins in between lies in pieces that face each other.
+    A rod that passes from one piece of the chord to another remains connected. One that ends or begins in between is
+    assigned to opposite pieces.
     """
     found: dict[tuple[int, int], list[Rod]] = {}
     for rod in planform.wing.rods:
@@ -192,17 +188,17 @@ def _along_span(planform: Planform, division: Division, parts: list[Body]) -> li
             section = Rectangle((s1 - s0) * float(planform.chord(y)), float(planform.thickness(y)))
             foam = _rigidities(section, twisting * section.width, True) / (y1 - y0)
             point = np.array([planform.x(0.5 * (s0 + s1), y), y, 0.0])
-            rods = _lying(planform, through.pop(pair, []), y0, y1)
+            rods = _rod_parts(planform, through.pop(pair, []), y0, y1)
             found.append(Connector(*pair, point, foam, *rods, SPANWISE_MODULUS))
         for pair, rods_alone in through.items():
             point = np.array([np.mean([_x_of(rod, y) for rod in rods_alone]), y, 0.0])
-            rods = _lying(planform, rods_alone, y0, y1)
+            rods = _rod_parts(planform, rods_alone, y0, y1)
             found.append(Connector(*pair, point, np.zeros(6), *rods, SPANWISE_MODULUS))
     return found
 
 
 def _facing(inner: int, outer: int) -> list[tuple[int, int, float, float]]:
-    """Pieces of two cuts of the chord that touch: their numbers, and from and to which fraction of the chord."""
+    """Overlapping pieces of two divisions of the chord: their indices, and first and last fraction of the overlap."""
     both = [
         (i, j, max(i / inner, j / outer), min((i + 1) / inner, (j + 1) / outer))
         for i in range(inner)
@@ -222,15 +218,15 @@ def _along_chord(planform: Planform, division: Division, panels: list[Panel], pa
             section = Rectangle(panel.y1 - panel.y0, float(planform.thickness(y)))
             foam = _rigidities(section, 0.5 * _twisting(planform, y) * section.width, False) / length
             point = np.array([planform.x(panel.s1, y), y, 0.0])
-            rods = _lying(planform, [], panel.y0, panel.y1)
+            rods = _rod_parts(planform, [], panel.y0, panel.y1)
             found.append(Connector(first, second, point, foam, *rods, CHORDWISE_MODULUS))
     return found
 
 
 def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[Connector]:
-    """The driven rods hold the root: each the body that carries it, with the foam of that body shared among its rods.
+    """Connectors of the driven rods at the root; the foam of a body is shared among the driven rods in it.
 
-    A driven rod goes on into its drive: what there is between the root and its start is counted as rod.
+    A driven rod continues into its drive, so it is extended to the root if it starts outboard.
     """
     wing, count = planform.wing, division.bodies[0]
     y, y1 = wing.stations[0].y, float(parts[0].centroid[1])
@@ -250,7 +246,7 @@ def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[
         torsion = _twisting(planform, y) * section.width * _spanwise_share(count)
         foam = _rigidities(section, torsion, True) / (y1 - y) / sharing
         point = np.array([_x_of(rod, max(y, rod.y_root)), y, 0.0])
-        rods = _lying(planform, [replace(rod, y_root=min(y, rod.y_root))], y, y1)
+        rods = _rod_parts(planform, [replace(rod, y_root=min(y, rod.y_root))], y, y1)
         found.append(Connector(-1 - number, body, point, foam, *rods, SPANWISE_MODULUS))
     return found
 

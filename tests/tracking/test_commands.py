@@ -16,8 +16,8 @@ from tests.tracking.test_free_flight import CENTRE, MARKERS, pitched, seen_from,
 from wingfit.cli.forces.free_flight import forces
 from wingfit.cli.forces.kinematics import kinematics
 from wingfit.client.client import WingfitError
-from wingfit.records import FourierFlap, PassivePitch, WingMotion
-from wingfit.records.description.convert_vehicle import to_vehicle
+from wingfit.records import FourierFlap, PassivePitch, Vehicle, WingMotion
+from wingfit.records.description.convert import to_dataclass
 from wingfit.records.description.vehicle_file import VehicleFile
 from wingfit.records.description.yaml_text import read_yaml
 from wingfit.records.files.forces import read_forces
@@ -84,7 +84,7 @@ def motion_of(path: Path) -> WingMotion:
         "stations": [{"r_m": 0, "chord_m": 0.08}, {"r_m": 0.14, "chord_m": 0.06}],
         "pitch_axis": 0, "dihedral_deg": 0, "mass_kg": 0.0174, "motion": motion,
     }  # fmt: skip
-    return to_vehicle(VehicleFile.model_validate(vehicle)).motion
+    return to_dataclass(Vehicle, VehicleFile.model_validate(vehicle)).motion
 
 
 def test_a_table_becomes_the_motion_of_a_dataset(wingfit: Wingfit, table: Path, tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_wrong_use_of_forces_is_told(
         ("time_s;flap_angle_deg\n0;1\n", (), ("separate columns by commas",)),
     ],
 )
-def test_wrong_tables_are_told(
+def test_errors_in_tables_are_reported(
     wingfit: Wingfit, tmp_path: Path, text: str, words: tuple[str, ...], expected: tuple[str, ...]
 ) -> None:
     path = tmp_path / "table.csv"

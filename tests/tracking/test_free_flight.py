@@ -232,9 +232,9 @@ def test_tracks_that_cannot_give_forces_are_refused(change: dict[str, Any], word
 
 
 @pytest.mark.parametrize(
-    ("tracks", "body", "said"),
+    ("tracks", "body", "message"),
     [
-        (1e3, 1.0, "1000 times as far apart as the body file says.*millimetres in the tracks"),
+        (1e3, 1.0, "the tracks are 1000 times those in the body file.*millimetres in the tracks"),
         (1e2, 1.0, "100 times.*centimetres in the tracks"),
         (10.0, 1.0, "10 times.*decimetres in the tracks"),
         (3.2808, 1.0, "3.281 times.*the tracks or the body file are in another unit"),
@@ -243,24 +243,26 @@ def test_tracks_that_cannot_give_forces_are_refused(change: dict[str, Any], word
         (0.7, 1.0, "0.7 times"),
     ],
 )
-def test_other_units_than_metres_are_refused(tracks: float, body: float, said: str) -> None:
+def test_other_units_than_metres_are_refused(tracks: float, body: float, message: str) -> None:
     given = Body(body * MARKERS, body * CENTRE, 0.0174)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=message):
         free_flight(times(120), tracks * still(120), given, FILTER)
 
 
 def test_a_scale_that_is_a_little_off_is_remarked_on() -> None:
-    said = [free_flight(times(120), scale * still(120), BODY, FILTER).remarks for scale in (1.0, 1.03, 1.1)]
-    assert said[:2] == [(), ()]
-    assert said[2][:1] == (
-        "the markers are seen 1.1 times as far apart as the body file says; check the cameras' scale",
+    message = [free_flight(times(120), scale * still(120), BODY, FILTER).remarks for scale in (1.0, 1.03, 1.1)]
+    assert message[:2] == [(), ()]
+    assert message[2][:1] == (
+        "distances between markers in the tracks are 1.1 times those in the body file; check the scale",
     )
 
 
 def test_swapped_markers_do_not_change_the_scale() -> None:
     tracks = still(120)
     tracks[:30, [0, 4]] = tracks[:30, [4, 0]]
-    assert not any("as far apart" in remark for remark in free_flight(times(120), tracks, BODY, FILTER).remarks)
+    assert not any(
+        "distances between markers" in remark for remark in free_flight(times(120), tracks, BODY, FILTER).remarks
+    )
 
 
 @pytest.mark.parametrize(("speed", "fine"), [(99.0, True), (101.0, False)])

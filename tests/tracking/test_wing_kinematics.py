@@ -110,7 +110,7 @@ def test_a_pitch_that_lags_is_told_from_equation_17() -> None:
     seen = angles()
     zeta, rate, _ = split_cycle((seen.times - START) * FREQUENCY - 0.08, FREQUENCY)
     late = Angles(seen.times, seen.flap, passive_pitch(zeta, rate))
-    assert any("Eq. 17 misses" in remark for remark in wing_motion(late, pitch="passive").remarks)
+    assert any("misfit of Eq. 17" in remark for remark in wing_motion(late, pitch="passive").remarks)
     assert not any("Eq. 17" in remark for remark in wing_motion(seen, pitch="passive", start=START).remarks)
 
 
@@ -137,7 +137,7 @@ def test_a_wrong_start_is_remarked_on() -> None:
     assert any("not at the start given" in remark for remark in found.remarks)
 
 
-def test_phases_that_start_again_count_on() -> None:
+def test_phases_that_restart_in_every_beat_are_unwrapped() -> None:
     np.testing.assert_allclose(beats_of(np.array([0.1, 0.6, 0.05, 0.9, 0.0])), [0.1, 0.6, 1.05, 1.9, 2.0])
 
 
@@ -157,7 +157,7 @@ def test_too_little_for_a_frequency_is_refused(change: dict[str, Any], words: tu
 
 @pytest.mark.parametrize("decay", [0.0, 0.9])
 @pytest.mark.parametrize("samples", [40, 600])
-def test_no_frequency_is_found_in_noise(decay: float, samples: int) -> None:
+def test_noise_gives_no_frequency(decay: float, samples: int) -> None:
     believed = 0
     for seed in range(20):
         draw = noise(np.random.default_rng(seed), (samples,), 0.005, 0.02 * (decay > 0), decay)
@@ -165,7 +165,7 @@ def test_no_frequency_is_found_in_noise(decay: float, samples: int) -> None:
             flap_frequency(np.arange(samples) / 1200, draw)
             believed += 1
     assert believed <= 1
-    with pytest.raises(ValueError, match=r"no flap frequency stands out: the strongest period, .* Hz, is what noise"):
+    with pytest.raises(ValueError, match=r"no significant flap frequency: .* Hz, is explained by noise"):
         flap_frequency(np.arange(samples) / 1200, np.random.default_rng(7).normal(0, 0.005, samples))
 
 
@@ -196,7 +196,7 @@ def test_a_given_frequency_that_explains_little_is_remarked_on() -> None:
     share = int(remark.partition("explains ")[2].split()[0])
     assert share < 10
     assert "given, 17 Hz" in remark
-    assert "shows 12.3" in remark
+    assert "flap angle is 12.3" in remark
     flat = noise(np.random.default_rng(3), (960,), 0.02, 0, 0)
     (remark,) = (r for r in wing_motion(Angles(angles().times, flat, flat), 17.0).remarks if "explains" in r)
-    assert "shows none" in remark
+    assert "no frequency can be estimated" in remark

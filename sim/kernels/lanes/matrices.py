@@ -5,13 +5,10 @@ A matrix is nine lane vectors, row by row; e~ is the matrix of the cross product
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.sim.kernels.jit import inlined
 from wingfit.sim.kernels.lanes.vector import Vector, load, store
 
-Array = npt.NDArray[np.float64]
 Three = tuple[Vector, Vector, Vector]
 Nine = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]
 Six = tuple[Nine, Nine, Nine, Nine]  # 6 x 6: moment-rotation, moment-translation, force-rotation, force-translation

@@ -1,15 +1,13 @@
-"""Arrays whose groups of lanes each fill one cache line: a group that straddles two costs twice as much to load."""
+"""Arrays in which every group of lanes fills one cache line; loading one that spans two lines takes twice as long."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.sim.kernels import LANES
-
-Array = npt.NDArray[np.float64]
 
 _LINE = 8 * LANES
 
@@ -22,7 +20,7 @@ def zeros(shape: tuple[int, ...]) -> Array:
     return whole[start : start + count].reshape(shape)
 
 
-def aligned(array: npt.ArrayLike) -> Array:
+def aligned(array: ArrayLike) -> Array:
     """A copy of an array [..., LANES] that starts on a cache line."""
     values = np.asarray(array, float)
     out = zeros(values.shape)
@@ -31,7 +29,7 @@ def aligned(array: npt.ArrayLike) -> Array:
 
 
 def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
-    """Zeros [..., LANES] of many shapes [...] by name, cut from one piece: a group of lanes asks for dozens."""
+    """Zeros [..., LANES] of many shapes [...] by name, as parts of one array, since a group of lanes needs dozens."""
     sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
     whole, start, found = zeros((sum(sizes.values()),)), 0, {}
     for name, size in sizes.items():

@@ -1,11 +1,11 @@
-"""A group of lanes as one value inside kernels: arithmetic on eight individuals that looks like arithmetic on one.
+"""A group of lanes as one value inside kernels, so that arithmetic on eight individuals is written as for one.
 
 Inside a compiled kernel ``load(array, i, j)`` gives the lanes of ``array[i, j, :]`` as a vector of the processor
 (LLVM's ``<8 x double>``); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store`` writes one back.
-The compiler's own vectoriser does not do this: it unrolls a loop over eight lanes first and then finds nothing to
-vectorise, and with a free number of lanes it spends more on alias checks than on arithmetic.
+The automatic vectorisation of the compiler does not achieve this: it unrolls a loop over eight lanes first, and with a
+variable number of lanes the checks for aliasing take longer than the arithmetic.
 
-Kernels run only compiled; the annotations are for the reader and the type checker.
+Kernels run only compiled; annotations are for the reader and for mypy.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _splat(builder: Any, value: Any) -> Any:
 
 
 def _binary(op: Any, method: str) -> None:
-    """Teach numba ``op`` on two vectors, and on a vector and a float in either order."""
+    """Register ``op`` with numba for two vectors, and for a vector and a float in either order."""
 
     class Template(ConcreteTemplate):
         cases = [  # noqa: RUF012
@@ -98,8 +98,7 @@ def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: AR
 def _address(context: Any, builder: Any, kind: Any, array: Any, indices: Any) -> Any:
     """Pointer to the lanes of a C-contiguous array at all but the last index.
 
-    The last of the indices steps over one group of lanes, which the compiler may know: with a constant index it is
-    part of the instruction.
+    The stride of the last index is that of one group of lanes, a constant for the compiler.
     """
     proxy = context.make_array(kind)(context, builder, array)
     strides = cgutils.unpack_tuple(builder, proxy.strides)[: len(indices)]
@@ -116,7 +115,7 @@ def _indices(builder: Any, args: Any, kinds: Any) -> list[Any]:
 
 
 def _accessors(count: int) -> tuple[Callable[..., Any], Callable[..., None]]:
-    """Load and store of the lanes of an array at ``count`` indices; numba wants a function per number of arguments."""
+    """Load and store of the lanes of an array at ``count`` indices; numba needs one function per count."""
 
     def read(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         indices = _indices(builder, args[1:], sig.args[1:])

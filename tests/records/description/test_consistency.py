@@ -35,4 +35,4 @@ def test_the_margin_is_one_centimetre() -> None:
     # Within the margin the marker passes, and only the deliberate second mistake is left.
     files = with_yaml(good, "x_m: 0.025, y_m: 0.5099")
     files["dataset.yaml"] = files["dataset.yaml"].replace(b"held_out: [vacuum-3hz", b"held_out: [nothing")
-    assert error_of_zip(zipped(files)).found == 1
+    assert error_of_zip(zipped(files)).count == 1

@@ -163,7 +163,7 @@ def test_the_errors_of_the_page_are_the_real_ones() -> None:
     assert str(error_of_zip(zipped(with_yaml("chord_m: 0.21", "chord_m: 210")))) == shown[0]
 
 
-def test_every_limit_stands_in_the_table() -> None:
+def test_the_table_lists_every_limit() -> None:
     names = [n for n in vars(limits_module) if n.isupper() and n not in {"MIB", "FORMAT_VERSION", "MAX_ERRORS"}]
     missing = [name for name in names if f"`{name}`" not in PAGE]
     assert missing == []

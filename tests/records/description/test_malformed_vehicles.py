@@ -80,7 +80,7 @@ DESCRIPTIONS = {
         "cutoff_hz: 40.0",
         "cutoff_hz: 12",
         ["recordings/slow.csv"],
-        ["is 12 Hz, below the flap frequency, 12.5 Hz", "leave low_pass out"],
+        ["is 12 Hz, below the flap frequency, 12.5 Hz", "omit low_pass"],
     ),
     "cutoff": ("cutoff_hz: 40.0", "cutoff_hz: 125", ["recordings/slow.csv"], ["is 125 Hz", "sampling rate, 125 Hz"]),
     "rig": ("rig: free_flight", "rig: bath", ["recordings[2].rig"], ["'free_flight'"]),
@@ -124,7 +124,7 @@ FILES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
     "marker": (lambda: vehicle_csv("force_z_n", "m1_x_m"), ["column 3"], ["remove"]),
     "twice": (lambda: vehicle_csv("force_z_n", "force_x_n"), ["column 3"], ["column 2", "keep one"]),
     "time": (lambda: vehicle_csv("time_s", "time_ms"), ["column 1"], ["'time_s'", "seconds"]),
-    "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["there is no force"]),
+    "no force": (lambda: {**good_vehicle(), FORCES: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["no column of forces"]),
     "decimal commas": (lambda: vehicle_csv("0.0,0.1", "0,0,0,1"), ["line 2"], ["5 cells", "decimal commas"]),
     "semicolons": (lambda: vehicle_csv(",", ";"), ["line 1"], ["semicolons"]),
     "values in mN": (lambda: _scaled(1e3), [FORCES], ["looks like millinewtons", "[1.706e-07, 1.706] N", "convert"]),
@@ -183,7 +183,7 @@ def test_four_samples_show_a_beat(rate_hz: float, fine: bool) -> None:
     faults, recording = Faults(), delfly_dataset().recordings[0]
     slow = replace(recording, times=np.arange(60) / (rate_hz * recording.condition.flap_frequency))
     check_numbers(slow, delfly(), "hover", str, faults)
-    assert [fault.message.partition(" of ")[0] for fault in faults.kept] == (
+    assert [fault.message.partition(" of ")[0] for fault in faults.faults] == (
         [] if fine else ["the sampling rate is 50.54 Hz, 3.8 samples in a beat"]
     )
 
@@ -193,20 +193,20 @@ def test_a_single_wing_may_clap_with_a_mirror() -> None:
 
 
 def test_a_wrong_unit_is_one_mistake(tmp_path: Path) -> None:
-    assert error_of(vehicle_yaml(SPLIT, "split_deg_per_beat: 20"), tmp_path).found == 1
+    assert error_of(vehicle_yaml(SPLIT, "split_deg_per_beat: 20"), tmp_path).count == 1
 
 
 def test_a_wing_has_no_keys_of_a_vehicle(tmp_path: Path) -> None:
     text = good_files()[YAML].replace(b"phase_lag_deg:", b"body_pitch_deg: 3, phase_lag_deg:", 1)
     error = error_of({**good_files(), YAML: text}, tmp_path)
-    assert error.found == 1
+    assert error.count == 1
     assert "key 'body_pitch_deg' is for a vehicle, this is a wing" in error.message
 
 
 def test_a_vehicle_that_does_not_clap_may_start_its_beat_anywhere(tmp_path: Path) -> None:
     files = vehicle_yaml(MEASURED, "cosine_deg: [18.0, 0.0]")
     files[YAML] = files[YAML].replace(b"claps: true", b"claps: false").replace(b"held_out: [fast]", b"held_out: [x]")
-    assert error_of(files, tmp_path).found == 1
+    assert error_of(files, tmp_path).count == 1
 
 
 def _first(**changes: object) -> Dataset:

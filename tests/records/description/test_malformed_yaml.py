@@ -118,7 +118,7 @@ def test_each_mistake_is_named(what: str, tmp_path: Path) -> None:
 
 
 def test_a_wrong_unit_is_one_mistake(tmp_path: Path) -> None:
-    assert error_of(with_yaml(FREQUENCY, "flap_frequency_rad_s: 12.6"), tmp_path).found == 1
+    assert error_of(with_yaml(FREQUENCY, "flap_frequency_rad_s: 12.6"), tmp_path).count == 1
 
 
 def test_line_and_column_point_at_the_key(tmp_path: Path) -> None:
@@ -158,7 +158,7 @@ def test_the_number_of_mistakes_shown_is_bounded(tmp_path: Path) -> None:
     files[YAML] = files[YAML].replace(b"_m:", b"_mm:")
     error = error_of(files, tmp_path)
     assert len(error.errors) == MAX_ERRORS
-    assert str(error).endswith(f"and {error.found - MAX_ERRORS} more")
+    assert str(error).endswith(f"and {error.count - MAX_ERRORS} more")
 
 
 @pytest.mark.parametrize(

@@ -80,10 +80,10 @@ def test_each_archive_is_refused_in_words(what: str) -> None:
         assert word in str(error), str(error)
 
 
-def test_an_entry_that_stands_twice_is_refused() -> None:
+def test_a_repeated_entry_is_refused() -> None:
     with pytest.warns(UserWarning, match="Duplicate name"):
         data = with_entry(YAML)
-    assert "stands twice" in str(error_of_zip(data))
+    assert "appears twice" in str(error_of_zip(data))
 
 
 @pytest.mark.parametrize("make", [good_zip, lambda: write_netcdf(falcon_dataset(12))], ids=["zip", "netcdf"])
@@ -180,7 +180,7 @@ NETCDF: dict[str, tuple[Callable[[h5py.File], None], str, str]] = {
     "infinite": (_replace("position_m", np.full((12, 12, 3), np.inf)), "time index 0", "infinite"),
     "markers as numbers": (_replace("marker", np.arange(12.0)), f"a.nc: {GROUP}", "must hold text"),
     "unknown marker": (_rename_marker, f"a.nc: {GROUP}", "'m11'"),
-    "repeated marker": (_repeat_marker, f"a.nc: {GROUP}", "stands twice"),
+    "repeated marker": (_repeat_marker, f"a.nc: {GROUP}", "appears twice"),
     "time": (_set_time, f"a.nc: {GROUP}, time index 5", "times must increase"),
     "external link": (_replace("time_s", h5py.ExternalLink("/etc/passwd", "/x")), f"a.nc: {GROUP}", "is a link"),
     "soft link": (_replace("time_s", h5py.SoftLink("/recordings")), f"a.nc: {GROUP}", "is a link"),

@@ -59,7 +59,7 @@ CASES: dict[str, tuple[Callable[[], Files], list[str], list[str]]] = {
         ["line 1"],
         ["'time_s' is missing"],
     ),
-    "no marker": (lambda: {**good_files(), TRACKS: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["no marker", "m1_x_m"]),
+    "no marker": (lambda: {**good_files(), TRACKS: b"time_s\n" + b"1\n" * 9}, ["line 1"], ["no column of", "m1_x_m"]),
     "millimetre column": (lambda: with_csv(old="m2_x_m", new="m2_x_mm"), ["line 1, column 5"], ["'m2_x_m'", "metres"]),
     "unknown marker": (lambda: with_csv(old="m12_", new="m112_"), ["line 1, column 35"], ["'m112'", "'m12'"]),
     "unknown column": (lambda: with_csv(old="m2_x_m", new="force"), ["line 1, column 5"], ["'force'", "remove"]),

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import jaxtyping
 import numpy as np
 import pytest
 
 from tests.records.samples import falcon_dataset
 from wingfit.records import Dataset, DatasetError, Recording, save_dataset
+
+
+@pytest.fixture(autouse=True)
+def _shapes_unchecked() -> Iterator[None]:
+    """As in production, where a recording of wrong shapes can be made."""
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 def _first(dataset: Dataset, recording: Recording) -> Dataset:
@@ -29,7 +39,7 @@ def _spoilt(what: str) -> Dataset:
         "float64 \\[36\\]": _first(dataset, replace(first, standard_deviation=np.ones(2))),
         "float32": _first(dataset, replace(first, values=first.values.astype(np.float32))),
         "'m99'": _first(dataset, replace(first, markers=("m99", *first.markers[1:]))),
-        "stands twice": _first(dataset, replace(first, markers=("m2", *first.markers[1:]))),
+        "appears twice": _first(dataset, replace(first, markers=("m2", *first.markers[1:]))),
         "times must increase": _first(dataset, replace(first, times=first.times[::-1].copy())),
         "millimetres": _first(dataset, replace(first, values=first.values * 1000)),
         "letters, digits": _first(dataset, replace(first, name="../x")),
@@ -46,7 +56,7 @@ def _spoilt(what: str) -> Dataset:
         "float64 \\[36\\]",
         "float32",
         "'m99'",
-        "stands twice",
+        "appears twice",
         "times must increase",
         "millimetres",
         "letters, digits",

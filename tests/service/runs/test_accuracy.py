@@ -208,7 +208,7 @@ def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> No
     model = FlexibleWing(wing, "4", numerics=impatient)
     nominal = np.array([gene.nominal for gene in model.genes])
     said = with_remedy(model.beat(nominal, still).reason or "")
-    assert "asked for 1e-09 mm. Remedy: state a larger accuracy_mm" in said
+    assert "requested 1e-09 mm. Remedy: state a larger accuracy_mm" in said
     slow = replace(model, numerics=Numerics(accuracy=1e-4, periodic=1e-15, max_beats=3))
     settling = slow.beat(nominal, still).reason or ""
     assert with_remedy(settling).endswith("needs a larger accuracy_mm (at most 1)")

@@ -50,11 +50,11 @@ def vacuum_here(step: float, gravity: float = 0.0) -> Setting:
     return Setting(np.zeros(LANES), np.zeros((3, LANES)), gravity, step)
 
 
-def driven(structure: Structure, condition: Condition, steps: int, beats: int, *, giving_way: bool = False) -> Array:
+def driven(structure: Structure, condition: Condition, steps: int, beats: int, *, compliant: bool = False) -> Array:
     """The drive of the first ``beats`` with ``steps`` each, ramped up over the first."""
     rods, numerics = RodDrive.of(structure.wing.drive, condition.phase_lag, LANES), Numerics(steps=steps)
     frequency = condition.flap_frequency
-    tables = [drive_table(rods, frequency, numerics, steps, beat, giving_way=giving_way) for beat in range(beats)]
+    tables = [drive_table(rods, frequency, numerics, steps, beat, compliant=compliant) for beat in range(beats)]
     return np.concatenate(tables)
 
 

@@ -22,7 +22,8 @@ from wingfit.sim.virtual_rigs.campaign import robird_wing, tunnel, vacuum
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.drive import RodDrive, flap_angle
 from wingfit.sim.wing.genes import lanes, wing_genes
-from wingfit.sim.wing.outputs import Outputs, from_motion
+from wingfit.sim.wing.load_recovery import from_motion
+from wingfit.sim.wing.outputs import Outputs
 from wingfit.sim.wing.structure import build
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +46,7 @@ def scene_of(droop: Array | float, condition: Condition) -> WingScene:
 
 def two_beats(scene: WingScene, steps: int) -> Trace:
     """From rest, the second at full amplitude."""
-    table = driven(STRUCTURE, scene.condition, steps, 2, giving_way=len(scene.motor) > 0)
+    table = driven(STRUCTURE, scene.condition, steps, 2, compliant=len(scene.motor) > 0)
     group = scene.frozen()
     return march(STRUCTURE, group, scene.setting(steps), at_rest(STRUCTURE, len(group.laws.size)), 2 * steps, table)
 

@@ -114,7 +114,7 @@ def test_failure_says_so_where_there_is_nothing_to_compare_with() -> None:
     course.reason, course.trace = None, Trace(*(np.zeros((LADDER[-1], 1, 3)) for _ in Trace._fields))
     _judge(course, Numerics(), LADDER[-1], last=True)
     assert course.reason is not None
-    assert "no coarser motion to compare with" in course.reason
+    assert "no coarser motion for comparison" in course.reason
     assert "nan" not in course.reason
 
 

@@ -94,7 +94,7 @@ def test_mode_too_slow_to_leap_along_is_not_taken_for_periodic(decay: float) -> 
     for _ in range(4):
         here = state
         state, told = secants.add(state, beat(state))
-    assert not secants.leapt
+    assert not secants.extrapolated
     assert told == pytest.approx(
         np.abs(beat.coordinates(beat.state(beat.fixed)) - beat.coordinates(here)).max(), rel=0.1
     )
@@ -150,13 +150,13 @@ def test_leap_that_makes_things_worse_is_taken_back() -> None:
     for _ in range(2):
         ends.append(beat(state))
         state, _ = secants.add(state, ends[-1])
-    assert secants.leapt
+    assert secants.extrapolated
     # what came of the leap: far away
     far = beat.state(beat.fixed + 10.0)
     back, distance = secants.add(state, far)
     assert distance == np.inf
     np.testing.assert_array_equal(back.p, ends[-1].p)
-    assert not secants.leapt
+    assert not secants.extrapolated
     with pytest.raises(ValueError, match="no leap"):
         secants.step_back()
 

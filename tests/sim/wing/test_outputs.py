@@ -27,8 +27,9 @@ from wingfit.sim.virtual_rigs.campaign import (
 )
 from wingfit.sim.wing.drive import flap_angle
 from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.load_recovery import body_names, from_motion
 from wingfit.sim.wing.loads import simulate_outputs
-from wingfit.sim.wing.outputs import Outputs, body_names, from_motion
+from wingfit.sim.wing.outputs import Outputs
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of
 from tests.sim.effects.driving import robird
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import new_work
-from wingfit.sim.kernels.motor import give_way
+from wingfit.sim.kernels.motor import motor_rates
 from wingfit.sim.solver.simulate import Beat
 
 OMEGA = 2 * np.pi * AIR.flap_frequency
@@ -30,7 +30,7 @@ def respond(harmonic: int, mean: float, wave: float, beats: int = 6, steps: int 
     def rate(t: float, z: Array) -> Array:
         work.z[:] = z
         work.wrench[front, 0] = -0.5 * (mean + wave * np.cos(harmonic * OMEGA * t))  # the wing resists
-        give_way(lanes.laws.motor, work)
+        motor_rates(lanes.laws.motor, work)
         return np.array(work.z_rate)
 
     h, z, kept = 2 * np.pi / OMEGA / steps, np.zeros((3, LANES)), np.zeros((beats * steps, 3))

@@ -1,0 +1,180 @@
+"""Conversion between the models of ``dataset.yaml`` and the dataclasses of ``wingfit.records``, exact both ways.
+
+A key of the file is the name of the dataclass's attribute, followed by the unit where there is one: ``dihedral_deg``
+holds ``Vehicle.dihedral``, in degrees. The names therefore determine the conversion (``wingfit.records.units``).
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from decimal import Decimal
+from typing import Any, TypeVar, get_args, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel
+
+from wingfit.records.array_types import Array, Float
+from wingfit.records.dataset import Condition, Recording
+from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
+from wingfit.records.description.fields import models_in, tag_of
+from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
+from wingfit.records.description.wing_file import WingFile, WingRecordingFile
+from wingfit.records.description.yaml_text import Document, Path
+from wingfit.records.errors import Faults, nearest
+from wingfit.records.files.table import Samples
+from wingfit.records.units import CELSIUS, DEG, MBAR, SI, Unit, from_si, to_si
+from wingfit.records.vehicle import Vehicle
+from wingfit.records.wing import Marker, Wing
+
+T = TypeVar("T")
+RecordingFile = WingRecordingFile | VehicleRecordingFile
+
+_UNITS = {"deg": DEG, "mbar": MBAR, "c": CELSIUS}
+_OTHER_NAMES = {"body_pitch_deg": "angle_of_attack_deg"}
+
+
+def to_rig(dataset: DatasetFile) -> Wing | Vehicle:
+    """The wing or vehicle of a checked description, in SI units."""
+    if isinstance(dataset, VehicleDatasetFile):
+        return to_dataclass(Vehicle, dataset.vehicle)
+    return to_dataclass(Wing, dataset.wing)
+
+
+def to_recording(entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults) -> Recording:
+    """The recording described by ``entry``, which stands at ``path``, with its ``samples``.
+
+    Errors in its standard deviations are added to ``faults``.
+    """
+    lag = {} if isinstance(entry, WingRecordingFile) else {"phase_lag": 0.0}
+    return to_dataclass(
+        Recording,
+        entry,
+        condition=to_dataclass(Condition, entry, **lag),
+        times=samples.times,
+        markers=samples.markers,
+        forces=samples.forces,
+        values=samples.values,
+        standard_deviation=_to_deviations(entry, samples, document, path, faults),
+    )
+
+
+def to_dataclass(cls: type[T], model: BaseModel, **given: object) -> T:
+    """An instance of the dataclass ``cls`` from the keys of ``model``; ``given`` attributes replace the model's."""
+    hints, values = get_type_hints(cls), dict(given)
+    for key in type(model).model_fields:
+        attribute, unit = _attribute(key, hints)
+        if attribute and attribute not in given:
+            values[attribute] = _to_value(getattr(model, key), hints[attribute], unit)
+    if cls is Marker:
+        values["position"] = tuple(float(getattr(model, f"{axis}_m")) for axis in "xyz")
+    return cls(**values)
+
+
+def to_data(instance: object, model: type[BaseModel]) -> dict[str, object]:
+    """The attributes of a dataclass as the plain data of ``model``, by its keys; None and empty values are omitted."""
+    axes = dict(zip("xyz", instance.position, strict=True)) if isinstance(instance, Marker) else {}
+    return _data(vars(instance) | axes, model)
+
+
+def describe_rig(rig: Wing | Vehicle) -> dict[str, object]:
+    """``rig`` as the plain data under the key ``wing`` or ``vehicle`` of ``dataset.yaml``."""
+    return to_data(rig, VehicleFile if isinstance(rig, Vehicle) else WingFile)
+
+
+def describe_recording(recording: Recording) -> dict[str, object]:
+    """``recording`` without its samples, as the plain data of ``dataset.yaml``."""
+    values = vars(recording.condition) | vars(recording) | {"standard_deviation": _deviations(recording)}
+    return _data(values, VehicleRecordingFile if recording.kind == "forces" else WingRecordingFile)
+
+
+def _attribute(key: str, attributes: Iterable[str]) -> tuple[str | None, Unit]:
+    """The attribute that a key of the file holds, or None, and the unit in which the key holds it."""
+    name = _OTHER_NAMES.get(key, key)
+    attribute = max((a for a in attributes if f"{name}_".startswith(f"{a}_")), key=len, default=None)
+    return attribute, _UNITS.get(name[len(attribute) + 1 :], SI) if attribute else SI
+
+
+def _to_value(value: Any, hint: Any, unit: Unit) -> object:
+    """The attribute of type ``hint`` that ``value`` of the file, in ``unit``, stands for."""
+    if isinstance(value, BaseModel):
+        kind = getattr(value, "kind", None)
+        return to_dataclass(next(c for c in _dataclasses(hint) if getattr(c, "kind", None) == kind), value)
+    if isinstance(value, Decimal):
+        return to_si(value, unit)
+    if isinstance(value, list):
+        return tuple(_to_value(item, hint, unit) for item in value)
+    if isinstance(value, dict):
+        return {name: _to_value(item, hint, unit) for name, item in value.items()}
+    return value
+
+
+def _dataclasses(hint: Any) -> Iterator[type[Any]]:
+    """Dataclasses within a type such as ``tuple[Rod, ...]`` or ``LowPass | None``."""
+    if isinstance(hint, type) and is_dataclass(hint):
+        yield hint
+    for argument in get_args(hint):
+        yield from _dataclasses(argument)
+
+
+def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, object]:
+    """Attributes as the keys of ``model``, without those that are None or empty."""
+    data = dict[str, object]()
+    for key, field in model.model_fields.items():
+        attribute, unit = _attribute(key, values)
+        if attribute and values[attribute] not in (None, {}):
+            data[key] = _plain(values[attribute], list(models_in(field.annotation)), unit)
+    return data
+
+
+def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
+    """An attribute as plain data, in ``unit``; a dataclass as the keys of that of ``models`` which has its kind."""
+    if is_dataclass(value):
+        kind = getattr(value, "kind", None)
+        return to_data(value, next(model for model in models if tag_of(model) == kind))
+    if isinstance(value, Mapping):
+        return {name: _plain(item, models, unit) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, models, unit) for item in value]
+    if (isinstance(value, int) and unit == SI) or not isinstance(value, numbers.Real):
+        return value
+    return from_si(float(value), unit)
+
+
+def _to_deviations(
+    entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults
+) -> Float[Array, " C"] | None:
+    """Standard deviation of each channel [C], or None; markers or axes that are missing or unknown are faults."""
+    names: Sequence[str]
+    if isinstance(entry, WingRecordingFile):
+        key, what, each, names, size = "standard_deviation_m", "marker", "[x, y, z] for each marker", samples.markers, 3
+    else:
+        key, what, each, names, size = "standard_deviation_n", "axis", "one for each axis recorded", samples.forces, 1
+    noise = getattr(entry, key)
+    if noise is None or isinstance(noise, Decimal):
+        return None if noise is None else np.full(size * len(names), float(noise))
+    known = noise if isinstance(noise, dict) else {axis: [value] for axis, value in noise if value is not None}
+    for name in known:
+        if name not in names:
+            remedy = nearest(name, names) if size == 3 else "remove it"
+            message = f"{what} {name!r} is not in the recording; {remedy}"
+            faults.add(document.where((*path, key, name)), name, message)
+    missing = [name for name in names if name not in known]
+    if missing:
+        message = f"{what} {missing[0]!r} has no entry; give {each}, or one number for all"
+        faults.add(document.where((*path, key)), missing[0], message)
+    return np.array([float(value) for name in names for value in known.get(name, [math.nan] * size)])
+
+
+def _deviations(recording: Recording) -> object:
+    """Standard deviations as plain data: one number where all are equal, else by marker or axis of force."""
+    if recording.standard_deviation is None:
+        return None
+    values = recording.standard_deviation.tolist()
+    if recording.kind == "forces":
+        return dict(zip(recording.forces, values, strict=True))
+    if values and len(set(values)) == 1 and math.isfinite(values[0]):
+        return values[0]
+    return {marker: values[3 * k : 3 * k + 3] for k, marker in enumerate(recording.markers)}

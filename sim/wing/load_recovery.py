@@ -1,0 +1,275 @@
+"""Load recovery: loads, powers and energies of one wing from the motion of its bodies over one beat.
+
+The forces are computed by the integrator's own compiled functions. Their lanes, elsewhere eight individuals, hold here
+eight instants of one individual.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from wingfit.records import Condition
+from wingfit.records.array_types import Array, Index
+from wingfit.sim.effects.ports.wing import WingScene
+from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels.air import strip_forces
+from wingfit.sim.kernels.arrays import NOW, Lanes, Setting, State, Wiring, Work, new_work
+from wingfit.sim.kernels.bodies import kinetic_and_height
+from wingfit.sim.kernels.connectors import twists
+from wingfit.sim.kernels.integrate import airflow, forces, point_forces
+from wingfit.sim.kernels.lanes.memory import aligned
+from wingfit.sim.kernels.masses import add_energies
+from wingfit.sim.wing.outputs import ConnectorLoad, Kind, Motor, Outputs, Section, Strip
+from wingfit.sim.wing.structure import Structure
+
+_NORMAL_MOTION = [0, 1, 5]  # components of a twist that move air along a plate's normal: omega_x, omega_y, v_z
+RODS = ("front rod", "rear rod")
+
+
+def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outputs:
+    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6], z [n, Z]) of the individual in ``scene``.
+
+    All lanes of the scene must be that individual with its effects, since lanes are used for instants.
+    """
+    structure, n = scene.structure, len(motion.V)
+    sums = _Sums(structure, n)
+    parts = _Parts(structure.wiring, scene.setting(n), scene.frozen())
+    groups = list(_groups(motion))
+    for c in range(len(structure.connectors)):
+        _connector(parts, c, groups, sums)
+    _air_and_energies(parts, groups, sums)
+    _added_mass_loads(parts, scene, motion, sums)
+    incidence = _incidence(scene.condition)
+    return Outputs(
+        phase=np.arange(n) / n,
+        crossing=crossing,
+        motors=(_motor(parts, motion, sums, 0), _motor(parts, motion, sums, 1)),
+        connectors=_named(structure, sums),
+        sections=_sections(structure, motion, sums),
+        strips=_strips(structure, sums),
+        air_wrench=sums.air_wrench,
+        held=sums.held,
+        held_lost=sums.held_lost,
+        held_stored=sums.held_stored,
+        lift_axis=np.array([-np.sin(incidence), 0.0, np.cos(incidence)]),
+        thrust_axis=-np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
+        kinetic=sums.kinetic,
+        elastic=sums.stored.sum(axis=1) + sums.held_stored,
+        gravitational=sums.gravitational,
+    )
+
+
+class _Sums:
+    """Results collected over the groups of instants."""
+
+    def __init__(self, structure: Structure, n: int) -> None:
+        bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.division.bodies)
+        self.wrench, self.twist = np.zeros((n, connectors, 6)), np.zeros((n, connectors, 6))
+        self.lost, self.stored = np.zeros((n, connectors)), np.zeros((n, connectors))
+        self.on_rods = np.zeros((n, 2, 6))
+        self.air_wrench, self.held = np.zeros((n, bodies, 6)), np.zeros((n, bodies, 6))
+        self.held_lost, self.held_stored = np.zeros(n), np.zeros(n)
+        self.strip_force, self.strip_power = np.zeros((n, strips, 3)), np.zeros((n, strips))
+        self.kinetic, self.gravitational = np.zeros(n), np.zeros(n)
+
+
+class _Parts(NamedTuple):
+    """Inputs of the kernels for the wing."""
+
+    wiring: Wiring
+    here: Setting
+    lanes: Lanes
+
+    def alone(self, c: int) -> tuple[_Parts, Index]:
+        """The wing with connector ``c`` and its laws only, and the indices of its states."""
+        w, group, none = self.wiring, self.lanes, np.zeros(0, np.int64)
+        one, count = slice(c, c + 1), len(w.first)
+        wiring = w._replace(
+            mass=0 * w.mass, inertia=0 * w.inertia, first=w.first[one], second=w.second[one], a=w.a[one], b=w.b[one],
+            driven=0, below=none, strip_start=np.zeros(1, np.int64), geometry=w.geometry[:0],
+        )  # fmt: skip
+        laws, rows, parameters, states = group.laws, [], none, none
+        for function, given, kept, at, first, axes in laws.connector:
+            rows.append([function, given, kept, len(parameters), len(states), axes])
+            parameters = np.append(parameters, at + c + count * np.arange(given))
+            states = np.append(states, first + c + count * np.arange(kept))
+        own = laws._replace(
+            strip=laws.strip[:0], connector=np.array(rows, np.int64).reshape(-1, 6), size=laws.size[states],
+            parameters=aligned(laws.parameters[parameters]), motor=laws.motor[:0], point=laws.point[:0],
+            bodies=laws.bodies[:0], arms=laws.arms[:0],
+        )  # fmt: skip
+        lanes = group._replace(
+            stiffness=group.stiffness[one], damping=group.damping[one], coupling=group.coupling[one],
+            pairs=group.pairs[:0], masses=group.masses[:0], weighing=0, laws=own,
+        )  # fmt: skip
+        return _Parts(wiring, self.here, lanes), states
+
+
+def _groups(motion: State) -> Iterator[tuple[Index, State]]:
+    """Groups of LANES instants: their indices, and their state with the instant as last axis, spare lanes filled."""
+    n = len(motion.V)
+    for start in range(0, n, LANES):
+        rows = np.arange(start, min(start + LANES, n))
+        filled = np.minimum(np.arange(start, start + LANES), n - 1)
+        yield rows, State(*(np.ascontiguousarray(np.moveaxis(part[filled], 0, -1)) for part in motion))
+
+
+def _put(work: Work, state: State) -> None:
+    for array, value in zip((work.R, work.p, work.V, work.z), state, strict=True):
+        array[:] = value
+
+
+def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _Sums) -> None:
+    """Loads of one connector: the integrator's forces of a wing that has no other connector."""
+    alone, own = parts.alone(c)
+    work, w, twist = new_work(*alone), alone.wiring, np.zeros((1, 6, LANES))
+    first = int(w.first[0])
+    for rows, state in groups:
+        count = len(rows)
+        _put(work, state._replace(z=state.z[own]))
+        forces(*alone, work)
+        twists(w.first, w.second, w.a, w.b, work.Q, work.d, work.V, twist)
+        on_first, e = work.wrench[first].T[:count], (w.a[0] + work.d[0].T)[:count]
+        sums.wrench[rows, c, 3:] = -on_first[:, 3:]
+        sums.wrench[rows, c, :3] = -on_first[:, :3] + np.cross(e, on_first[:, 3:])
+        sums.twist[rows, c] = twist[0].T[:count]
+        sums.lost[rows, c], sums.stored[rows, c] = work.lost[:count], work.stored[:count]
+        if first >= len(w.mass):
+            sums.on_rods[rows, first - len(w.mass)] += on_first
+
+
+def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
+    """Flow and laws of the air for the whole wing, then the forces one strip at a time; and of laws at points."""
+    w, here, group = parts
+    work, n = new_work(*parts), len(w.mass)
+    kinetic, height = np.zeros(LANES), np.zeros(LANES)
+    for rows, state in groups:
+        count = len(rows)
+        _put(work, state)
+        work.clock[NOW, :count] = 2 * np.pi * rows / len(sums.kinetic)
+        airflow(w, here, group, work)
+        work.wrench[:] = 0.0
+        for s in range(len(w.geometry)):
+            one = slice(s, s + 1)
+            power, force = np.zeros(LANES), np.zeros((3, LANES))
+            strip_forces(
+                w.strip_start[s : s + 2], w.weight, w.centroid, w.geometry[one], here.density,
+                group.lift_share, group.lift_x, group.drag_share, group.drag_x,
+                work.flow[one], work.loads[one], len(group.laws.strip) > 0,
+                work.R, work.V, work.wrench, work.normal_damping, power, force,
+            )  # fmt: skip
+            sums.strip_force[rows, s], sums.strip_power[rows, s] = force.T[:count], power[:count]
+        sums.air_wrench[rows] = np.moveaxis(work.wrench, -1, 0)[:count, :n]
+        for array in (work.wrench, work.lost, work.stored):
+            array[:] = 0.0
+        point_forces(group, work)
+        sums.held[rows] = np.moveaxis(work.wrench, -1, 0)[:count, :n]
+        sums.held_lost[rows], sums.held_stored[rows] = work.lost[:count], work.stored[:count]
+        kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
+        add_energies(
+            group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,
+            work.R, work.p, work.V, kinetic, height,
+        )  # fmt: skip
+        sums.kinetic[rows], sums.gravitational[rows] = kinetic[:count], height[:count]
+
+
+def _added_mass_loads(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> None:
+    """Add the reaction -N q' of the added mass (`sim.kernels.masses`), with q' from the Fourier series of the beat.
+
+    It is inertia in the integrator, but a load of the air on the wing.
+    """
+    group, structure = parts.lanes, scene.structure
+    if len(group.pairs) == group.weighing:
+        return
+    n, bodies = motion.V.shape[0], len(structure.bodies)
+    turn = motion.R[:, :bodies].reshape(n, bodies, 3, 3)
+    q = motion.V[:, :bodies, _NORMAL_MOTION].copy()
+    q[..., 2] -= turn[..., :, 2] @ parts.here.wind[:, 0]
+    momentum = np.zeros_like(q)
+    for (i, j, _), block in zip(group.pairs[group.weighing :], group.masses[group.weighing :, :, 0], strict=True):
+        momentum[:, i] += q[:, j] @ block.reshape(6, 6)[np.ix_(_NORMAL_MOTION, _NORMAL_MOTION)].T
+    order = 2j * np.pi * scene.condition.flap_frequency * np.arange(n // 2 + 1)
+    wrench = np.zeros((n, bodies, 6))
+    wrench[..., _NORMAL_MOTION] = -np.fft.irfft(np.fft.rfft(momentum, axis=0) * order[:, None, None], n, axis=0)
+    force = turn[..., 2] * wrench[..., 5:]
+    power = (wrench * motion.V[:, :bodies]).sum(axis=2)
+    starts = structure.wiring.strip_start[:-1]
+    sums.air_wrench += wrench
+    sums.strip_force += np.add.reduceat(force, starts, axis=1)
+    sums.strip_power += np.add.reduceat(power, starts, axis=1)
+
+
+def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
+    """Motor loads: the rods have no mass, so the motor balances the connectors, about the true axis of the hinge."""
+    hinge, row = parts.lanes.hinge[:, 0], len(parts.wiring.mass) + rod
+    axis, off = hinge[:3], hinge[3:6]
+    R, rate = motion.R[:, row].reshape(-1, 3, 3), motion.V[:, row, :3] @ axis
+    turned = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1) @ axis
+    angle = np.arctan2(turned, np.trace(R, axis1=1, axis2=2) - 1.0)
+    moment, force = sums.on_rods[:, rod, :3], sums.on_rods[:, rod, 3:]
+    torque = -(moment - np.cross(off, force)) @ axis
+    return Motor(angle, rate, torque, torque * rate)
+
+
+def body_names(structure: Structure) -> list[str]:
+    """Names ``strip.body``, strips from the root, bodies from the leading edge; then those of the two driving rods."""
+    counts = structure.division.bodies
+    return [f"{s}.{k}" for s, count in enumerate(counts, 1) for k in range(1, count + 1)] + list(RODS)
+
+
+def _named(structure: Structure, sums: _Sums) -> tuple[ConnectorLoad, ...]:
+    names, w, found = body_names(structure), structure.wiring, []
+    strip = np.repeat(np.arange(len(structure.division.bodies)), structure.division.bodies)
+    for c, connector in enumerate(structure.connectors):
+        i, j = int(w.first[c]), int(w.second[c])
+        kind: Kind = "root" if i >= len(strip) else "spanwise" if strip[i] != strip[j] else "chordwise"
+        name = names[i] if kind == "root" else f"{kind} {names[i]}-{names[j]}"
+        series = (sums.wrench[:, c], sums.twist[:, c], sums.lost[:, c], sums.stored[:, c])
+        found.append(ConnectorLoad(name, kind, (names[i], names[j]), connector.point, *series))
+    return tuple(found)
+
+
+def _strips(structure: Structure, sums: _Sums) -> tuple[Strip, ...]:
+    edges = structure.planform.strips(structure.division)
+    return tuple(
+        Strip(f"strip {s + 1}", (float(edges[s]), float(edges[s + 1])), sums.strip_force[:, s], sums.strip_power[:, s])
+        for s in range(len(edges) - 1)
+    )
+
+
+def _sections(structure: Structure, motion: State, sums: _Sums) -> tuple[Section, ...]:
+    """Loads at the root and at every boundary between strips."""
+    w, starts = structure.wiring, structure.wiring.strip_start
+    edges = structure.planform.strips(structure.division)
+    R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
+    found = []
+    for s in range(len(starts) - 1):
+        inside = (w.second >= starts[s]) & (w.second < starts[s + 1])
+        through = np.flatnonzero(inside & ((w.first < starts[s]) | (w.first >= len(w.mass))))
+        turn = R[:, w.first[through]]
+        force = np.einsum("tcij,tcj->tci", turn, sums.wrench[:, through, 3:])
+        moment = np.einsum("tcij,tcj->tci", turn, sums.wrench[:, through, :3])
+        second = w.second[through]
+        point = motion.p[:, second] + np.einsum("tcij,cj->tci", R[:, second], w.b[through])
+        moment = moment + np.cross(point - point.mean(axis=1, keepdims=True), force)
+        body = slice(starts[s], starts[s + 1])
+        axes = _nearest_rotation(np.einsum("tnij,n->tij", R[:, body], w.weight[body]))
+        both = np.stack([moment.sum(axis=1), force.sum(axis=1)], axis=1)
+        wrench = np.einsum("tij,tki->tkj", axes, both).reshape(len(R), 6)
+        name = "root" if s == 0 else f"strips {s}-{s + 1}"
+        found.append(Section(name, float(edges[s]), wrench))
+    return tuple(found)
+
+
+def _nearest_rotation(mean: Array) -> Array:
+    """Rotations [n, 3, 3] nearest to mean rotation matrices: the orthogonal factor of their polar decomposition."""
+    U, _, Vt = np.linalg.svd(mean)
+    return np.asarray(U @ Vt)
+
+
+def _incidence(condition: Condition) -> float:
+    """Angle of the stream, rad; 0 without wind."""
+    return condition.angle_of_attack if condition.airspeed > 0 else 0.0
