@@ -217,7 +217,7 @@ def _forces(group: Any, where: str, limit: Limit) -> Samples:
 
 
 def _numbers(variable: Any) -> Array:
-    """All values of a variable, read some chunks at a time: at once, the library would hold them twice."""
+    """All values of a variable, read some chunks at a time, since the library holds a copy of what it reads."""
     made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
     rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
     for start in range(0, len(made), rows):
