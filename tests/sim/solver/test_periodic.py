@@ -157,7 +157,7 @@ def test_an_extrapolation_that_enlarges_the_change_is_reverted() -> None:
     assert distance == np.inf
     np.testing.assert_array_equal(back.p, ends[-1].p)
     assert not secants.extrapolated
-    with pytest.raises(ValueError, match="no leap"):
+    with pytest.raises(ValueError, match="no extrapolation"):
         secants.step_back()
 
 

@@ -82,7 +82,7 @@ def test_filter_refusals() -> None:
         low_passed(rec, LowPass(600.0))
     values = rec.values.copy()
     values[3, 0] = np.nan
-    with pytest.raises(ValueError, match="lacks 1 values"):
+    with pytest.raises(ValueError, match="has 1 missing values"):
         low_passed(replace(rec, values=values), LowPass(40.0))
     with pytest.raises(ValueError, match="not sampled evenly"):
         low_passed(replace(rec, times=rec.times**1.1), LowPass(40.0))
