@@ -2,7 +2,7 @@
 
 BLAS divides a product among its threads, and the rounding depends on the division. A difference in the last bit can
 change the outcome of a search or of a significance test. All code that computes numbers of a result therefore runs with
-one BLAS thread (docs/decisions/0012-threads.md), whatever the environment says; afterwards the setting is restored.
+one BLAS thread (docs/decisions/0012-threads.md), for any setting of the environment, and the setting is restored then.
 """
 
 from __future__ import annotations

@@ -7,16 +7,17 @@ from typing import Literal
 
 
 @dataclass(frozen=True)
-class FourierDrive:
-    """Flap angle as a Fourier series of the drive phase psi, in rad.
-
-    phi(psi) = mean + sum_k [cosine[k-1] cos(k psi) + sine[k-1] sin(k psi)], k = 1, 2, ...
-    """
+class FourierSeries:
+    """An angle (rad) over the beat: mean + sum_k [cosine[k-1] cos(k psi) + sine[k-1] sin(k psi)], k = 1, 2, ..."""
 
     mean: float
     cosine: tuple[float, ...]
     sine: tuple[float, ...]
     kind: Literal["fourier"] = "fourier"
+
+
+class FourierDrive(FourierSeries):
+    """Flap angle of the driving rods as a Fourier series of the drive phase psi."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ class DatasetError(ValueError):
 
 
 class Faults:
-    """Collects faults, so that an error reports several at once; counts all, stores the first ``MAX_ERRORS``."""
+    """Collects faults, so that one error reports several; counts all, stores the first ``MAX_ERRORS``."""
 
     def __init__(self) -> None:
         self.faults: list[Fault] = []

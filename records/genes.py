@@ -66,7 +66,7 @@ class Gene:
             value = self.lower * np.exp(x * math.log(self.upper / self.lower))
         else:
             value = self.lower + x * (self.upper - self.lower)
-        return np.clip(value, self.lower, self.upper)
+        return np.asarray(np.clip(value, self.lower, self.upper))
 
 
 @dataclass(frozen=True)

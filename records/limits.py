@@ -55,7 +55,7 @@ MAX_CHUNK_BYTES = 64 * MIB
 """Size of one chunk of a NetCDF variable, unpacked."""
 
 MAX_ERRORS = 20
-"""Errors reported at once."""
+"""Errors in one report."""
 
 PLANFORM_MARGIN = 0.01
 """Largest distance of a marker at rest from the planform, m."""

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wingfit.records.drive import FourierSeries
+
 Layout = Literal["x4", "pair", "single"]
 WINGS: Mapping[Layout, int] = {"x4": 4, "pair": 2, "single": 1}
 
@@ -38,14 +40,8 @@ class SplitCycleFlap:
     kind: Literal["split_cycle"] = "split_cycle"
 
 
-@dataclass(frozen=True)
-class FourierFlap:
-    """Flap angle (rad): mean + sum_k [cosine[k-1] cos(2 pi k t*) + sine[k-1] sin(2 pi k t*)], k = 1, 2, ..."""
-
-    mean: float
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-    kind: Literal["fourier"] = "fourier"
+class FourierFlap(FourierSeries):
+    """Flap angle as a Fourier series of psi = 2 pi t*."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +58,8 @@ class PassivePitch:
     kind: Literal["passive"] = "passive"
 
 
-@dataclass(frozen=True)
-class FourierPitch:
-    """Wing pitch theta_w (rad) as a Fourier series like that of :class:`FourierFlap`."""
-
-    mean: float
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-    kind: Literal["fourier"] = "fourier"
+class FourierPitch(FourierSeries):
+    """Wing pitch theta_w as a Fourier series of psi = 2 pi t*."""
 
 
 Flap = SplitCycleFlap | FourierFlap

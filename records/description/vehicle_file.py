@@ -8,20 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, StrictBool, Tag
 
-from wingfit.records.description.fields import (
-    METRES,
-    Chord,
-    Estimates,
-    FourierFile,
-    Frequency,
-    Name,
-    Pressure,
-    Strict,
-    Temperature,
-    Thickness,
-    Title,
-    whole,
-)
+from wingfit.records.description import fields
+from wingfit.records.description.fields import Strict
 from wingfit.records.description.quantity import limits
 from wingfit.records.limits import MAX_STATIONS
 
@@ -37,8 +25,8 @@ Deviation = Annotated[
 class ChordFile(Strict):
     """Chord at a distance from the flapping axis."""
 
-    r_m: Annotated[Decimal, limits("0", "10", "m", "distance from the flapping axis", METRES)]
-    chord_m: Chord
+    r_m: Annotated[Decimal, limits("0", "10", "m", "distance from the flapping axis", fields.METRES)]
+    chord_m: fields.Chord
 
 
 class SplitCycleFile(Strict):
@@ -78,8 +66,8 @@ class PassivePitchFile(Strict):
 class MotionFile(Strict):
     """Prescribed motion of the wings over a beat; it starts where they are closest and begin to open."""
 
-    flap: Annotated[SplitCycleFile | FourierFile, Field(discriminator="kind")]
-    pitch: Annotated[PassivePitchFile | FourierFile, Field(discriminator="kind")]
+    flap: Annotated[SplitCycleFile | fields.FourierFile, Field(discriminator="kind")]
+    pitch: Annotated[PassivePitchFile | fields.FourierFile, Field(discriminator="kind")]
     pitch_station: Annotated[
         Decimal, limits("0", "1", "spans", "where the pitch holds", "give a fraction of the span", above=True)
     ] = Decimal("0.7")
@@ -93,12 +81,12 @@ class MotionFile(Strict):
 class VehicleFile(Strict):
     """The vehicle."""
 
-    name: Title
+    name: fields.Title
     layout: Literal["x4", "pair", "single"]
     claps: StrictBool = Field(description="whether the wings meet at the start of the beat")
     stations: list[ChordFile] = Field(min_length=2, max_length=MAX_STATIONS)
     wing_mass_kg: Mass
-    thickness_m: Thickness
+    thickness_m: fields.Thickness
     pitch_axis: Annotated[
         Decimal,
         limits("0", "1", "chords", "axis of wing pitch behind the leading edge", "give a fraction of the chord"),
@@ -107,14 +95,14 @@ class VehicleFile(Strict):
     mass_kg: Mass
     motion: MotionFile
     velocities: Literal["mirrored", "printed"] = "mirrored"
-    estimates: Estimates
+    estimates: fields.Estimates
 
 
 class LowPassFile(Strict):
     """The zero-phase Butterworth filter that was applied to the values."""
 
     cutoff_hz: Annotated[Decimal, limits("0", "1000000", "Hz", "half-power frequency of one pass", above=True)]
-    order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(whole)] = 4
+    order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(fields.whole)] = 4
 
 
 class AxesFile(Strict):
@@ -134,12 +122,12 @@ Noise = Annotated[Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("pe
 class VehicleRecordingFile(Strict):
     """One recording; its forces are in ``recordings/<name>.csv``."""
 
-    name: Name
+    name: fields.Name
     rig: Literal["wind_tunnel", "free_flight", "vacuum_chamber"]
-    flap_frequency_hz: Frequency
+    flap_frequency_hz: fields.Frequency
     body_pitch_deg: Annotated[Decimal, limits("-90", "90", "deg", "nose up from level", _DEGREES)]
-    pressure_mbar: Pressure
-    temperature_c: Temperature
+    pressure_mbar: fields.Pressure
+    temperature_c: fields.Temperature
     airspeed_m_s: Annotated[Decimal, limits("0", "100", "m/s", "level speed through the air")] = Decimal(0)
     gravity_m_s2: Annotated[Decimal, limits("0", "30", "m/s^2", "downwards", "give a positive number")] = Decimal(
         "9.80665"

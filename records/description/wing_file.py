@@ -8,24 +8,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from wingfit.records.description.fields import (
-    METRES,
-    Chord,
-    Estimates,
-    FourierFile,
-    Frequency,
-    Name,
-    Pressure,
-    Strict,
-    Temperature,
-    Thickness,
-    Title,
-)
+from wingfit.records.description import fields
+from wingfit.records.description.fields import Strict
 from wingfit.records.description.quantity import fault, limits
 from wingfit.records.limits import MAX_MARKERS, MAX_RODS, MAX_STATIONS
 
-Place = Annotated[Decimal, limits("-10", "10", "m", "coordinate in the wing frame (x aft, y outboard, z up)", METRES)]
-Length = Annotated[Decimal, limits("0", "10", "m", "length", METRES, above=True)]
+Place = Annotated[
+    Decimal, limits("-10", "10", "m", "coordinate in the wing frame (x aft, y outboard, z up)", fields.METRES)
+]
+Length = Annotated[Decimal, limits("0", "10", "m", "length", fields.METRES, above=True)]
 Deviation = Annotated[
     Decimal, limits("0", "0.1", "m", "standard deviation of the noise", "give metres: 0.0005, not 0.5", above=True)
 ]
@@ -36,8 +27,8 @@ class StationFile(Strict):
 
     y_m: Place
     leading_edge_m: Place
-    chord_m: Chord
-    thickness_m: Thickness
+    chord_m: fields.Chord
+    thickness_m: fields.Thickness
 
 
 class MaterialsFile(Strict):
@@ -52,7 +43,7 @@ class MaterialsFile(Strict):
 class RodFile(Strict):
     """Carbon rod in its straw."""
 
-    name: Name
+    name: fields.Name
     x_root_m: Place
     y_root_m: Place
     x_tip_m: Place
@@ -69,7 +60,7 @@ class RodFile(Strict):
 class MarkerFile(Strict):
     """Tracked marker at rest."""
 
-    name: Name
+    name: fields.Name
     x_m: Place
     y_m: Place
     z_m: Place
@@ -113,16 +104,16 @@ class FourBarFile(Strict):
 class WingFile(Strict):
     """The wing."""
 
-    name: Title
+    name: fields.Title
     stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)
     materials: MaterialsFile
     rods: list[RodFile] = Field(min_length=2, max_length=MAX_RODS)
-    driven_rods: list[Name] = Field(min_length=2, max_length=2, description="front rod, rear rod")
+    driven_rods: list[fields.Name] = Field(min_length=2, max_length=2, description="front rod, rear rod")
     markers: list[MarkerFile] = Field(min_length=1, max_length=MAX_MARKERS)
-    reference_markers: list[Name] = Field(min_length=1, max_length=MAX_MARKERS)
+    reference_markers: list[fields.Name] = Field(min_length=1, max_length=MAX_MARKERS)
     hinge: HingeFile
-    drive: Annotated[FourierFile | FourBarFile, Field(discriminator="kind")]
-    estimates: Estimates
+    drive: Annotated[fields.FourierFile | FourBarFile, Field(discriminator="kind")]
+    estimates: fields.Estimates
 
 
 def _noise_kind(value: Any) -> str:
@@ -131,7 +122,7 @@ def _noise_kind(value: Any) -> str:
 
 Noise = Annotated[
     Annotated[Deviation, Tag("one")]
-    | Annotated[dict[Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("per_marker")],
+    | Annotated[dict[fields.Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("per_marker")],
     Discriminator(_noise_kind),
 ]
 
@@ -139,14 +130,14 @@ Noise = Annotated[
 class WingRecordingFile(Strict):
     """One recording; its tracks are in ``recordings/<name>.csv``."""
 
-    name: Name
+    name: fields.Name
     rig: Literal["vacuum_chamber", "wind_tunnel"]
-    flap_frequency_hz: Frequency
+    flap_frequency_hz: fields.Frequency
     phase_lag_deg: Annotated[
         Decimal, limits("-180", "180", "deg", "lag of the rear rod", "give degrees of drive phase")
     ]
-    pressure_mbar: Pressure
-    temperature_c: Temperature
+    pressure_mbar: fields.Pressure
+    temperature_c: fields.Temperature
     airspeed_m_s: Annotated[Decimal, limits("0", "100", "m/s", "speed of the airstream, aft")] = Decimal(0)
     angle_of_attack_deg: Annotated[Decimal, limits("-90", "90", "deg", "of the rig", "give degrees")] = Decimal(0)
     gravity_m_s2: Annotated[Decimal, limits("0", "30", "m/s^2", "along -z", "give a positive number")] = Decimal(

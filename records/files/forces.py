@@ -27,7 +27,7 @@ _WIND_AXES = re.compile(r"(?:lift|drag|thrust)(?:_?[a-z]+)?", re.IGNORECASE)
 
 
 def read_forces(raw: bytes, file: str, room: int = MAX_VALUES) -> Samples:
-    """Read CSV of at most ``room`` numbers. The order of the channels is x, z, whatever that of the columns.
+    """Read CSV of at most ``room`` numbers. The order of the channels is x, z in any file.
 
     DatasetError names line and column of every error.
     """

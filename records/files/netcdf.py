@@ -22,6 +22,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
+from wingfit.records import limits
 from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset, Recording
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
@@ -32,15 +33,7 @@ from wingfit.records.files.folder import RECORDINGS
 from wingfit.records.files.forces import AXES
 from wingfit.records.files.parsed import Parsed
 from wingfit.records.files.table import Samples, too_much
-from wingfit.records.limits import (
-    MAX_CHUNK_BYTES,
-    MAX_DESCRIPTION_BYTES,
-    MAX_MARKERS,
-    MAX_NAME_BYTES,
-    MAX_ROWS,
-    MAX_VALUES,
-    MIB,
-)
+from wingfit.records.limits import MAX_CHUNK_BYTES, MAX_DESCRIPTION_BYTES, MIB
 
 FORMAT = "wingfit dataset"
 BLOCK = 2**20  # numbers
@@ -93,7 +86,7 @@ def read_netcdf(data: bytes, label: str) -> Dataset:
 
 
 def parse_netcdf(
-    opened: BinaryIO, label: str, most: int = MAX_VALUES, *, storage: bool = True
+    opened: BinaryIO, label: str, most: int = limits.MAX_VALUES, *, storage: bool = True
 ) -> tuple[Dataset, Parsed]:
     """Read a NetCDF-4 file of at most ``most`` numbers; returns the dataset and its parsed contents.
 
@@ -196,8 +189,8 @@ def _tracks(group: Any, where: str, known: list[str], limit: Limit) -> Samples:
             f"{list(positions.shape)} do not fit; they must be [T], [M] and [T, M, 3]"
         )
         raise fail(where, list(positions.shape), message)
-    if count > MAX_MARKERS:
-        raise fail(where, count, f"{count} markers; at most {MAX_MARKERS} are read: remove some")
+    if count > limits.MAX_MARKERS:
+        raise fail(where, count, f"{count} markers; at most {limits.MAX_MARKERS} are read: remove some")
     _check_size(times, positions, where, limit)
     markers = _names(names, "marker", where, limit)
     _check_names(markers, known, where)
@@ -224,7 +217,7 @@ def _forces(group: Any, where: str, limit: Limit) -> Samples:
 
 
 def _numbers(variable: Any) -> Array:
-    """All values of a variable, read some chunks at a time: at once, the library would hold them twice."""
+    """All values of a variable, read some chunks at a time, since the library holds a copy of what it reads."""
     made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
     rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
     for start in range(0, len(made), rows):
@@ -235,8 +228,8 @@ def _numbers(variable: Any) -> Array:
 
 def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
     """Check the declared sizes before memory is allocated for them."""
-    if times.size > MAX_ROWS:
-        raise fail(where, times.size, f"{times.size} times; at most {MAX_ROWS} are read: cut it")
+    if times.size > limits.MAX_ROWS:
+        raise fail(where, times.size, f"{times.size} times; at most {limits.MAX_ROWS} are read: cut it")
     if times.size + values.size > limit.left:
         raise too_much(where, limit.most)
     for variable in (times, values):
@@ -267,10 +260,9 @@ def _check_storage(variable: Any, where: str) -> None:
 def _names(variable: Any, name: str, where: str, limit: Limit) -> tuple[str, ...]:
     if h5py.check_string_dtype(variable.dtype) is None:
         raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
-    if limit.storage and variable.dtype.itemsize > MAX_NAME_BYTES:
-        message = (
-            f"each {name} takes {variable.dtype.itemsize} bytes; at most {MAX_NAME_BYTES} are read: shorten the type"
-        )
+    if limit.storage and variable.dtype.itemsize > limits.MAX_NAME_BYTES:
+        size = variable.dtype.itemsize
+        message = f"each {name} takes {size} bytes; at most {limits.MAX_NAME_BYTES} are read: shorten the type"
         raise fail(where, str(variable.dtype), message)
     if limit.storage:
         _check_storage(variable, where)

@@ -6,19 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from wingfit.records import limits
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
-from wingfit.records.limits import (
-    IMPLAUSIBLE_SPANS,
-    IMPLAUSIBLE_WEIGHTS,
-    MAX_MARKERS,
-    MAX_ROWS,
-    MIN_FRAMES,
-    MIN_SAMPLES_PER_BEAT,
-    NEGLIGIBLE_WEIGHTS,
-    UNEVEN_STEPS,
-)
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
 
@@ -31,10 +22,16 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     """Add the faults of the times and values of ``recording``; ``at(row)`` names the place of a row in messages."""
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
-    if not MIN_FRAMES <= frames <= MAX_ROWS:
-        faults.add(where, frames, f"{frames} frames; it must be {MIN_FRAMES} to {MAX_ROWS}: record longer, or split it")
-    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= MAX_MARKERS:
-        faults.add(where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {MAX_MARKERS}")
+    if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
+        faults.add(
+            where,
+            frames,
+            f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it",
+        )
+    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= limits.MAX_MARKERS:
+        faults.add(
+            where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {limits.MAX_MARKERS}"
+        )
     increasing = _check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:_SHOWN]:
@@ -48,7 +45,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         _check_positions(values, recording.markers, rig, where, faults)
         return
     _check_forces(recording, rig, where, faults)
-    if increasing and frames >= MIN_FRAMES:
+    if increasing and frames >= limits.MIN_FRAMES:
         _check_clock(recording, where, at, faults)
 
 
@@ -74,7 +71,7 @@ def _check_positions(
     """Markers are within about a span of the hinge; farther ones indicate another unit or frame."""
     hinge = (0.0, wing.hinge.y, wing.hinge.z)
     distance = _typical(values, hinge)
-    limit = IMPLAUSIBLE_SPANS * wing.span
+    limit = limits.IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
         far = distance / wing.span
         unit = (
@@ -127,7 +124,7 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
     mass = vehicle.mass if recording.mass is None else recording.mass
     weight = mass * STANDARD_GRAVITY
     largest, force = max(sizes.items(), key=lambda item: item[1])
-    low, high = NEGLIGIBLE_WEIGHTS * weight, IMPLAUSIBLE_WEIGHTS * weight
+    low, high = limits.NEGLIGIBLE_WEIGHTS * weight, limits.IMPLAUSIBLE_WEIGHTS * weight
     if not low <= force <= high:
         message = (
             f"{largest} is typically {force:.4g} N (root mean square), of a vehicle that weighs {weight:.4g} N; it "
@@ -153,12 +150,12 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
     times, frequency, low_pass = recording.times, recording.condition.flap_frequency, recording.low_pass
     steps = np.diff(times)
     step = float(np.median(steps))
-    uneven = np.flatnonzero(np.abs(steps - step) > UNEVEN_STEPS * step) + 1
+    uneven = np.flatnonzero(np.abs(steps - step) > limits.UNEVEN_STEPS * step) + 1
     for row in uneven[:_SHOWN]:
         message = (
             f"time_s is {steps[row - 1]:.6g} s after the one above, typically {step:.6g} s; steps must be equal within "
-            f"{100 * UNEVEN_STEPS:g} %: write times with more digits, give lost samples a row with empty cells, or "
-            "resample to an even clock"
+            f"{100 * limits.UNEVEN_STEPS:g} %: write times with more digits, give lost samples a row with empty cells, "
+            "or resample to an even clock"
         )
         faults.add(at(int(row)), float(times[row]), message)
     beats = frequency * float(times[-1] - times[0] + 1.5 * step)
@@ -168,10 +165,10 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
             "one whole beat is needed (two or more are better): record longer, or check flap_frequency_hz and time_s"
         )
         faults.add(where, None, message)
-    if step * frequency * MIN_SAMPLES_PER_BEAT > 1.0 + UNEVEN_STEPS:
+    if step * frequency * limits.MIN_SAMPLES_PER_BEAT > 1.0 + limits.UNEVEN_STEPS:
         message = (
             f"the sampling rate is {1 / step:.4g} Hz, {1 / (step * frequency):.3g} samples in a beat of "
-            f"{1 / frequency:.4g} s; at least {MIN_SAMPLES_PER_BEAT} are needed: give time_s in seconds, not "
+            f"{1 / frequency:.4g} s; at least {limits.MIN_SAMPLES_PER_BEAT} are needed: give time_s in seconds, not "
             "milliseconds, check flap_frequency_hz, or record faster"
         )
         faults.add(where, f"{1 / step:.4g}", message)

@@ -49,7 +49,7 @@ def test_saving_what_was_loaded_gives_the_same_description(tmp_path: Path, name:
         assert again.read_bytes() == file.read_bytes()
 
 
-def test_zip_bytes_are_deterministic_and_order_is_kept() -> None:
+def test_zip_bytes_are_deterministic_and_preserve_the_order() -> None:
     dataset = falcon_dataset()
     shuffled = replace(dataset, recordings=dataset.recordings[::-1])
     assert write_zip(dataset) == write_zip(dataset)
@@ -71,7 +71,7 @@ def test_an_existing_file_is_replaced(tmp_path: Path, name: str) -> None:
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_empty_is_not_changed(tmp_path: Path) -> None:
     (tmp_path / "precious.txt").write_text("mine")
     with pytest.raises(DatasetError, match="not an empty folder"):
         save_dataset(falcon_dataset(), tmp_path)

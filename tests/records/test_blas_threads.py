@@ -136,7 +136,7 @@ def test_a_generator_returns_what_it_returns() -> None:
     assert ended == ["end"]
 
 
-def test_a_generator_that_is_abandoned_holds_nothing() -> None:
+def test_an_abandoned_generator_restores_the_threads() -> None:
     steps = Steps()
     run = steps.run()
     next(run)

@@ -16,7 +16,7 @@ from wingfit.records import Gene
         ("1", "gene 'g' is 0; it must lie in [1, 3]"),
     ],
 )
-def test_a_value_out_of_bounds_is_told_with_its_unit_where_it_has_one(unit: str, said: str) -> None:
+def test_an_error_on_bounds_names_value_and_unit(unit: str, said: str) -> None:
     gene = Gene(name="g", unit=unit, nominal=2.0, lower=1.0, upper=3.0, scale="linear", description="")
     with pytest.raises(ValueError, match=f"^{re.escape(said)}$"):
         gene.check(0.0)

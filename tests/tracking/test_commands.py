@@ -159,7 +159,7 @@ def test_tracks_become_forces_that_a_dataset_reads(wingfit: Wingfit, flight: tup
         (("--plot", "forces.txt"), (".html",)),
     ],
 )
-def test_wrong_use_of_forces_is_told(
+def test_wrong_use_of_forces_is_reported(
     wingfit: Wingfit, flight: tuple[Path, Path], words: tuple[object, ...], expected: tuple[str, ...]
 ) -> None:
     given = ["forces", flight[0], "--body", flight[1], "--mass-kg", 0.0174, "--flap-hz", 12.5, *words]
@@ -192,7 +192,7 @@ def test_errors_in_tables_are_reported(
     assert all(word in err for word in expected), err
 
 
-def test_a_body_file_lacks_the_columns_of_angles(wingfit: Wingfit, flight: tuple[Path, Path]) -> None:
+def test_a_body_file_given_as_angles_is_refused(wingfit: Wingfit, flight: tuple[Path, Path]) -> None:
     code, _, err = wingfit("kinematics", flight[1])
     assert code == 1
     assert "body.csv, line 1: there is no column 'time_s', no 'flap_angle_deg', no 'wing_pitch_deg'" in err

@@ -120,7 +120,7 @@ def test_a_body_spinning_about_no_principal_axis_needs_the_gyroscopic_moment() -
     np.testing.assert_allclose(flight.moment[150], expected, atol=1e-3 * np.abs(expected[1]))
 
 
-def test_the_filter_is_the_one_named_and_the_derivative_loses_nothing_more() -> None:
+def test_kernels_have_the_gain_of_the_filter_and_exact_derivatives() -> None:
     windows = kernels(FILTER, RATE)
     n = windows.reach
     sections = signal.butter(4, 40.0, fs=RATE, output="sos")
@@ -137,7 +137,7 @@ def test_the_filter_is_the_one_named_and_the_derivative_loses_nothing_more() -> 
     [{}, {"drop": 0.3}, {"decay": 0.6}, {"common": 1.5e-4}],
     ids=["white", "many gaps", "coloured", "common to all"],
 )
-def test_standard_deviations_hold(case: dict[str, float]) -> None:
+def test_standard_deviations_agree_with_the_scatter(case: dict[str, float]) -> None:
     """Chi-square over instants and flights: the mean of (error / standard deviation)^2 is one."""
     squares = []
     for seed in range(16):
@@ -148,7 +148,7 @@ def test_standard_deviations_hold(case: dict[str, float]) -> None:
     assert np.all(mean < 1.18), mean
 
 
-def test_standard_deviations_hold_the_attitude() -> None:
+def test_standard_deviations_include_the_attitude() -> None:
     """Markers close together and a low cut-off: most of the error is the weight seen in a body that seems tilted."""
     shape, squares = 0.2 * MARKERS, []
     for seed in range(6):
@@ -161,7 +161,7 @@ def test_standard_deviations_hold_the_attitude() -> None:
     assert np.all(mean < 1.4), mean
 
 
-def test_marker_noise_is_told_from_rigidity_and_what_markers_share_from_the_scatter() -> None:
+def test_marker_noise_is_estimated_from_rigidity_and_common_noise_from_the_scatter() -> None:
     apart, _ = flapping(0)
     assert apart.noise.deviation == pytest.approx(2e-4, rel=0.05)
     assert apart.noise.common < 1.15
@@ -266,7 +266,7 @@ def test_swapped_markers_do_not_change_the_scale() -> None:
 
 
 @pytest.mark.parametrize(("speed", "fine"), [(99.0, True), (101.0, False)])
-def test_nothing_flies_faster_than_a_dataset_takes(speed: float, fine: bool) -> None:
+def test_speeds_above_those_of_a_dataset_are_refused(speed: float, fine: bool) -> None:
     limits = VehicleRecordingFile.model_fields["airspeed_m_s"].metadata
     assert any(getattr(limit, "high", None) == 100 for limit in limits), limits
     tracks = seen_from(np.outer(times(120), [0, speed, 0]), np.broadcast_to(LEVEL, (120, 3, 3)))

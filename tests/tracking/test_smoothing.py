@@ -99,7 +99,7 @@ def test_the_scores_are_those_of_fits_without_the_beat_predicted() -> None:
         assert score == pytest.approx(np.sqrt(square / 240), rel=1e-6)
 
 
-def test_cutting_harmonics_off_is_reported_as_lost() -> None:
+def test_the_truncation_error_is_reported() -> None:
     """Harmonic 3 is cut: its amplitude is lost from the value, 3 omega times it from the rate."""
     rng = np.random.default_rng(3)
     times = np.arange(960) / 1200
@@ -110,7 +110,7 @@ def test_cutting_harmonics_off_is_reported_as_lost() -> None:
     assert fit.noise.deviation == pytest.approx(1e-4, rel=0.1)  # what is cut off is not taken for noise
 
 
-def test_the_tail_beyond_what_is_seen_follows_the_fall_off() -> None:
+def test_harmonics_beyond_the_significant_ones_follow_their_envelope() -> None:
     """Harmonics k^-3, as of an acceleration that jumps: half of what the acceleration loses lies beyond sight."""
     k = np.arange(1, 201)
     times = np.arange(4000) / 5000

@@ -68,7 +68,7 @@ def test_a_frame_without_all_its_markers_counts_as_a_gap() -> None:
     assert np.flatnonzero(np.isnan(found.pitch)).tolist() == [7, 9]
 
 
-def test_frequency_and_start_are_found_within_their_errors() -> None:
+def test_frequency_and_start_are_estimated_within_their_errors() -> None:
     offs = []
     for seed in range(12):
         found = wing_motion(angles(seed))
@@ -106,7 +106,7 @@ def test_the_errors_of_equation_17_hold_the_noise_of_the_flap_angle() -> None:
     assert np.sqrt(np.mean(np.square(offs))) < 2.0, offs
 
 
-def test_a_pitch_that_lags_is_told_from_equation_17() -> None:
+def test_a_pitch_that_lags_has_a_misfit_to_equation_17() -> None:
     seen = angles()
     zeta, rate, _ = split_cycle((seen.times - START) * FREQUENCY - 0.08, FREQUENCY)
     late = Angles(seen.times, seen.flap, passive_pitch(zeta, rate))
@@ -169,7 +169,7 @@ def test_noise_gives_no_frequency(decay: float, samples: int) -> None:
         flap_frequency(np.arange(samples) / 1200, np.random.default_rng(7).normal(0, 0.005, samples))
 
 
-def test_a_weak_motion_is_found_in_noise() -> None:
+def test_the_frequency_of_a_weak_motion_is_detected_in_noise() -> None:
     t = np.arange(1200) / 1200
     for seed in range(5):
         y = 0.02 * np.sin(2 * np.pi * FREQUENCY * t) + noise(np.random.default_rng(seed), t.shape, 0.03, 0, 0)

@@ -172,7 +172,7 @@ def test_each_mistake_of_the_numbers_is_named(what: str, tmp_path: Path) -> None
     _assert_named(error_of(make(), tmp_path), places, words)
 
 
-def test_an_axis_may_be_zero_beside_a_good_one() -> None:
+def test_one_force_axis_may_be_zero_if_the_other_is_not() -> None:
     read = load_archive(zipped(_axis(0.0)), "a.zip").recording("hover")
     assert not read.values[:, 1].any()
     assert read.values[:, 0].all()

@@ -146,7 +146,7 @@ def test_what_was_stored_before_there_were_these_limits_is_still_read() -> None:
     assert load_parsed(convert_netcdf(data, "wing.nc", STORED), "wing.nc").recordings
 
 
-def test_the_child_knows_none_of_the_servers_secrets(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_environment_of_the_child_has_no_secrets(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "spy").write_text(f"#!/bin/sh\nenv > {tmp_path}/environment\nexit 1\n")
     (tmp_path / "spy").chmod(0o700)
     monkeypatch.setattr(sys, "executable", str(tmp_path / "spy"))
@@ -320,7 +320,7 @@ def test_a_stored_form_that_would_unpack_to_gigabytes_is_refused(name: str) -> N
         load_parsed(lie.getvalue(), "wing.nc")
 
 
-def test_no_process_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_process_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     started: list[subprocess.Popen[bytes]] = []
 
     class Noted(subprocess.Popen[bytes]):

@@ -87,7 +87,7 @@ def test_coupling_joins_small_rotations_and_displacements() -> None:
     np.testing.assert_allclose(load(both)[2], 0.5 * (K[0] + K[4]) * 1e-8 + coupling[0, 1] * 1e-8, rtol=1e-3)
 
 
-def test_coupling_is_the_same_seen_from_either_body() -> None:
+def test_coupling_is_symmetric_in_the_bodies() -> None:
     """Turning both bodies and their places together changes neither energy nor the wrenches in body axes."""
     pair = random_pair(1)
     assert pair.coupling is not None

@@ -30,7 +30,7 @@ from wingfit.sim.wing.structure import Structure, build
 Array = npt.NDArray[np.float64]
 
 
-def _one(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _one(frame: Any, moment: int) -> None:  # noqa: ARG001 (an argument of all laws)
     """One parameter, two states."""
     port = connector_port(frame)
     for c in range(port.places):
@@ -56,7 +56,7 @@ def _two(frame: Any, moment: int) -> None:  # noqa: ARG001
 
 
 def _blowing(frame: Any, moment: int) -> None:
-    """One parameter, one state: it blows upward, and is told the parameter and the wind."""
+    """One parameter, one state: an upward induced velocity from the parameter and the wind."""
     port = strip_port(frame)
     for s in range(port.places):
         state, given = load1(port.state[0], s), load(port.parameters, 0, s)

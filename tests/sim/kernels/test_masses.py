@@ -113,7 +113,7 @@ def test_lanes_have_masses_of_their_own() -> None:
     assert np.all(np.diff(np.abs(tracks[0] - tracks[0][..., :1]).max(axis=(0, 1, 2))) > 0)
 
 
-def test_plate_drifting_with_the_wind_feels_nothing() -> None:
+def test_a_plate_that_drifts_with_the_wind_has_no_load() -> None:
     """Air moved along has the momentum of the motion relative to the wind: none, whatever its matrix."""
     structure, scene = free_body()
     part = np.random.default_rng(1).normal(size=(6, 6)) * np.array([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])[:, None]

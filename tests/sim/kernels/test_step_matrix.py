@@ -93,7 +93,7 @@ def moved_air(scene: WingScene, rng: np.random.Generator) -> None:
                 scene.add_air(division.index(strip, i), division.index(strip, j), block)
 
 
-def _joint(frame: Any, moment: int) -> None:  # noqa: ARG001 (all laws are told the moment)
+def _joint(frame: Any, moment: int) -> None:  # noqa: ARG001 (an argument of all laws)
     """Springs against displacement, dampers, and a state along every axis that relaxes and pulls, both not linearly."""
     port = connector_port(frame)
     for k in range(6):

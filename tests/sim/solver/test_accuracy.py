@@ -35,7 +35,7 @@ def error(beat: Beat, reference: Beat) -> float:
 
 @pytest.mark.parametrize("condition", [vacuum(10.0, 0.05, 3.0), tunnel(0.12, 4.0, 6.0)], ids=["vacuum", "tunnel"])
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 2e-5])
-def test_error_is_what_was_asked_for(condition: Condition, accuracy: float) -> None:
+def test_the_error_is_below_the_requested_accuracy(condition: Condition, accuracy: float) -> None:
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(accuracy=accuracy))
     genomes, blank = random_genomes(model, 8), blank_recording(model.wing, condition)
     found, exact = model.beats(genomes, blank), replace(model, numerics=FINE).beats(genomes, blank)
@@ -65,7 +65,7 @@ def test_what_one_needs_does_not_depend_on_its_neighbours() -> None:
 
 @pytest.mark.parametrize("condition", [vacuum(10.0, 0.05, 3.0), tunnel(0.12, 4.0, 6.0)], ids=["vacuum", "tunnel"])
 @pytest.mark.parametrize("division", ["4", "11"])
-def test_those_that_begin_beside_another_are_as_accurate_and_cost_less(division: str, condition: Condition) -> None:
+def test_a_warm_start_is_as_accurate_and_costs_less(division: str, condition: Condition) -> None:
     model = FlexibleWing(robird_wing(), division)
     base, blank = random_genomes(model, 1)[0], blank_recording(model.wing, condition)
     genomes = base * np.exp(np.random.default_rng(4).uniform(-0.15, 0.15, (8, len(base))))
@@ -79,7 +79,7 @@ def test_those_that_begin_beside_another_are_as_accurate_and_cost_less(division:
     assert max(len(beat.tracks) for beat in found) <= max(len(beat.tracks) for beat in alone)
 
 
-def test_one_that_fails_beside_another_begins_from_rest() -> None:
+def test_an_individual_that_fails_from_a_warm_start_starts_from_rest() -> None:
     """A stroke that is larger at once throws the wing over in its first beat; from rest it goes."""
     wing = FlexibleWing(robird_wing(), "4")
     nominal, blank = np.array([g.nominal for g in wing.genes]), blank_recording(wing.wing, vacuum(10.0, 0.05, 3.0))
@@ -90,7 +90,7 @@ def test_one_that_fails_beside_another_begins_from_rest() -> None:
     assert max(error(a, b) for a, b in zip(found, exact, strict=True)) < model.numerics.accuracy
 
 
-def test_accuracy_out_of_reach_is_said() -> None:
+def test_an_accuracy_out_of_reach_is_reported() -> None:
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(accuracy=1e-12, periodic=1e-6))
     beat = model.beat([g.nominal for g in model.genes], blank_recording(model.wing, vacuum(10.0, 0.05, 4.0)))
     assert beat.reason is not None
@@ -106,7 +106,7 @@ def test_there_are_always_two_motions_to_compare(frequency: float) -> None:
     assert ladder == LADDER[-len(ladder) :]
 
 
-def test_failure_says_so_where_there_is_nothing_to_compare_with() -> None:
+def test_a_failure_without_a_coarser_motion_is_reported() -> None:
     """The rung before the last failed: no error is made up, nor one kept from before."""
     course = Course(np.zeros(1), tracks=np.zeros((4, 1, 3)), changes=[1.0], error=1.0, reason="diverged")
     _judge(course, Numerics(), LADDER[-2], last=False)
@@ -135,7 +135,7 @@ def test_accuracy_that_is_none_is_refused(accuracy: float) -> None:
         Numerics(accuracy=accuracy)
 
 
-def test_wing_that_flutters_is_reported_and_harms_nobody() -> None:
+def test_a_wing_that_flutters_is_reported_and_does_not_affect_others() -> None:
     """A soft wing with five times the lift in a fast stream has no periodic motion; its neighbours have theirs."""
     model = FlexibleWing(robird_wing(), "11")
     nominal = np.array([g.nominal for g in model.genes])
@@ -153,7 +153,7 @@ def test_wing_that_flutters_is_reported_and_harms_nobody() -> None:
 WILD = (4.36, 0.41, 0.41, 0.65, 0.26, 0.52, 3.69, 0.71, 1.2, 1.03, 2.93, 1.99, 1.79, 0.63, 1.01, 0.23, 0.31, 1.11)
 
 
-def test_periodic_motion_that_no_wing_keeps_is_told_from_one_that_settles_slowly() -> None:
+def test_an_unstable_periodic_motion_is_distinguished_from_slow_convergence() -> None:
     """Leaping finds unstable motions too; waiting shows which they are. Light damping is not flutter."""
     model = FlexibleWing(robird_wing(), "11")
     nominal = np.array([g.nominal for g in model.genes])

@@ -257,14 +257,14 @@ def test_air_on_exudyns_angles_does_the_work_of_the_air_on_the_bodies() -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max(axis=0).min())
 
 
-def test_cost_in_scipy_is_found_at_the_tolerance() -> None:
+def test_cost_in_scipy_is_measured_at_the_tolerance() -> None:
     row = compare.scipy_case("4", "vacuum", 0.1)
     assert row["error_mm"] < 0.1
     assert 0 < row["cpu_ms_per_beat"] < 5000
     assert row["method"] in scipy_engine.METHODS
 
 
-def test_cost_in_exudyn_is_found_at_the_tolerance_and_grows_with_it() -> None:
+def test_cost_in_exudyn_is_measured_at_the_tolerance_and_grows_with_it() -> None:
     pytest.importorskip("exudyn", reason=EXUDYN)
     rough, fine = compare.exudyn_case("4", "vacuum", 1.0), compare.exudyn_case("4", "vacuum", 0.05)
     assert rough["error_mm"] < 1.0

@@ -51,13 +51,13 @@ class LinearBeat:
 
 
 def follow(beat: LinearBeat, count: int, kept: int = 8) -> tuple[State, list[float], Secants]:
-    """State after ``count`` accelerated beats from the start, and the distances told on the way."""
-    state, told = beat.state(beat.start), []
+    """State after ``count`` accelerated beats from the start, and the estimated distances."""
+    state, estimated = beat.state(beat.start), []
     secants = Secants(state, RATE, kept, NO_SIZES)
     for _ in range(count):
         state, distance = secants.add(state, beat(state))
-        told.append(distance)
-    return state, told, secants
+        estimated.append(distance)
+    return state, estimated, secants
 
 
 @pytest.mark.parametrize("decays", [(0.8,), (0.7, -0.5), (0.8, 0.5, -0.3), (0.95, 0.9)])
@@ -77,25 +77,25 @@ def test_distance_is_to_the_fixed_point_and_not_to_the_next_beat() -> None:
     secants = Secants(state, RATE, 8, NO_SIZES)
     for _ in range(3):
         here = state
-        state, told = secants.add(state, beat(state))
+        state, estimated = secants.add(state, beat(state))
     left, moved = (
         np.abs(beat.coordinates(s) - beat.coordinates(here)).max() for s in (beat.state(beat.fixed), beat(here))
     )
-    assert told == pytest.approx(left, rel=0.5)
+    assert estimated == pytest.approx(left, rel=0.5)
     assert moved < 0.5 * left
 
 
 @pytest.mark.parametrize("decay", [0.96, 0.99])
-def test_mode_too_slow_to_leap_along_is_not_taken_for_periodic(decay: float) -> None:
-    """Where a leap would be too long the distance is still that to the fixed point."""
+def test_a_mode_too_slow_to_extrapolate_does_not_count_as_periodic(decay: float) -> None:
+    """If the extrapolation would be too long, the distance is still that to the fixed point."""
     beat = LinearBeat((decay,), 6)
     state = beat.state(beat.start)
     secants = Secants(state, RATE, 8, NO_SIZES)
     for _ in range(4):
         here = state
-        state, told = secants.add(state, beat(state))
+        state, estimated = secants.add(state, beat(state))
     assert not secants.extrapolated
-    assert told == pytest.approx(
+    assert estimated == pytest.approx(
         np.abs(beat.coordinates(beat.state(beat.fixed)) - beat.coordinates(here)).max(), rel=0.1
     )
 
@@ -117,11 +117,11 @@ class RingingBeat(LinearBeat):
 @pytest.mark.parametrize("turn", [0.6, 1.0, 2.0])
 def test_modes_faster_than_the_beat_are_learnt(turn: float) -> None:
     """Two of them, four unknowns: five beats. A beat that changes more only because it is caught at another phase is no
-    leap gone wrong.
+    failed extrapolation.
     """
     beat = RingingBeat(0.85, turn, 8.0)
-    end, told, _ = follow(beat, 6)
-    assert np.all(np.isfinite(told)), "a leap was taken back"
+    end, estimated, _ = follow(beat, 6)
+    assert np.all(np.isfinite(estimated)), "an extrapolation was reverted"
     np.testing.assert_allclose(end.p, beat.state(beat.fixed).p, atol=1e-7)
 
 
@@ -131,18 +131,18 @@ def test_growth_is_the_largest_multiplier(decays: tuple[float, ...]) -> None:
     assert secants.growth == pytest.approx(max(abs(d) for d in decays), rel=0.05)
 
 
-def test_keeping_nothing_is_waiting() -> None:
+def test_without_secants_there_is_no_acceleration() -> None:
     beat = LinearBeat((0.8,), 3)
-    end, told, _ = follow(beat, 4, kept=0)
+    end, estimated, _ = follow(beat, 4, kept=0)
     expected = beat.state(beat.start)
     for _ in range(4):
         expected = beat(expected)
     for found, value in zip(end, expected, strict=True):
         np.testing.assert_array_equal(found, value)
-    assert told[-1] < told[0]
+    assert estimated[-1] < estimated[0]
 
 
-def test_leap_that_makes_things_worse_is_taken_back() -> None:
+def test_an_extrapolation_that_enlarges_the_change_is_reverted() -> None:
     beat = LinearBeat((0.8, 0.5), 4)
     state = beat.state(beat.start)
     secants = Secants(state, RATE, 8, NO_SIZES)
@@ -157,7 +157,7 @@ def test_leap_that_makes_things_worse_is_taken_back() -> None:
     assert distance == np.inf
     np.testing.assert_array_equal(back.p, ends[-1].p)
     assert not secants.extrapolated
-    with pytest.raises(ValueError, match="no leap"):
+    with pytest.raises(ValueError, match="no extrapolation"):
         secants.step_back()
 
 

@@ -26,8 +26,8 @@ def test_genes() -> None:
     assert BladeElementWing(DELFLY, PRESETS["berman_wang"].terms).searched == ("C_l", "C_r")
     assert BladeElementWing(DELFLY, PRESETS["dickinson"].terms).searched == ("C_r", "K_l", "K_d")
     assert "C_F" not in [g.name for g in BladeElementWing(replace(DELFLY, claps=False)).genes]
-    told = BladeElementWing(replace(DELFLY, estimates={"C_l": 1.3}))
-    assert told.genes[0].nominal == 1.3
+    reference = BladeElementWing(replace(DELFLY, estimates={"C_l": 1.3}))
+    assert reference.genes[0].nominal == 1.3
     wing = FlexibleWing(robird_wing(), "4")
     assert wing.searched == tuple(g.name for g in wing.genes)
 
@@ -82,7 +82,7 @@ def test_filter_refusals() -> None:
         low_passed(rec, LowPass(600.0))
     values = rec.values.copy()
     values[3, 0] = np.nan
-    with pytest.raises(ValueError, match="lacks 1 values"):
+    with pytest.raises(ValueError, match="has 1 missing values"):
         low_passed(replace(rec, values=values), LowPass(40.0))
     with pytest.raises(ValueError, match="not sampled evenly"):
         low_passed(replace(rec, times=rec.times**1.1), LowPass(40.0))
@@ -148,7 +148,7 @@ def test_lifts_about_its_weight_in_the_seeds_conditions() -> None:
     With the twist starting at theta_w = 0 at the root, as the print may also be read, the fast condition would carry a
     third of the weight (docs/decisions/0005).
     """
-    told = {
+    reference = {
         (13.3, 0.30, 83): (0.89, 1.49, 1.69),
         (12.5, 0.65, 71): (1.24, 1.44, 1.58),
         (10.3, 2.00, 31): (2.02, 1.57, 0.67),
@@ -156,9 +156,9 @@ def test_lifts_about_its_weight_in_the_seeds_conditions() -> None:
     lifts = {}
     for root in (np.pi / 2, 0.0):
         model = BladeElementWing(replace(DELFLY, motion=replace(DELFLY.motion, root_pitch=root)))
-        for (f, speed, pitch), (C_l, C_r, C_F) in told.items():
+        for (f, speed, pitch), (C_l, C_r, C_F) in reference.items():
             rec = recording(f, speed, np.radians(pitch))
             force = model.beat(genome(model, C_l=C_l, C_r=C_r, C_F=C_F), rec)[0].mean(axis=0)
             lifts[root, f] = lift_drag(force, np.radians(pitch))[0]
-    assert all(0.12 < lifts[np.pi / 2, f] < 0.22 for f, *_ in told)
+    assert all(0.12 < lifts[np.pi / 2, f] < 0.22 for f, *_ in reference)
     assert lifts[0.0, 10.3] < 0.1

@@ -32,8 +32,8 @@ def beat_of(model: BladeElementWing, rec: Recording = REC, **values: float) -> A
     """Forces [n, 2] at the seed's coefficients and ``values``; names of effects in the form effect__parameter."""
     known = {gene.name for gene in model.genes}
     own = {name: value for name, value in COEFFICIENTS.items() if name in known}
-    told = own | {name.replace("__", "."): value for name, value in values.items()}
-    return np.asarray(model.beat([genome(model, **told)], rec)[0])
+    nominal_values = own | {name.replace("__", "."): value for name, value in values.items()}
+    return np.asarray(model.beat([genome(model, **nominal_values)], rec)[0])
 
 
 def scene_of(vehicle: Vehicle, rec: Recording, **genes: float) -> VehicleScene:
@@ -71,7 +71,7 @@ def test_off_is_exactly_the_model_without() -> None:
     assert np.array_equal(model.observe([genome(model)], REC).channels, bare.observe([genome(bare)], REC).channels)
 
 
-def test_same_bits_beside_any_other_and_in_any_order_of_names() -> None:
+def test_results_do_not_depend_on_the_batch_or_the_order_of_names() -> None:
     """Individuals with other effects on, in another order, alone; effects named in another order."""
     model, draw = BladeElementWing(DELFLY).with_effects(*FREE), np.random.default_rng(5)
     typical = {key: value for name in FREE for key, value in EFFECTS[name].typical(DELFLY).items()}
@@ -164,9 +164,11 @@ def test_a_wobble_of_the_balance_is_filtered_like_the_data() -> None:
 
 def test_amplitude_and_bias_are_those_of_the_stroke() -> None:
     bare, model = BladeElementWing(DELFLY), BladeElementWing(DELFLY).with_effects("stroke_amplitude", "stroke_bias")
-    told = {gene.name: gene.nominal for gene in bare.genes}
+    nominal_values = {gene.name: gene.nominal for gene in bare.genes}
     found = beat_of(model, stroke_amplitude__part=0.1, stroke_bias__angle=0.05)
-    assert found == pytest.approx(beat_of(bare, A=1.1 * told["A"], eta=told["eta"] + 0.05), abs=1e-12)
+    assert found == pytest.approx(
+        beat_of(bare, A=1.1 * nominal_values["A"], eta=nominal_values["eta"] + 0.05), abs=1e-12
+    )
 
 
 def test_harmonics_are_those_of_the_flap_angle() -> None:

@@ -191,7 +191,7 @@ def test_air_gives_back_its_impulse(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("term", sorted(TERMS))
-def test_each_term_can_be_left_out(term: str) -> None:
+def test_each_term_can_be_omitted(term: str) -> None:
     every = tuple(name for name in TERMS)
     model, rec = BladeElementWing(DELFLY, terms=every), recording(12.5, 0.5, 1.2)
     values = {"C_l": 1.24, "C_r": 1.44, "C_F": 1.58, "C_D0": 0.07, "C_Dpi2": 2.0, "K_l": 0.8, "K_d": 0.9}

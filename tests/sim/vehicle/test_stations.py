@@ -136,7 +136,7 @@ def test_attachment_comes_late_where_the_angle_rises() -> None:
     assert smooth.mean() > 0.9
 
 
-def test_what_separation_leaves() -> None:
+def test_lift_after_separation() -> None:
     """Kirchhoff: all of it attached leaves all, none of it a quarter; and all of what is of rotation."""
     attached = np.array([1.0, 0.0, 0.25, -1e-9])[None, None, :, None] * np.ones(8)
     found, rotation = np.full_like(attached, 2.0), np.zeros((1, 4, 8))

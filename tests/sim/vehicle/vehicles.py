@@ -38,7 +38,7 @@ COEFFICIENTS = {"C_l": 1.24, "C_r": 1.44, "C_F": 1.58, "C_D0": 0.07, "C_Dpi2": 2
 
 
 def plate(flap: FourierFlap, pitch: FourierPitch, **changes: object) -> Vehicle:
-    """One rectangular wing of 0.1 m by 0.05 m, untwisted, that moves as told and meets no other."""
+    """One rectangular wing of 0.1 m by 0.05 m, untwisted, with the given motion; a single wing."""
     mean = pitch.mean if not pitch.cosine else math.pi / 2
     motion = WingMotion(flap, pitch, root_pitch=mean)
     made = Vehicle(

@@ -216,9 +216,9 @@ def test_written_campaign_reads_back_and_keeps_its_secret(tmp_path: Path) -> Non
         np.testing.assert_allclose(found.values, made.values, atol=1e-9)
         np.testing.assert_allclose(found.times, made.times, atol=1e-9)
     assert beside == tmp_path / "flight.truth.json"
-    told = json.loads(beside.read_text(encoding="utf-8"))
-    assert told["genome"] == truth.as_dict()
-    assert (told["division"], told["seed"]) == ("4", 5)
+    stored = json.loads(beside.read_text(encoding="utf-8"))
+    assert stored["genome"] == truth.as_dict()
+    assert (stored["division"], stored["seed"]) == ("4", 5)
     inside = [p for p in (tmp_path / "flight").rglob("*") if p.is_file()]
     assert inside
     assert not any("truth" in p.name or repr(truth.as_dict()["E_f"]) in p.read_text(encoding="utf-8") for p in inside)

@@ -168,7 +168,7 @@ def test_twist_of_a_thick_plate_does_not_depend_on_the_strips(chordwise: int, of
 
 
 @pytest.mark.parametrize(("chordwise", "limit"), [(2, (1e-3, 1.5e-3, 3e-3)), (4, (1.5e-3, 7e-3, 1.5e-2))])
-def test_torsion_of_a_sheet_cut_both_ways_converges(chordwise: int, limit: tuple[float, ...]) -> None:
+def test_torsion_of_a_sheet_divided_in_both_directions_converges(chordwise: int, limit: tuple[float, ...]) -> None:
     """A sheet three times as long as deep, strips narrower than the 24 mm over which its clamped end warps.
 
     Order between one and two (docs/beams.md). Four pieces also let the chord bend, which the theory does not.
@@ -183,7 +183,7 @@ def test_torsion_of_a_sheet_cut_both_ways_converges(chordwise: int, limit: tuple
 
 @pytest.mark.parametrize("chordwise", [2, 4])
 @pytest.mark.parametrize("name", ["uniform sheet", "tapered sheet"])
-def test_torsion_of_a_slender_sheet_cut_both_ways(name: str, chordwise: int) -> None:
+def test_torsion_of_a_slender_sheet_divided_in_both_directions(name: str, chordwise: int) -> None:
     """First two frequencies at 32 strips; they stay so close at 64."""
     assert np.all(np.abs(errors_of(name, "torsion", chordwise, 32)[:2]) < 1.6e-3)
     if chordwise == 2:
@@ -191,7 +191,7 @@ def test_torsion_of_a_slender_sheet_cut_both_ways(name: str, chordwise: int) -> 
 
 
 @pytest.mark.parametrize(("chordwise", "worst"), [(2, 0.115), (4, 0.145)])
-def test_shear_in_the_plane_of_a_cut_chord_is_too_soft(chordwise: int, worst: float) -> None:
+def test_in_plane_shear_of_a_divided_chord_is_too_soft(chordwise: int, worst: float) -> None:
     """A limit on a known error (docs/beams.md): spanwise and chordwise connectors shear in series, each with G A."""
     errors = errors_of("stocky beam", "in-plane", chordwise, 16)
     assert np.all(np.abs(errors) < worst)
@@ -229,7 +229,7 @@ def test_more_bodies_along_the_chord_move_the_wing_less_and_less() -> None:
     assert steps[1] < 1.5e-3
 
 
-def test_tables_leave_out_motions_that_a_division_does_not_have() -> None:
+def test_tables_omit_motions_that_a_discretisation_does_not_have() -> None:
     rows = frequency_errors("rod", replace(UNIFORM_ROD, length=1.0), ("flapwise",), True, 1, 2)
     text = frequency_markdown(rows)
     assert np.isnan(rows[0].errors[2])

@@ -63,7 +63,7 @@ def test_same_bits_for_any_batch_lane_and_neighbour(model: FlexibleWing, recordi
     assert whole.tobytes() == np.ascontiguousarray(turned).tobytes()
 
 
-def test_a_diverging_individual_is_reported_and_leaves_its_neighbours_alone(
+def test_a_diverging_individual_is_reported_and_does_not_affect_others(
     model: FlexibleWing, recording: Recording
 ) -> None:
     genomes = random_genomes(model, 3)
@@ -86,7 +86,7 @@ def test_survives_pickling(model: FlexibleWing, recording: Recording) -> None:
     assert copy.observe(genomes, recording).channels.tobytes() == model.observe(genomes, recording).channels.tobytes()
 
 
-def test_the_true_wing_is_seen_through_its_own_noise_only(model: FlexibleWing, recording: Recording) -> None:
+def test_recordings_of_the_true_wing_differ_by_their_noise_only(model: FlexibleWing, recording: Recording) -> None:
     """Aligned by the crossing, the true genome's tracks differ from the recorded ones by the tracking noise."""
     truth = true_genome(model, 3)
     difference = model.observe([truth.values], recording).channels[0] - recording.values

@@ -126,8 +126,8 @@ def test_motors_follow_the_drive(which: str, request: pytest.FixtureRequest) -> 
     front, rear = outputs.motors
     for motor in outputs.motors:
         np.testing.assert_allclose(motor.rate, rate_of(motor.angle, step), atol=1e-6 * np.abs(motor.rate).max())
-    told = flap_angle(model.wing.drive, 2 * np.pi * outputs.phase)[:, 0]
-    np.testing.assert_allclose(front.angle, told, atol=1e-9)
+    exact_angle = flap_angle(model.wing.drive, 2 * np.pi * outputs.phase)[:, 0]
+    np.testing.assert_allclose(front.angle, exact_angle, atol=1e-9)
     late = [float(np.argmax(m.angle)) / len(outputs.phase) for m in (front, rear)]
     assert (late[1] - late[0]) % 1.0 == pytest.approx(TUNNEL.phase_lag / (2 * np.pi), abs=1 / len(outputs.phase))
 
@@ -285,7 +285,7 @@ def test_phase_zero_is_that_of_the_recording() -> None:
     assert around[0] < 0 < around[1]
 
 
-def test_the_balance_closes_at_the_steps_that_are_taken_unasked() -> None:
+def test_the_balance_closes_at_the_default_steps() -> None:
     """In vacuum at 2 Hz what the dampers take is a hundredth of what swings to and fro."""
     model, condition = FlexibleWing(robird_wing(), "11"), vacuum(10.0, 0.0, 2.0)
     outputs = simulate_outputs(model, nominal(model), blank_recording(model.wing, condition))

@@ -100,8 +100,8 @@ def test_answers_are_those_of_any_size_and_motion_is_that_of_the_wing() -> None:
     assert found.responses.shape == (*known.values.shape, SMALL.size)
     model, genome = with_load(SMALL, {"2_c1": 0.2, "1_s2": -0.3})
     change = model.observe(genome, known).channels[0] - known.values
-    told = found.responses @ genome[-SMALL.size :]
-    assert np.abs(change - told).max() < 0.03 * np.abs(change).max()
+    predicted = found.responses @ genome[-SMALL.size :]
+    assert np.abs(change - predicted).max() < 0.03 * np.abs(change).max()
     motion = found.motion
     dt = 1.0 / (len(motion.phase) * motion.flap_frequency)
     slope = (np.roll(motion.deflection, -1, axis=1) - np.roll(motion.deflection, 1, axis=1)) / (2 * dt)

@@ -22,7 +22,7 @@ def springs(structure: Structure) -> Array:
 
 
 def rodded(ends: tuple[float, float], chord: float = 0.2) -> Wing:
-    """A plate with two rods on its middle line, which end where they are told."""
+    """A plate with two rods on its middle line, which end at the given positions."""
     rods = [
         straight_rod(n, chord / 2, y, d) for n, y, d in zip(("front", "rear"), ends, (FRONT_D, REAR_D), strict=True)
     ]

@@ -253,7 +253,7 @@ def integrated(wing: Wing) -> tuple[float, Array, Array]:
 
 
 @pytest.mark.parametrize("division", ["4", "11", "24", "6x3"])
-def test_every_division_cuts_one_and_the_same_wing(division: str) -> None:
+def test_every_discretisation_has_the_same_mass_properties(division: str) -> None:
     mass, centre, inertia = integrated(robird_wing())
     found = whole(cut(robird_wing(), division))
     assert found[0] == pytest.approx(mass, rel=2e-5)
