@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -166,6 +167,11 @@ class Effect:
         lower, upper = parameter.lower * unit, parameter.upper * unit
         name = f"{self.name}.{parameter.name}"
         return Gene(name, parameter.unit, nominal, lower, upper, parameter.scale, parameter.description)
+
+
+fault_of_tracks = partial(Effect, family="measurement", port="observation", observed=("tracks",))
+fault_of_forces = partial(Effect, family="measurement", port="observation", observed=("forces",))
+fault_of_recordings = partial(Effect, family="measurement", port="observation", observed=("tracks", "forces"))
 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import Recording, Vehicle, Wing
-from wingfit.sim.effects.contract import Array, Effect
 
-fault_of_tracks = partial(Effect, family="measurement", port="observation", observed=("tracks",))
-fault_of_forces = partial(Effect, family="measurement", port="observation", observed=("forces",))
-fault_of_recordings = partial(Effect, family="measurement", port="observation", observed=("tracks", "forces"))
+Array = npt.NDArray[np.float64]
 
 
 @dataclass

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from wingfit.records import Condition, Vehicle, WingMotion
 from wingfit.sim.atmosphere import density
-from wingfit.sim.effects.contract import Values
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
@@ -27,7 +26,7 @@ Complex = npt.NDArray[np.complex128]
 ROTATION_POINT = 0.75  # Eq. 4
 # Stages of a scene, in order: each reads what the stages before have changed.
 Stage = Literal["mass", "inflow", "wake", "circulation"]
-Change = Callable[["VehicleScene", Values], None]
+Change = Callable[["VehicleScene", Mapping[str, Array]], None]
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_forces
+from wingfit.sim.effects.contract import Parameter, Values, fault_of_forces
+from wingfit.sim.effects.ports.observation import Sampling
 
 
 def _observe(sampling: Sampling, values: Values) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
+from wingfit.sim.effects.contract import Parameter, Values, fault_of_tracks
+from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
+from wingfit.sim.effects.contract import Array, Parameter, Values, fault_of_tracks
+from wingfit.sim.effects.ports.observation import Sampling
 
 _TINY = 1e-8  # rad: below, (1 - cos a) / a^2 is 1/2 to the last digit, and would be 0 / 0
 

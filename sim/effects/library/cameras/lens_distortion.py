@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Array, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
+from wingfit.sim.effects.contract import Array, Parameter, Values, fault_of_tracks
+from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 

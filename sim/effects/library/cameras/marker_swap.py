@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, fault_of_tracks
 from wingfit.sim.effects.ports.markers import PLACE, nearest
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
+from wingfit.sim.effects.ports.observation import Sampling
 
 
 def _observe(sampling: Sampling, values: Values) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Parameter, Values, measure
-from wingfit.sim.effects.ports.observation import Sampling, between, fault_of_tracks
+from wingfit.sim.effects.contract import Parameter, Values, fault_of_tracks, measure
+from wingfit.sim.effects.ports.observation import Sampling, between
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 _ROUNDS = 2  # in each an error falls by the marker's speed over that of the read-out, a few hundredths

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Array, Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_tracks
+from wingfit.sim.effects.contract import Array, Parameter, Values, fault_of_tracks
+from wingfit.sim.effects.ports.observation import Sampling
 
 _BISECTIONS = 60
 

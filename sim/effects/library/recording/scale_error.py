@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Parameter, Values
-from wingfit.sim.effects.ports.observation import Sampling, fault_of_recordings
+from wingfit.sim.effects.contract import Parameter, Values, fault_of_recordings
+from wingfit.sim.effects.ports.observation import Sampling
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
