@@ -1,5 +1,7 @@
 """The style sheet: colours for light and dark, one column on a phone, ink on paper.
 
+``:host`` rules apply where the web page embeds the report in a shadow tree, in which there is no ``:root`` and no body.
+
 Maps go from the ground's own colour to the strongest contrast, so that nothing looks like nothing in light and in dark:
 yellow-green-blue for sizes, blue-orange for signs (after the palettes of Brewer, 2003, which colour-blind readers tell
 apart); before and after are vermilion and blue of Okabe and Ito (2008), and differ in shape as well.
@@ -26,8 +28,8 @@ _DARK = """--ground:#121716;--surface:#1a2120;--line:#2e3836;--ink:#e6ebe9;--qui
 _RULES = """
 *{box-sizing:border-box}
 html{-webkit-text-size-adjust:100%}
-body{margin:0;background:var(--ground);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,
-"Noto Sans",sans-serif;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
+body,:host{color:var(--ink);font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
+body{margin:0;background:var(--ground);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif}
 main{max-width:72rem;margin:0 auto;padding:1.2rem 1rem 4rem}
 h1{font-size:1.75rem;line-height:1.2;margin:.3rem 0 .6rem;letter-spacing:-.01em;text-wrap:balance}
 h2{font-size:1.15rem;margin:2.6rem 0 .8rem;padding-top:.8rem;border-top:2px solid var(--line)}
@@ -116,6 +118,8 @@ summary{cursor:pointer;color:var(--quiet);font-size:.9rem}
 ul.plain{margin:.3rem 0;padding-left:1.2rem}
 footer{margin-top:3rem;border-top:2px solid var(--line);padding-top:.8rem}
 .defs{position:absolute;width:0;height:0}
+:host{display:block;margin-top:1.5rem}
+:host h1{font-size:1.35rem}
 @media(max-width:40rem){.ranking li{grid-template-columns:minmax(0,1fr)}h1{font-size:1.45rem}}
 @media print{body{font-size:10.5pt}main{max-width:none;padding:0}h2{break-after:avoid}.scroll{overflow:visible}
 .panels{grid-template-columns:repeat(2,1fr)}:root{--ground:#fff}details::details-content{content-visibility:visible;display:block}
@@ -125,8 +129,10 @@ svg,.warning{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 
 def style_sheet() -> str:
     """All rules; no part of them loads anything."""
-    light = f":root{{color-scheme:light dark;{_LIGHT}}}{_palette(_LEVELS_LIGHT, _SIDES_LIGHT)}"
-    dark = f"@media screen and (prefers-color-scheme:dark){{:root{{{_DARK}}}{_palette(_LEVELS_DARK, _SIDES_DARK)}}}"
+    light = f":root,:host{{color-scheme:light dark;{_LIGHT}}}{_palette(_LEVELS_LIGHT, _SIDES_LIGHT)}"
+    dark = (
+        f"@media screen and (prefers-color-scheme:dark){{:root,:host{{{_DARK}}}{_palette(_LEVELS_DARK, _SIDES_DARK)}}}"
+    )
     return light + _RULES + dark
 
 

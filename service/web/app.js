@@ -6,7 +6,6 @@ import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.
 import { redrawDataset, selectDataset, setUpDataset } from "./pages/dataset.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
-import { redrawFinding } from "./parts/finding.js";
 import { $, plural, toast } from "./base/format.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
@@ -132,7 +131,6 @@ const onChange = (kind) => (job) => {
 
 function redrawAll() {
   redraw();
-  redrawFinding();
   redrawDataset();
   redrawComparison();
 }

@@ -17,14 +17,14 @@ export class ApiError extends Error {
 
 export const isFinal = (job) => FINAL.has(job.state);
 
-export async function call(method, path, { body, headers = {} } = {}) {
+export async function call(method, path, { body, headers = {}, as = "json" } = {}) {
   let response;
   try {
     response = await fetch(`v1/${path}`, { method, body, headers });
   } catch {
     throw new ApiError("The server does not answer. Start it with 'wingfit serve'.");
   }
-  if (response.ok) return response.status === 204 ? null : response.json();
+  if (response.ok) return response.status === 204 ? null : response[as]();
   let problem = {};
   try {
     problem = await response.json();
@@ -34,6 +34,8 @@ export async function call(method, path, { body, headers = {} } = {}) {
 }
 
 export const get = (path) => call("GET", path);
+
+export const getText = (path) => call("GET", path, { as: "text" });
 
 export const postJson = (path, value, headers = {}) =>
   call("POST", path, { body: JSON.stringify(value), headers: { "Content-Type": "application/json", ...headers } });

@@ -4,7 +4,7 @@ import { get, history, part } from "../base/api.js";
 import { $, DASH, duration, el, kept, plain, significant, toast } from "../base/format.js";
 import { badge, runName } from "../parts/sidebar.js";
 import { MOST_COMPARED } from "./table_page.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { isForces, request, spoken } from "../base/labels.js";
 
 let shown = [];
@@ -126,21 +126,16 @@ function geneCell(gene) {
 // Best misfit so far over what it cost. Where the stages of a run sum over different recordings its line may rise.
 export async function redrawComparison() {
   if ($("comparison").hidden) return;
-  try {
-    const Plotly = await plotly();
-    const look = theme();
-    const forces = shown.some(({ run }) => isForces(run));
-    const value = (item) => (forces ? item.best_mn : item.best_mm);
-    const traces = shown.map(({ run, past }, k) => ({ run, past, k })).filter(({ run }) => isForces(run) === forces).map(({ run, past, k }) => ({
-      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations), y: past.map(value),
-      text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
-    }));
-    await Plotly.react($("compare-plot"), traces, layout(look, {
-      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
-      xaxis: axis(look, { title: { text: "simulated individuals", standoff: 6 }, showgrid: false }),
-      yaxis: axis(look, { type: "log", title: { text: forces ? "RMS difference, mN" : "mean distance per marker, mm", standoff: 6 }, nticks: 6 }),
-    }), CONFIG);
-  } catch (error) {
-    toast(error.message);
-  }
+  const forces = shown.some(({ run }) => isForces(run));
+  const unit = forces ? "mN" : "mm";
+  const curves = shown.map((one, k) => ({ ...one, k })).filter(({ run }) => isForces(run) === forces);
+  await draw($("compare-plot"), (look) => ({
+    traces: curves.map(({ run, past, k }) => ({
+      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations),
+      y: past.map((item) => (forces ? item.best_mn : item.best_mm)), text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 },
+      hovertemplate: `%{y:.4g} ${unit}, %{text}<extra>%{fullData.name}</extra>`,
+    })),
+    showlegend: true, xaxis: axis(look, "simulated individuals", { showgrid: false }),
+    yaxis: axis(look, forces ? "RMS difference, mN" : "mean distance per marker, mm", { type: "log", nticks: 6 }),
+  })).catch((error) => toast(error.message));
 }

@@ -3,7 +3,7 @@
 import { get, part } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
 import { badge, runName } from "../parts/sidebar.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { remove } from "./submit.js";
 import { isForces, misfit } from "../base/labels.js";
 
@@ -74,25 +74,18 @@ export async function redrawDataset() {
   if (!shown) return;
   const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(shown.recordings.map((one) => one[name])).size }));
   const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
-  try {
-    const Plotly = await plotly();
-    if (shown !== dataset) return;
-    const look = theme();
-    const dots = (held, label, symbol) => {
-      const those = shown.recordings.filter((one) => one.held_out === held);
-      return {
-        type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
-        text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
-        hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
-      };
+  const dots = (look, held, label, symbol) => {
+    const those = shown.recordings.filter((one) => one.held_out === held);
+    return {
+      type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
+      text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
+      hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
     };
-    await Plotly.react($("conditions"), [dots(false, "to fit", "circle"), dots(true, "held out", "circle-open")], layout(look, {
-      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
-      xaxis: axis(look, { title: { text: "flap frequency, Hz", standoff: 6 } }), yaxis: axis(look, { title: { text: title, standoff: 6 } }),
-    }), CONFIG);
-  } catch (error) {
-    toast(error.message);
-  }
+  };
+  await draw($("conditions"), (look) => ({
+    traces: [dots(look, false, "to fit", "circle"), dots(look, true, "held out", "circle-open")],
+    showlegend: true, xaxis: axis(look, "flap frequency, Hz"), yaxis: axis(look, title),
+  })).catch((error) => toast(error.message));
 }
 
 async function listWork(id) {

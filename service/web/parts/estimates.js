@@ -1,7 +1,7 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
 import { $, correlation, el, fixed, kept, plain, plural, significant } from "../base/format.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 
 const STRONG = 0.9;
 
@@ -28,7 +28,7 @@ export function drawEstimates(result, dataset) {
   const axes = { "by-frequency": ["flap_frequency_hz", "angle_of_attack_deg", "flap frequency, Hz"],
     "by-pitch": ["angle_of_attack_deg", "flap_frequency_hz", "body pitch, deg"] };
   for (const [id, [over, other, title]] of Object.entries(axes)) {
-    drawOver($(id), result, alone, { over, other, title }).catch((error) => { $("estimates-note").textContent = error.message; });
+    draw($(id), (look) => chart(look, result, alone, { over, other, title })).catch((error) => { $("estimates-note").textContent = error.message; });
   }
 }
 
@@ -63,9 +63,7 @@ function drawLaw(law) {
 
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
 
-async function drawOver(node, result, rows, { over, other, title }) {
-  const Plotly = await plotly();
-  const look = theme();
+function chart(look, result, rows, { over, other, title }) {
   const genes = names(result);
   const x = rows.map((row) => row.recording[over]);
   const ends = [Math.min(...x), Math.max(...x)];
@@ -95,12 +93,10 @@ async function drawOver(node, result, rows, { over, other, title }) {
         arrayminus: found.map((one) => (one.low_90 === null ? 0 : one.value - one.low_90)) },
       text: rows.map((row) => plain(row.estimate.name)), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>estimate</extra>` });
     const height = 1 / genes.length;
-    axes[`yaxis${suffix}`] = axis(look, { domain: [1 - (k + 1) * height + 0.03, 1 - k * height - 0.02], title: { text: gene, standoff: 4 }, nticks: 4 });
+    axes[`yaxis${suffix}`] = axis(look, gene, { domain: [1 - (k + 1) * height + 0.03, 1 - k * height - 0.02], nticks: 4 });
   });
-  return Plotly.react(node, traces, layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look), ...axes,
-    xaxis: axis(look, { title: { text: title, standoff: 6 }, showgrid: false, anchor: `y${genes.length > 1 ? genes.length : ""}` }),
-  }), CONFIG);
+  const xaxis = axis(look, title, { showgrid: false, anchor: `y${genes.length > 1 ? genes.length : ""}` });
+  return { traces, showlegend: true, ...axes, xaxis };
 }
 
 export function fillEstimates(result) {

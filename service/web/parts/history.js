@@ -1,7 +1,7 @@
 // Fitness by generation: best and mean on a log axis, with the boundaries of the stages.
 
 import { mm, plain, significant, withForceUnit } from "../base/format.js";
-import { axis, CONFIG, layout, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { newtons } from "../base/labels.js";
 
 const GAP = { sequence: null, best: null, mean: null };
@@ -33,10 +33,10 @@ const FORCES = {
 
 export const aboutHistory = (forces) => (forces ? FORCES : MARKERS).about;
 
-export async function drawHistory(node, items, forces = false) {
+export const drawHistory = (node, items, forces = false) => draw(node, (look) => chart(look, items, forces));
+
+function chart(look, items, forces) {
   const shown = forces ? FORCES : MARKERS;
-  const Plotly = await plotly();
-  const look = theme();
   const x = items.map((item) => item.sequence);
   // The stages sum over different recordings: a line across their boundary would compare what cannot be compared.
   const points = items.flatMap((item, i) => (i && items[i - 1].stage !== item.stage ? [GAP, item] : [item]));
@@ -54,12 +54,10 @@ export async function drawHistory(node, items, forces = false) {
     line("mean", (item) => (item.mean === item.best ? null : item.mean), look.faint, 1.5),
     line("best", (item) => item.best, look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
   ];
-  const figure = layout(look, {
-    margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
-    xaxis: axis(look, { title: { text: "generation", standoff: 8 }, showgrid: false, range: span(x), ...wholeTicks(x) }),
-    yaxis: axis(look, {
-      title: { text: `fitness, ${shown.unit}`, standoff: 8 }, type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)),
-    }),
+  return {
+    traces, margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
+    xaxis: axis(look, "generation", { showgrid: false, range: span(x), ...wholeTicks(x) }),
+    yaxis: axis(look, `fitness, ${shown.unit}`, { type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)) }),
     shapes: boundaries.slice(1).map((item) => ({
       type: "line", x0: item.sequence - 0.5, x1: item.sequence - 0.5, yref: "paper", y0: 0, y1: 1,
       line: { color: look.quiet, width: 1, dash: "dot" },
@@ -71,8 +69,7 @@ export async function drawHistory(node, items, forces = false) {
       })),
       ...endLabels(traces),
     ],
-  });
-  return Plotly.react(node, traces, figure, CONFIG);
+  };
 }
 
 const span = (x) => (x.length > 1 ? [x[0] - 0.5, x.at(-1) + 0.5] : [0.5, 2.5]);

@@ -300,8 +300,8 @@ def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path
     seen.wait(f"{ROWS.format('misfit')} > 0")
     seen.page.click("#diagnose-run")
     seen.wait("location.hash.startsWith('#diagnosis=')")
-    seen.wait(TEXT.format("verdict") + " === 'named'", 30)
-    seen.wait(DRAWN.format("phases-map", 0))
+    seen.wait("document.getElementById('report').shadowRoot?.querySelector('svg[role=img]')", 30)
+    assert "verdict: named" in seen.page.inner_text("#report .over")
     assert "from the best genome of a run" in seen.page.inner_text("#diagnosis-about")
     diagnosis = seen.page.evaluate("location.hash").replace("#diagnosis=", "")
     for name, ending in (("csv", "-ranking.csv"), ("netcdf", ".nc"), ("json", ".json")):
