@@ -1,10 +1,26 @@
-"""Blocks of the page: sections, figures with the finding as their title, tables."""
+"""Blocks of a page: the document itself, sections, figures, tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
 from wingfit.report.markup import Markup, tag
+from wingfit.report.style import style_sheet
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def document(title: str, *body: object) -> str:
+    """One HTML file with no script that loads nothing, for screen, phone and paper."""
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("title", title),
+        tag("style", Markup(style_sheet())),
+    )
+    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', *body), lang='en')}\n"
 
 
 def section(heading: str, *parts: object) -> Markup:
@@ -18,9 +34,9 @@ def figure(told: str, *parts: object, note: object = None) -> Markup:
     return tag("figure", tag("figcaption", told), *parts, below)
 
 
-def panels(*drawings: object, small: bool = False) -> Markup:
-    """Drawings side by side where there is room, else below each other."""
-    return tag("div", *drawings, class_="panels small" if small else "panels")
+def panels(*drawings: object, size: str = "") -> Markup:
+    """Drawings side by side where there is room, else below each other; ``size``: "small", "wide", or the usual one."""
+    return tag("div", *drawings, class_=f"panels {size}".strip())
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int = 0) -> Markup:

@@ -113,7 +113,7 @@ def overlays(finding: Finding) -> Markup | None:
     left = len(finding.overlays) - len(shown)
     return figure(
         overlays_told(finding, shown, scale),
-        panels(*(_overlay(finding, o, scale) for o in shown), small=True),
+        panels(*(_overlay(finding, o, scale) for o in shown), size="small"),
         legend(
             ("recorded", "recorded"),
             *((f"{stage}-line", name) for stage, name in stages(finding).items()),

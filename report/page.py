@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
 from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
-from wingfit.report.layout import figure, panels, section
+from wingfit.report.layout import document, figure, panels, section
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
     Scale,
@@ -18,25 +18,15 @@ from wingfit.report.number_format import (
     titles,
     what_was_put_in,
 )
-from wingfit.report.style import style_sheet
 from wingfit.report.svg import Axis, bar, drawing, text, x_axis
 
 _PROVED = "Is the fit better on recordings it has not seen?"
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
 def html(finding: Finding) -> str:
     """One HTML file that shows all of ``finding``: no script, nothing loaded, for screen, phone and paper."""
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", f"{headline(finding)} ({finding.dataset})"),
-        tag("style", Markup(style_sheet())),
-    )
-    body = tag("body", _hatch(), tag("main", *_parts(finding)))
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    title = f"{headline(finding)} ({finding.dataset})"
+    return document(title, _hatch(), tag("main", *_parts(finding)))
 
 
 def headline(finding: Finding) -> str:

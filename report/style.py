@@ -18,6 +18,9 @@ _LEVELS_DARK = ("#22302f", "#1f4a7a", "#1d79ab", "#33a9bd", "#7fcdbb", "#cdebb0"
 _SIDES_LIGHT = ("#08519c", "#6baed6", "#f2f2ef", "#fdae6b", "#a63603")
 _SIDES_DARK = ("#a9d3f7", "#3f86c4", "#262f2e", "#c4713a", "#ffc996")
 
+# Series of line charts, distinguishable in grey and by colour-blind readers (Okabe and Ito, 2008).
+_SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+
 _LIGHT = """--ground:#fbfbf9;--surface:#fff;--line:#dfe1de;--ink:#1d2422;--quiet:#55605d;--faint:#8d9794;
 --trough:#e9ebe7;--before:#d55e00;--after:#0072b2;--floor:#1d2422;--strong:#1f7a80;--pale:#8fb9b8;--warn:#a8341f;--soft:#faeae6;
 --veil:rgba(255,255,255,.72);--hatch:#9aa5a2;--wing:#f4f5f1"""
@@ -46,6 +49,9 @@ figure{margin:1.2rem 0 1.8rem;break-inside:avoid}
 figcaption{font-weight:650;font-size:1.02rem;line-height:1.35;margin-bottom:.5rem;max-width:48rem}
 .panels{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,21rem),1fr));gap:.8rem;align-items:start}
 .panels.small{grid-template-columns:repeat(auto-fill,minmax(min(100%,17rem),1fr))}
+.panels.wide{grid-template-columns:repeat(auto-fill,minmax(min(100%,28rem),1fr))}
+.panels.wide figure>svg{max-width:40rem}
+.panels figure{margin:.4rem 0;min-width:0}
 .panels svg{display:block;width:100%;max-width:32rem;height:auto;background:var(--surface);border:1px solid var(--line);
 border-radius:8px}
 svg text{fill:var(--ink);font-size:12px}
@@ -67,6 +73,7 @@ svg .tick{fill:var(--quiet);font-size:11px}
 .curve{fill:none;stroke-width:2;stroke-linejoin:round}
 .curve.before{stroke:var(--before);stroke-dasharray:5 3}
 .curve.after{stroke:var(--after)}
+.points{fill:none;stroke:var(--faint);stroke-width:2.5;stroke-linecap:round}
 .samples{fill:none;stroke:var(--ink);opacity:.5;stroke-width:4.5;stroke-linecap:round}
 .noise{stroke:var(--ink);stroke-width:1.3;stroke-dasharray:2 3}
 .band{fill:var(--after);opacity:.22}
@@ -133,7 +140,8 @@ def style_sheet() -> str:
     dark = (
         f"@media screen and (prefers-color-scheme:dark){{:root,:host{{{_DARK}}}{_palette(_LEVELS_DARK, _SIDES_DARK)}}}"
     )
-    return light + _RULES + dark
+    series = "".join(f".curve.s{k}{{stroke:{colour}}}" for k, colour in enumerate(_SERIES))
+    return light + _RULES + series + dark
 
 
 def _palette(levels: Sequence[str], sides: Sequence[str]) -> str:

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
 
 LEVELS = 12  # colours of a map from nothing to most, classes l0 to l11
+SERIES = 6  # colours of curves, classes s0 to s5
 SIDES = 6  # colours of a map on either side of nothing, classes d0 to d12
 Points = Sequence[tuple[float, float]]
 
@@ -49,13 +51,13 @@ class Axis:
         return [round(k * step, 12) for k in range(first, last + 1)]
 
 
-def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> Axis:
-    """A linear axis that holds all ``values``, and zero where wanted, with a little room."""
+def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False, room: float = 0.05) -> Axis:
+    """A linear axis that holds all ``values``, and zero if required; ``room``: free part of the range at its ends."""
     held = [*values, 0.0] if zero or not values else list(values)
     low, high = min(held), max(held)
-    room = 0.05 * (high - low) or abs(high) * 0.1 or 1.0
-    bottom = 0.0 if zero and low == 0 else low - room
-    return Axis(bottom, high + room, start, end)
+    free = room * (high - low) if high > low else abs(high) * 0.1 or 1.0
+    bottom = 0.0 if zero and low == 0 else low - free
+    return Axis(bottom, high + free, start, end)
 
 
 def drawing(width: float, height: float, label: str, *parts: object, wide: bool = False) -> Markup:
@@ -223,9 +225,11 @@ def legend(*entries: tuple[str, str]) -> Markup:
         "noise-line": lambda: line(1, 6, 17, 6, "noise"),
         "recorded": lambda: dots([(3, 6), (9, 6), (15, 6)], "samples"),
         "hatched": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="faint"),
+        "points": lambda: dots([(3, 6), (9, 6), (15, 6)], "points"),
         "band": lambda: tag("rect", x=2, y=2, width=14, height=8, class_="band"),
         "place": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="place"),
     }
+    swatches |= {f"s{k}": partial(line, 1, 6, 17, 6, f"curve s{k}") for k in range(SERIES)}
     items = [
         tag("li", tag("svg", swatches[kind](), viewBox="0 0 18 12", aria_hidden="true"), name) for kind, name in entries
     ]

@@ -266,7 +266,7 @@ def test_nothing_stands_in_anyones_way(
         f"run={runs[0]}": DRAWN.format("beat", 1),
         "runs": f"{ROWS.format('listing-table')} > 0",
         f"dataset={dataset['id']}": DRAWN.format("conditions", 1),
-        f"diagnosis={diagnosis}": DRAWN.format("overlay-plot", 0),
+        f"diagnosis={diagnosis}": "document.getElementById('report').shadowRoot?.querySelector('h1')",
         f"compare={','.join(runs)}": DRAWN.format("compare-plot", 1),
         "effects=added_mass": "document.querySelectorAll('.effect').length > 0",
     }
