@@ -7,25 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from wingfit.cli.base import options as o
 from wingfit.cli.base.files import check_file, write_text
-from wingfit.cli.base.options import (
-    Accuracy,
-    Axes,
-    BoundsFactor,
-    DatasetOrPath,
-    Division,
-    Genes,
-    JobId,
-    LowPass,
-    PeelWidth,
-    Preset,
-    Recordings,
-    Url,
-    With,
-    Without,
-    names,
-    read_genome,
-)
 from wingfit.cli.base.output import emit, note, progress
 from wingfit.cli.findings import print_finding
 from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow
@@ -44,6 +27,7 @@ def _stage(one: Diagnosis) -> str:
 DIAGNOSES = JobKind(
     name="diagnosis",
     plural="diagnoses",
+    help="List, follow, export, cancel and delete diagnoses.",
     work="diagnosing",
     submit="wingfit diagnose DATASET",
     outcome="verdict",
@@ -60,25 +44,25 @@ app = commands(DIAGNOSES)
 
 
 def diagnose(
-    dataset: DatasetOrPath = None,
+    dataset: o.DatasetOrPath = None,
     run: Annotated[str | None, typer.Option(help="Id of a run: start from its best genome and its settings.")] = None,
-    division: Division = None,
-    preset: Preset = None,
-    without: Without = None,
-    axes: Axes = None,
-    low_pass_hz: LowPass = None,
-    peel_width_beats: PeelWidth = None,
-    with_: With = None,
+    division: o.Division = None,
+    preset: o.Preset = None,
+    without: o.Without = None,
+    axes: o.Axes = None,
+    low_pass_hz: o.LowPass = None,
+    peel_width_beats: o.PeelWidth = None,
+    with_: o.With = None,
     suspect: Annotated[
         list[str] | None, typer.Option(help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable.")
     ] = None,
-    recordings: Recordings = None,
-    gene: Genes = None,
+    recordings: o.Recordings = None,
+    gene: o.Genes = None,
     fixed: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE or FILE.json: genes that are not estimated; repeatable.")
     ] = None,
-    bounds_factor: BoundsFactor = None,
-    accuracy_mm: Accuracy = None,
+    bounds_factor: o.BoundsFactor = None,
+    accuracy_mm: o.Accuracy = None,
     refits: Annotated[int | None, typer.Option(help="Largest number of effects refitted in full; default: 8.")] = None,
     refine: Annotated[
         bool, typer.Option(help="Allow a finer discretisation where the number of bodies limits the accuracy.")
@@ -92,7 +76,7 @@ def diagnose(
         int | None,
         typer.Option(min=1, max=MOST_WORKERS, help="With --local: number of processes; default: one per processor."),
     ] = None,
-    url: Url = DEFAULT_URL,
+    url: o.Url = DEFAULT_URL,
 ) -> None:
     """Identify the physics missing from a model: what, where, how certain, validated on held-out recordings.
 
@@ -103,15 +87,15 @@ def diagnose(
         "run_id": run,
         "division": division,
         "preset": preset,
-        "without": names(without, "--without"),
+        "without": o.names(without, "--without"),
         "axes": axes or None,
         "low_pass_hz": low_pass_hz,
         "peel_width_beats": peel_width_beats,
-        "effects": names(with_, "--with"),
-        "suspects": names(suspect, "--suspect"),
+        "effects": o.names(with_, "--with"),
+        "suspects": o.names(suspect, "--suspect"),
         "recordings": recordings or None,
         "genes": gene or None,
-        "fixed": read_genome(fixed, "--fixed") if fixed else None,
+        "fixed": o.read_genome(fixed, "--fixed") if fixed else None,
         "bounds_factor": bounds_factor,
         "accuracy_mm": accuracy_mm,
         "refits": refits,
@@ -134,7 +118,9 @@ def diagnose(
 
 
 @app.command()
-def watch(diagnosis_id: JobId, report: ReportFile = None, url: Url = DEFAULT_URL, as_json: FindingJson = False) -> None:
+def watch(
+    diagnosis_id: o.JobId, report: ReportFile = None, url: o.Url = DEFAULT_URL, as_json: FindingJson = False
+) -> None:
     """Show the progress of a diagnosis, then its finding. Ctrl-C ends this command; the diagnosis continues.
 
     Example: wingfit diagnoses watch ID --report finding.html

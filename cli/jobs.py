@@ -32,6 +32,7 @@ class JobKind:
 
     name: str
     plural: str
+    help: str
     work: str
     submit: str
     outcome: str
@@ -47,7 +48,7 @@ class JobKind:
 
 def commands(kind: JobKind) -> typer.Typer:
     """Commands list, cancel, delete and export, to which runs and diagnoses each add their own."""
-    app = typer.Typer(no_args_is_help=True, help=f"Submit, follow, export and delete {kind.plural}.")
+    app = typer.Typer(no_args_is_help=True, help=kind.help)
     group = f"wingfit {kind.plural}"
 
     def command(name: str, text: str, example: str) -> Callable[..., Any]:

@@ -9,24 +9,8 @@ from typing import Annotated
 
 import typer
 
+from wingfit.cli.base import options as o
 from wingfit.cli.base.files import check_file, write_text
-from wingfit.cli.base.options import (
-    Accuracy,
-    AsJson,
-    Axes,
-    BoundsFactor,
-    Division,
-    Genes,
-    JobId,
-    LowPass,
-    PeelWidth,
-    Preset,
-    Recordings,
-    Url,
-    With,
-    Without,
-    names,
-)
 from wingfit.cli.base.output import duration, emit, moment, note, percent, say, table
 from wingfit.cli.base.rounding import with_unit
 from wingfit.cli.forces.runs import forces, predict
@@ -53,6 +37,7 @@ def _stage(run: a.Run) -> str:
 RUNS = JobKind(
     name="run",
     plural="runs",
+    help="Submit, follow, control and export calibrations, and print their results.",
     work="calibrating",
     submit="wingfit runs submit DATASET",
     outcome=">best",
@@ -73,7 +58,7 @@ app.command()(predict)
 @app.command()
 def submit(
     dataset: Annotated[str, typer.Argument(help="Id of a dataset, or a folder, .zip or .nc file to upload first.")],
-    division: Division = None,
+    division: o.Division = None,
     mode: Annotated[
         str | None, typer.Option(help="staged (vacuum, then tunnel), joint, or local (each recording on its own).")
     ] = None,
@@ -86,20 +71,20 @@ def submit(
     ] = None,
     max_generations: Annotated[int | None, typer.Option(help="Limit of generations per stage.")] = None,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same numbers.")] = None,
-    bounds_factor: BoundsFactor = None,
-    accuracy_mm: Accuracy = None,
-    recordings: Recordings = None,
-    gene: Genes = None,
-    with_: With = None,
-    preset: Preset = None,
-    without: Without = None,
-    axes: Axes = None,
-    low_pass_hz: LowPass = None,
-    peel_width_beats: PeelWidth = None,
+    bounds_factor: o.BoundsFactor = None,
+    accuracy_mm: o.Accuracy = None,
+    recordings: o.Recordings = None,
+    gene: o.Genes = None,
+    with_: o.With = None,
+    preset: o.Preset = None,
+    without: o.Without = None,
+    axes: o.Axes = None,
+    low_pass_hz: o.LowPass = None,
+    peel_width_beats: o.PeelWidth = None,
     name: Annotated[str | None, typer.Option(help="A name for the run.")] = None,
     watch_it: Annotated[bool, typer.Option("--watch", help="Stay and show the progress.")] = False,
-    url: Url = DEFAULT_URL,
-    as_json: AsJson = False,
+    url: o.Url = DEFAULT_URL,
+    as_json: o.AsJson = False,
 ) -> None:
     """Submit a calibration. Defaults: van der Grinten's thesis for wings, Armanini et al. (2016) for vehicles.
 
@@ -121,9 +106,9 @@ def submit(
             accuracy_mm=accuracy_mm,
             recordings=recordings or None,
             genes=gene or None,
-            effects=names(with_, "--with"),
+            effects=o.names(with_, "--with"),
             preset=preset,
-            without=names(without, "--without"),
+            without=o.names(without, "--without"),
             axes=axes or None,
             low_pass_hz=low_pass_hz,
             peel_width_beats=peel_width_beats,
@@ -137,7 +122,7 @@ def submit(
 
 
 @app.command()
-def show(run_id: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
+def show(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) -> None:
     """Show the settings, the state and the progress of a run.
 
     Example: wingfit runs show ID --json
@@ -147,7 +132,7 @@ def show(run_id: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None
 
 
 @app.command()
-def watch(run_id: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
+def watch(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) -> None:
     """Show the progress of a run until it ends. Ctrl-C ends this command; the run continues.
 
     Example: wingfit runs watch ID
@@ -159,7 +144,7 @@ def watch(run_id: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> Non
 
 
 @app.command()
-def pause(run_id: JobId, url: Url = DEFAULT_URL) -> None:
+def pause(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
     """Stop a run after its current generation; it can be resumed.
 
     Example: wingfit runs pause ID
@@ -169,7 +154,7 @@ def pause(run_id: JobId, url: Url = DEFAULT_URL) -> None:
 
 
 @app.command()
-def resume(run_id: JobId, url: Url = DEFAULT_URL) -> None:
+def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
     """Continue a paused run, with the same numbers as without the pause.
 
     Example: wingfit runs resume ID
@@ -180,13 +165,13 @@ def resume(run_id: JobId, url: Url = DEFAULT_URL) -> None:
 
 @app.command()
 def genome(
-    run_id: JobId,
+    run_id: o.JobId,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Also write {name: value} as JSON, for 'simulate --genome'."),
     ] = None,
-    url: Url = DEFAULT_URL,
-    as_json: AsJson = False,
+    url: o.Url = DEFAULT_URL,
+    as_json: o.AsJson = False,
 ) -> None:
     """Print the best genome so far and the nominal one.
 
@@ -204,7 +189,7 @@ def genome(
 
 
 @app.command()
-def result(run_id: JobId, url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
+def result(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) -> None:
     """Print the misfit of each recording before and after the calibration, and the estimates with their errors.
 
     Example: wingfit runs result ID

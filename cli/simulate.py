@@ -8,22 +8,8 @@ from typing import Annotated, Any, cast
 
 import typer
 
+from wingfit.cli.base import options as o
 from wingfit.cli.base.files import check_file, write_csv
-from wingfit.cli.base.options import (
-    Accuracy,
-    AsJson,
-    Division,
-    LowPass,
-    PeelWidth,
-    Preset,
-    Url,
-    With,
-    Without,
-    names,
-    read_condition,
-    read_genome,
-    refuse,
-)
 from wingfit.cli.base.output import emit, mm, number, progress, say, table
 from wingfit.cli.forces.results import force_simulation, write_forces
 from wingfit.cli.loads import summary, write_loads, write_plot
@@ -34,12 +20,12 @@ from wingfit.client.client import DEFAULT_URL, Client
 def simulate(
     dataset: Annotated[str, typer.Option(help="Id of a dataset.")],
     recording: Annotated[str | None, typer.Option(help="Recording; default: the first one.")] = None,
-    division: Division = None,
+    division: o.Division = None,
     genome: Annotated[
         list[str] | None,
         typer.Option(help="FILE.json or NAME=VALUE; repeatable. Other genes have their nominal values."),
     ] = None,
-    accuracy_mm: Accuracy = None,
+    accuracy_mm: o.Accuracy = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks or forces as CSV.")] = None,
     loads: Annotated[
         Path | None,
@@ -60,13 +46,13 @@ def simulate(
             "flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg."
         ),
     ] = None,
-    with_: With = None,
-    preset: Preset = None,
-    without: Without = None,
-    low_pass_hz: LowPass = None,
-    peel_width_beats: PeelWidth = None,
-    url: Url = DEFAULT_URL,
-    as_json: AsJson = False,
+    with_: o.With = None,
+    preset: o.Preset = None,
+    without: o.Without = None,
+    low_pass_hz: o.LowPass = None,
+    peel_width_beats: o.PeelWidth = None,
+    url: o.Url = DEFAULT_URL,
+    as_json: o.AsJson = False,
 ) -> None:
     """Simulate one recording on the server and print the distance between simulation and recording.
 
@@ -89,20 +75,20 @@ def simulate(
         "--low-pass-hz": low_pass_hz,
         "--peel-width-beats": peel_width_beats,
     }
-    given: dict[str, Any] = {"genome": read_genome(genome or []), "effects": names(with_, "--with") or ()}
-    condition = read_condition(at or [])
+    given: dict[str, Any] = {"genome": o.read_genome(genome or []), "effects": o.names(with_, "--with") or ()}
+    condition = o.read_condition(at or [])
     with Client(url) as client:
         described = client.dataset(dataset)
         name = recording or described["recordings"][0]["name"]
         if described["kind"] == "forces":
-            refuse(of_wings, "the dataset describes a vehicle, and this is for wings")
-            given |= {"preset": preset or "proposed", "without": names(without, "--without") or ()}
+            o.refuse(of_wings, "the dataset describes a vehicle, and this is for wings")
+            given |= {"preset": preset or "proposed", "without": o.names(without, "--without") or ()}
             given |= {"low_pass_hz": low_pass_hz, "peel_width_beats": peel_width_beats or 0.0}
             forces = client.simulate_forces(dataset, name, **given)
             write_forces(forces, output, plot)
             emit(forces, force_simulation, as_json=as_json)
             return
-        refuse(of_vehicles, "the dataset describes a wing, and this is for vehicles")
+        o.refuse(of_vehicles, "the dataset describes a wing, and this is for vehicles")
         given |= {"division": division or "11", "accuracy_mm": accuracy_mm}
         with progress("simulating") as report:
             report(None)

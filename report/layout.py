@@ -24,14 +24,14 @@ def document(title: str, *body: object) -> str:
 
 
 def section(heading: str, *parts: object) -> Markup:
-    """A part of the page under its heading."""
+    """A section with a heading."""
     return tag("section", tag("h2", heading), *parts)
 
 
-def figure(told: str, *parts: object, note: object = None) -> Markup:
-    """A figure whose title says what one sees; ``note`` says how it is drawn."""
+def figure(caption: str, *parts: object, note: object = None) -> Markup:
+    """A figure whose caption states its result; ``note`` explains the drawing."""
     below = None if note is None else tag("p", note, class_="note")
-    return tag("figure", tag("figcaption", told), *parts, below)
+    return tag("figure", tag("figcaption", caption), *parts, below)
 
 
 def panels(*drawings: object, size: str = "") -> Markup:
@@ -40,7 +40,7 @@ def panels(*drawings: object, size: str = "") -> Markup:
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int = 0) -> Markup:
-    """A table that scrolls by itself where it is too wide; the last ``numbers`` columns are set to the right."""
+    """A table that scrolls where it is too wide; the last ``numbers`` columns are right-aligned."""
     first = len(head) - numbers
     top = tag("tr", *(tag("th", name, scope="col", class_=_side(k, first)) for k, name in enumerate(head)))
     body = [tag("tr", *(tag("td", cell, class_=_side(k, first)) for k, cell in enumerate(row))) for row in rows]
@@ -48,7 +48,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int
 
 
 def folded(summary: str, *parts: object) -> Markup:
-    """Details that open on a click, and are always open on paper."""
+    """Details that open on a click, and are open on paper."""
     return tag("details", tag("summary", summary), *parts)
 
 

@@ -2,9 +2,9 @@
 
 ``:host`` rules apply where the web page embeds the report in a shadow tree, in which there is no ``:root`` and no body.
 
-Maps go from the ground's own colour to the strongest contrast, so that nothing looks like nothing in light and in dark:
-yellow-green-blue for sizes, blue-orange for signs (after the palettes of Brewer, 2003, which colour-blind readers tell
-apart); before and after are vermilion and blue of Okabe and Ito (2008), and differ in shape as well.
+Zero has the colour of the background, large values the strongest contrast: yellow-green-blue for sizes, blue-orange for
+signed values (after the palettes of Brewer, 2003, which colour-blind readers can distinguish). Before and after are
+vermilion and blue of Okabe and Ito (2008), and differ in shape as well.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ figcaption{font-weight:650;font-size:1.02rem;line-height:1.35;margin-bottom:.5re
 border-radius:8px}
 svg text{fill:var(--ink);font-size:12px}
 svg .title{font-weight:650;font-size:12.5px}
-svg .said{paint-order:stroke;stroke:var(--surface);stroke-width:4px;stroke-linejoin:round}
+svg .value{paint-order:stroke;stroke:var(--surface);stroke-width:4px;stroke-linejoin:round}
 svg .label{fill:var(--quiet);font-size:11.5px}
 svg .tick{fill:var(--quiet);font-size:11px}
 .grid{stroke:var(--line);stroke-width:1}
@@ -99,7 +99,7 @@ svg .tick{fill:var(--quiet);font-size:11px}
 .bars{display:grid;grid-template-columns:7.6rem minmax(3rem,1fr) 4.4rem;gap:.3rem .7rem;
 align-items:center;font-size:.86rem;align-content:start}
 .bars .name{color:var(--quiet)}
-.bars .said{text-align:right}
+.bars .value{text-align:right}
 .bars .negative{color:var(--warn)}
 .verdicts{grid-template-columns:8.6rem minmax(3rem,1fr) 4.4rem;max-width:34rem;margin:1rem 0}
 .verdicts .chosen{font-weight:700;color:var(--ink)}

@@ -1,7 +1,7 @@
-"""A small kit for figures: axes with round numbers, marks, colour levels.
+"""SVG charts: axes with round numbers, marks, colour levels, legends.
 
-Panels are drawn about 360 units wide, so that on a phone, where each fills the width, letters keep their size. Colours
-are classes, given in :mod:`wingfit.report.style` for light and for dark.
+Drawings are about 360 units wide, so that text keeps its size on a phone, where each fills the width. Colours are CSS
+classes, defined in :mod:`wingfit.report.style` for light and dark.
 """
 
 from __future__ import annotations
@@ -14,15 +14,15 @@ from functools import partial
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
 
-LEVELS = 12  # colours of a map from nothing to most, classes l0 to l11
+LEVELS = 12  # colours of a map from zero to the maximum, classes l0 to l11
 SERIES = 6  # colours of curves, classes s0 to s5
-SIDES = 6  # colours of a map on either side of nothing, classes d0 to d12
+SIDES = 6  # colours of a map on either side of zero, classes d0 to d12
 Points = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Values from ``low`` to ``high`` at places from ``start`` to ``end`` in the drawing."""
+    """Maps values from ``low`` to ``high`` to coordinates from ``start`` to ``end``."""
 
     low: float
     high: float
@@ -31,7 +31,7 @@ class Axis:
     logarithmic: bool = False
 
     def at(self, value: float) -> float:
-        """Place of ``value``; values beyond the ends are put on them."""
+        """Coordinate of ``value``; values beyond the ends are moved to them."""
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             part = math.log(value / self.low) / math.log(self.high / self.low)
@@ -61,7 +61,7 @@ def axis(values: Sequence[float], start: float, end: float, *, zero: bool = Fals
 
 
 def drawing(width: float, height: float, label: str, *parts: object, wide: bool = False) -> Markup:
-    """An SVG that scales to the width it is given; ``label`` is read out to those who cannot see it."""
+    """An SVG that fills the width of its parent; ``label`` is its text alternative."""
     return tag(
         "svg",
         *parts,
@@ -73,7 +73,7 @@ def drawing(width: float, height: float, label: str, *parts: object, wide: bool 
 
 
 def text(x: float, y: float, words: object, *, anchor: str = "start", class_: str | None = None) -> Markup:
-    """Words whose base line is at ``y``."""
+    """Text with its baseline at ``y``."""
     return tag("text", words, x=x, y=y, text_anchor=None if anchor == "start" else anchor, class_=class_)
 
 
@@ -97,7 +97,7 @@ def area(points: Points, class_: str) -> Markup | None:
 
 
 def dots(points: Points, class_: str) -> Markup | None:
-    """Points as one path; the class says how large (its line has round ends)."""
+    """Points as one path with round line ends; the class sets their size."""
     return tag("path", d="".join(f"M{x:.1f} {y:.1f}h0" for x, y in points), class_=class_) if points else None
 
 
@@ -115,7 +115,7 @@ def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
 
 
 def whisker(along: Axis, y: float, ends: tuple[float | None, float | None], value: float, class_: str) -> Markup:
-    """A dot with its interval; an end that nothing bounds runs to the end of the axis and has an arrow there."""
+    """A dot with its interval; an end without a bound is an arrow to the end of the axis."""
     parts: list[Markup] = []
     for bound, edge in zip(ends, (along.start, along.end), strict=True):
         if bound is None:
@@ -161,12 +161,12 @@ def level(value: float, most: float) -> int:
 
 
 def side(value: float, most: float) -> int:
-    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; SIDES is nothing."""
+    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; zero is SIDES."""
     return SIDES + max(-SIDES, min(SIDES, round(SIDES * value / most))) if most > 0 else SIDES
 
 
 def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> Markup:
-    """A grid of cells, rows downwards, one path for each class; None leaves a cell out."""
+    """A grid of cells, rows downwards, one path per class; None: no cell."""
     rows, columns = len(classes), len(classes[0])
     width, height = (across.end - across.start) / columns, (down.end - down.start) / rows
     paths: dict[str, list[str]] = {}
@@ -174,7 +174,7 @@ def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> 
         for j, name in enumerate(row):
             if name is not None:
                 x, y = across.start + j * width, down.start + i * height
-                # a hair wider than the cell, so that no seam shows
+                # slightly wider than the cell, so that no gap shows
                 piece = f"M{x:.2f} {y:.2f}h{width + 0.2:.2f}v{height + 0.2:.2f}h-{width + 0.2:.2f}z"
                 paths.setdefault(name, []).append(piece)
     return joined(*(tag("path", d="".join(pieces), class_=name) for name, pieces in sorted(paths.items())))
@@ -183,7 +183,7 @@ def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> 
 def colour_bar(
     across: Axis, y: float, classes: Sequence[str], label: str, mark: tuple[float, str] | None = None
 ) -> Markup:
-    """A bar of ``classes`` over the values of ``across``, 44 units high with its numbers; ``mark`` is a named value."""
+    """A colour bar of ``classes`` over ``across``, 44 units high with its numbers; ``mark``: a value and its name."""
     width = (across.end - across.start) / len(classes)
     parts = [
         tag("rect", x=across.start + k * width, y=y, width=width + 0.3, height=9.0, class_=name)
@@ -201,7 +201,7 @@ def colour_bar(
 
 
 def bar(part: float, class_: str) -> Markup:
-    """A bar that fills ``part`` of the width it is given."""
+    """A bar that fills the fraction ``part`` of the width of its parent."""
     shown = min(1.0, max(0.0, part))
     return tag(
         "svg",
@@ -215,7 +215,7 @@ def bar(part: float, class_: str) -> Markup:
 
 
 def legend(*entries: tuple[str, str]) -> Markup:
-    """Names beside what they stand for: (kind, name), kind being one of the swatches below."""
+    """A legend of (kind, name); ``kind`` is one of the swatches below."""
     swatches: dict[str, Callable[[], object]] = {
         "before": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot before"),
         "after": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot after"),

@@ -39,7 +39,12 @@ Preset = Annotated[str | None, typer.Option(help="Vehicles: a model of 'wingfit 
 Without = Annotated[
     list[str] | None, typer.Option(help="Vehicles: leave out this term, e.g. clap_and_peel; repeatable.")
 ]
-Axes = Annotated[list[str] | None, typer.Option("--axis", help="Vehicles: fit this force axis, x or z; repeatable.")]
+Axes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--axis", help="Vehicles: fit this force axis, x or z; repeatable; default of runs: x, of diagnoses: all."
+    ),
+]
 LowPass = Annotated[
     float | None, typer.Option(help="Vehicles: cut-off frequency; default: 3.2 x flap frequency; 0: no filter.")
 ]
