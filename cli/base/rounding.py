@@ -11,7 +11,7 @@ NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
 ROUNDING = 1e-9  # of the correlation of a thing with itself
 
 
-def kept(value: float | None, digits: int = 3) -> str:
+def rounded(value: float | None, digits: int = 3) -> str:
     """``value`` with significant digits, trailing zeros kept: 0.0500, 12.0, 385; a dash for None."""
     if value is None:
         return "–"
@@ -41,7 +41,7 @@ class Unit:
 
     def show(self, value: float | None, digits: int = 3) -> str:
         """``value`` (SI) in this unit, without its name; a dash for None."""
-        return kept(None if value is None else self.per_si_unit * value, digits)
+        return rounded(None if value is None else self.per_si_unit * value, digits)
 
 
 UNITS = ((10.0, Unit("N", 1.0)), (1e-3, Unit("mN", 1e3)), (0.0, Unit("µN", 1e6)))

@@ -89,7 +89,7 @@ def _inertia(text: str) -> npt.NDArray[np.float64]:
     tensor = np.array([[xx, 0, -xz], [0, yy, 0], [-xz, 0, zz]])
     if np.linalg.eigvalsh(tensor)[0] <= 0:
         raise typer.BadParameter(
-            f"{text}: no rigid body has this inertia; it must be positive definite", param_hint="--inertia"
+            f"{text}: not positive definite; no rigid body has this inertia", param_hint="--inertia"
         )
     return tensor
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wingfit.cli.base.files import write_csv, write_text
 from wingfit.cli.base.output import interval, number, remarks, say, table
-from wingfit.cli.base.rounding import Unit, correlation, force_unit, kept
+from wingfit.cli.base.rounding import Unit, correlation, force_unit, rounded
 from wingfit.client import force_answers as f
 from wingfit.service.units import MN
 
@@ -46,7 +46,7 @@ def force_simulation(answer: f.ForceSimulation) -> None:
         [
             QUANTITIES[one["quantity"]],
             *map(unit.show, row),
-            kept(one["rmse_percent"]),
+            rounded(one["rmse_percent"]),
             correlation(one["correlation"]),
         ]
         for one, row in zip(answer["agreements"], forces, strict=True)
@@ -170,11 +170,11 @@ def _global(law: f.GlobalModel) -> None:
 
 
 def _rms(one: f.Agreement | None, unit: Unit) -> str:
-    return "–" if one is None else f"{unit.show(one['rmse_n'])} ({kept(one['rmse_percent'], 2)})"
+    return "–" if one is None else f"{unit.show(one['rmse_n'])} ({rounded(one['rmse_percent'], 2)})"
 
 
 def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{kept(value, 2)} %"
+    return "–" if value is None else f"{rounded(value, 2)} %"
 
 
 def _mean(series: Sequence[float]) -> float:

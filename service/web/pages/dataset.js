@@ -1,4 +1,4 @@
-// The selected dataset: what was recorded, under which conditions, and what was made of it.
+// The selected dataset: recordings, conditions, and its runs and diagnoses.
 
 import { get, part } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
@@ -68,7 +68,7 @@ function drawRecordings() {
     number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
 }
 
-// What the recordings cover: flap frequency against the one other condition that varies most.
+// Chart of the conditions: flap frequency against the other quantity with the most values.
 export async function redrawDataset() {
   const shown = dataset;
   if (!shown) return;
@@ -95,7 +95,7 @@ async function listWork(id) {
     const found = await get(`${kind}?dataset_id=${part(id)}&limit=${LISTED}`);
     if (hooks.currentId() !== id) return;
     const items = found.items.map((job) => el("li", {}, el("a", { href: `#${page}=${part(job.id)}` }, ...text(job))));
-    if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "all of them")));
+    if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "Show all")));
     list.replaceChildren(...(items.length ? items : [el("li", { className: "quiet" }, "None yet.")]));
   };
   await Promise.all([

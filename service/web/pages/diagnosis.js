@@ -19,7 +19,7 @@ export function setUpDiagnosis(given) {
   });
 }
 
-// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, and said, where it is refused.
+// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, after an error message, if it is refused.
 export async function diagnose(body) {
   try {
     return await postJson("diagnoses", body, { "Idempotency-Key": randomKey() });

@@ -7,7 +7,7 @@ import { QUANTITIES, SOURCES } from "../base/labels.js";
 const HARMONICS = 8;
 const DECADES = 6;
 
-// Draw the quantities ``names`` (at most two); the answer is a note on what is seen.
+// Draw the quantities ``names`` (at most two); returns a note on the charts.
 export async function drawBeats(forces, names, about) {
   const drawn = [];
   for (const k of [0, 1]) {
@@ -37,7 +37,7 @@ function meanBeatDifference(forces, name) {
   return Math.sqrt(recorded.reduce((sum, value, i) => sum + (value - modelled[i]) ** 2, 0) / recorded.length);
 }
 
-// A beat has no last instant: its end is the start of the next.
+// Close the curve: the end of a beat is the start of the next.
 const closed = (values) => [...values, values[0]];
 
 function beat(look, forces, name) {
@@ -61,7 +61,7 @@ function beat(look, forces, name) {
   };
 }
 
-// The model repeats beat by beat, so all its power is at harmonics: dots there, not a line through nothing.
+// The model is periodic: all its power is at harmonics of the flap frequency, drawn as dots.
 function spectrum(look, forces, name, frequency) {
   const recorded = forces.recorded_spectrum_n2_hz[name];
   const modelled = forces.modelled_spectrum_n2_hz[name];

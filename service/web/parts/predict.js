@@ -1,4 +1,4 @@
-// Forces that the global model of a run predicts for a condition that somebody asks for.
+// Prediction of the global model for a given condition.
 
 import { part, postJson } from "../base/api.js";
 import { $, el, forceUnit, significant } from "../base/format.js";
@@ -24,8 +24,8 @@ export function showPrediction(next, result, dataset) {
   const law = result.global_model;
   $("prediction-form").hidden = !law;
   if (!law) {
-    $("prediction-note").textContent = "This run has no global model, from which the coefficients of another condition could follow. "
-      + "It takes local estimates under at least four conditions that differ in flap frequency and body pitch.";
+    $("prediction-note").textContent = "This run has no global model, so it cannot predict other conditions. "
+      + "A global model needs local estimates under at least four conditions with different flap frequency and body pitch.";
     return;
   }
   $("prediction-note").textContent = `Coefficients from the global model, forces of one beat, not low-passed. Fitted between `
@@ -46,7 +46,7 @@ export function redrawPrediction() {
   if (prediction) draw();
 }
 
-// The middle of what was fitted, as a start.
+// Initial values: the mean of the fitted conditions.
 function fill(recordings) {
   const form = $("prediction-form");
   const mean = (key) => recordings.reduce((sum, recording) => sum + recording[key], 0) / recordings.length;

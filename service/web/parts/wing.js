@@ -1,4 +1,4 @@
-// Recorded over simulated markers: in 3-D at one phase, and their height over the beat.
+// Recorded and simulated markers: in 3-D at one phase, and their height over the beat.
 
 import { plain, significant } from "../base/format.js";
 import { axis, draw, PHASE } from "../base/plots.js";
@@ -6,7 +6,7 @@ import { axis, draw, PHASE } from "../base/plots.js";
 const SHOWN = 4;
 const AXES = ["x aft, mm", "y span, mm", "z up, mm"];
 
-// Frames in order of phase: a strobe takes them from many beats.
+// Frames in order of phase: a stroboscopic recording takes them from many beats.
 export function byPhase(tracks) {
   const order = tracks.phase.map((_, i) => i).sort((a, b) => tracks.phase[a] - tracks.phase[b]);
   const pick = (list) => order.map((i) => list[i]);
@@ -80,7 +80,7 @@ function wing(look, node, tracks, frame) {
   });
   const [x, y, z] = tracks.extents ??= extents(tracks);
   const lengths = [x, y, z].map(([low, high]) => high - low);
-  // True to scale, and as large as the figure allows: its height sets the scale, so a narrow one needs a smaller box.
+  // To scale, as large as the chart allows: its height sets the scale, so a narrow chart needs a smaller box.
   const zoom = Math.min(1.6, (1.4 * node.clientWidth) / node.clientHeight) / Math.max(...lengths);
   const [rx, ry, rz] = lengths.map((length) => length * zoom);
   return {
@@ -93,7 +93,7 @@ function wing(look, node, tracks, frame) {
   };
 }
 
-// A few markers from the root to the tip, those that were tracked best.
+// A few well-tracked markers from the root to the tip.
 export function chosen(tracks) {
   const count = (m) => tracks.recorded_mm.filter((frame) => isSeen(frame[m])).length;
   const seen = tracks.markers.map((_, m) => m).filter((m) => count(m) >= tracks.phase.length / 2);

@@ -14,7 +14,7 @@ import pytest
 from tests.service.clients.test_cli import wingfit
 from tests.service.processes import ServerProcess
 from tests.service.runs import force_data
-from wingfit.cli.base.rounding import correlation, force_unit, kept, with_unit
+from wingfit.cli.base.rounding import correlation, force_unit, rounded, with_unit
 from wingfit.cli.forces.results import charts, write_forces
 from wingfit.client.client import Client, WingfitError
 from wingfit.records import load_dataset
@@ -201,7 +201,7 @@ def test_a_balance_campaign_is_written_with_its_truth(wingfit: Wingfit, tmp_path
 
 
 def test_forces_of_any_size_keep_three_digits() -> None:
-    assert [kept(v) for v in (None, 0.0, -0.0, 0.05, 12.0, 9.996, 385051.8)] == [
+    assert [rounded(v) for v in (None, 0.0, -0.0, 0.05, 12.0, 9.996, 385051.8)] == [
         "–", "0", "0", "0.0500", "12.0", "10.0", "385052",
     ]  # fmt: skip
     assert [with_unit(v) for v in (5e-5, 0.0312, -0.9, 385051.8, 0.0)] == [

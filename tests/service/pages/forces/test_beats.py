@@ -9,7 +9,7 @@ import pytest
 from tests.service.conftest import Api
 from tests.service.pages.browsing import DRAWN, Seen
 from tests.service.runs import force_data
-from wingfit.cli.base.rounding import kept
+from wingfit.cli.base.rounding import rounded
 
 
 def _forces(api: Api, run_id: str, recording: str, source: str) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def test_prediction_within_outside_and_far_outside(seen: Seen, api: Api, local: 
     assert not seen.page.is_visible("#prediction-warnings")
     assert seen.data("prediction-lift", 0, "y") == pytest.approx(expected["lift_n"])
     assert seen.data("prediction-x", 1, "y") == pytest.approx(expected["z_n"])
-    assert kept(1e3 * expected["averages_n"]["lift"]) in seen.page.inner_text("#prediction-numbers")
+    assert rounded(1e3 * expected["averages_n"]["lift"]) in seen.page.inner_text("#prediction-numbers")
     seen.page.fill("[name=flap_frequency_hz]", "13.6")
     seen.page.click("#prediction-form [type=submit]")
     seen.wait("document.getElementById('prediction-warnings').textContent.includes('extrapolation')")

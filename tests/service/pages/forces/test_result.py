@@ -11,7 +11,7 @@ from tests.service.conftest import Api
 from tests.service.pages.browsing import DRAWN, Seen
 from tests.service.pages.forces.conftest import finished
 from tests.service.runs import force_data
-from wingfit.cli.base.rounding import correlation, kept, with_unit
+from wingfit.cli.base.rounding import correlation, rounded, with_unit
 
 if TYPE_CHECKING:
     from playwright.sync_api import Route
@@ -34,7 +34,7 @@ def test_convergence_and_outcome_are_in_millinewtons(seen: Seen, api: Api, local
     names = seen.page.evaluate("document.getElementById('history').layout.annotations.map((a) => a.text)")
     assert set(force_data.FITTED) <= set(names)
     seen.wait("document.getElementById('numbers').textContent.includes('held out')")
-    assert kept(result["after_mn"]) in seen.page.inner_text("#numbers")
+    assert rounded(result["after_mn"]) in seen.page.inner_text("#numbers")
     about = seen.page.inner_text("#run-about")
     assert "fitted to x" in about
     assert "low-pass at 3.2 × flap frequency" in about
@@ -101,12 +101,14 @@ def test_the_agreement_table_has_every_model(seen: Seen, local: str, result: dic
     entries += [_agreement(result["agreements"], first, source, quantity) for source in ("average", "nominal")]
     shown = seen.page.evaluate("[...document.querySelectorAll('#agreement thead th')].map((c) => c.textContent)")
     assert "mN" in shown
-    expected = [(kept(1e3 * a["rmse_n"]), kept(a["rmse_percent"]), correlation(a["correlation"])) for a in entries]
+    expected = [
+        (rounded(1e3 * a["rmse_n"]), rounded(a["rmse_percent"]), correlation(a["correlation"])) for a in entries
+    ]
     assert rows[first] == [cell for entry in expected for cell in entry]
     assert rows[force_data.HELD_OUT][:3] == ["–", "–", "–"]
     means = {row[0].removesuffix(" held out"): row[1:] for row in seen.rows("averages")}
     forces = [entries[0]["mean_recorded_n"], *(a["mean_modelled_n"] for a in entries)]
-    assert means[first] == [kept(1e3 * force) for force in forces]
+    assert means[first] == [rounded(1e3 * force) for force in forces]
     assert seen.page.inner_text("#averages-title") == "Average over the beat, mN"
 
 
