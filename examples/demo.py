@@ -140,7 +140,7 @@ def _print_genes(genes: list[a.GeneInfo]) -> None:
     table(["gene", ">nominal", ">best", ">truth", "unit", "identifiable", ">off by"], rows)
     known = [abs(off[gene["name"]]) for gene in genes if gene["identifiable"]]
     close = sum(value <= GOAL_PERCENT for value in known)
-    say(f"of {len(known)} genes that the data tell, {close} are within {GOAL_PERCENT:g} % of the truth")
+    say(f"of {len(known)} identifiable genes {close} are within {GOAL_PERCENT:g} % of the truth")
 
 
 def _print_floor(result: a.Result) -> None:

@@ -13,7 +13,7 @@ from wingfit.report.layout import document, figure, panels
 from wingfit.report.markup import Markup, tag
 from wingfit.report.svg import SERIES, Axis, area, axis, curve, dots, drawing, legend, x_axis, y_axis
 
-WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 56.0, 470.0, 10.0, 210.0
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
 Values = Sequence[float] | npt.NDArray[np.float64]
 DECADES = 8  # shown of a logarithmic axis: smaller values are rounding errors
 

@@ -20,9 +20,7 @@ def place(finding: Finding) -> Markup | None:
     where = finding.where
     if where is None:
         return None
-    whose = (
-        "the contribution of the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
-    )
+    whose = "the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
     drawings = [d for d in (_strips(where), _harmonics(where, whose)) if d is not None]
     found = figure(where.words or "Location of the misfit", panels(*drawings)) if drawings else tag("p", where.words)
     return joined(found, _powers(where.exponents, whose))

@@ -139,16 +139,17 @@ def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[f
 
 
 def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -> Markup:
-    """Grid lines, their numbers to the left, and the label turned beside these (about 46 units in all)."""
+    """Grid lines, their numbers to the left, and beside these the rotated label (about 46 units in all)."""
     parts: list[Markup] = []
+    room = 36.0  # between the axis and the middle of the label
     for value in up.ticks(count):
-        at = up.at(value)
+        at, room = up.at(value), max(room, 12 + 6.2 * len(number(value)))
         parts += [line(left, at, right, at), text(left - 4, at + 3.5, number(value), anchor="end", class_="tick")]
     middle = (up.start + up.end) / 2
     turned = tag(
         "text",
         label,
-        transform=f"translate({left - 36:g},{middle:g}) rotate(-90)",
+        transform=f"translate({left - room:g},{middle:g}) rotate(-90)",
         text_anchor="middle",
         class_="label",
     )
