@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from wingfit.cli.base.files import refused
 from wingfit.cli.base.output import progress, say
 from wingfit.client.client import WingfitError
 
@@ -27,11 +28,8 @@ def campaign(
     _refuse_existing(out)
     from wingfit.sim.virtual_rigs.campaign import write_campaign  # imported late: other commands start faster
 
-    try:
-        with progress("simulating the campaign") as report:
-            write_campaign(out, division=division, small=small, seed=seed, progress=report)
-    except ValueError as error:
-        raise WingfitError("no campaign written", str(error)) from error
+    with refused("no campaign written"), progress("simulating the campaign") as report:
+        write_campaign(out, division=division, small=small, seed=seed, progress=report)
     _written(out)
 
 
@@ -48,10 +46,8 @@ def balance(
     _refuse_existing(out)
     from wingfit.sim.virtual_rigs.balance import write_campaign  # as above
 
-    try:
+    with refused("no campaign written"):
         write_campaign(out, seed)
-    except ValueError as error:
-        raise WingfitError("no campaign written", str(error)) from error
     _written(out)
 
 

@@ -68,8 +68,8 @@ def revoke(key_id: Annotated[str, typer.Argument(help="From 'wingfit keys list'.
     Example: wingfit keys revoke KEY_ID
     """
     with Client(url) as client:
-        found = client.revoke_key(key_id)
-    say(f"key {found['id']} revoked at {moment(found['revoked_at'])}")
+        key = client.revoke_key(key_id)
+    say(f"key {key['id']} revoked at {moment(key['revoked_at'])}")
 
 
 def _created(key: NewKey) -> None:

@@ -20,10 +20,10 @@ def place(finding: Finding) -> Markup | None:
     where = finding.where
     if where is None:
         return None
-    whose = "the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
-    drawings = [d for d in (_strips(where), _harmonics(where, whose)) if d is not None]
+    subject = "the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
+    drawings = [d for d in (_strips(where), _harmonics(where, subject)) if d is not None]
     found = figure(where.words or "Location of the misfit", panels(*drawings)) if drawings else tag("p", where.words)
-    return joined(found, _powers(where.exponents, whose))
+    return joined(found, _powers(where.exponents, subject))
 
 
 def _strips(where: Where) -> Markup | None:
@@ -66,7 +66,7 @@ def _within(interval: Interval, factor: float, unit: str) -> str:
     return f", 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
 
 
-def _harmonics(where: Where, whose: str) -> Markup | None:
+def _harmonics(where: Where, subject: str) -> Markup | None:
     shown = where.harmonics[:MOST_HARMONICS]
     if not shown or not any(shown):
         return None
@@ -85,14 +85,14 @@ def _harmonics(where: Where, whose: str) -> Markup | None:
         bottom + 32,
         title,
         text(LEFT, 14, title, class_="title"),
-        text(LEFT, 29, f"fraction of the mean square of {whose}", class_="tick"),
+        text(LEFT, 29, f"fraction of the mean square of {subject}", class_="tick"),
         *parts,
         line(LEFT, bottom, RIGHT, bottom, "axis"),
         text((LEFT + RIGHT) / 2, bottom + 28, "harmonic", anchor="middle", class_="label"),
     )
 
 
-def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
+def _powers(exponents: tuple[Exponent, ...], subject: str) -> Markup | None:
     if not exponents:
         return None
     ends = [v for e in exponents for v in (e.power.value, e.power.low, e.power.high) if v is not None]
@@ -109,7 +109,7 @@ def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
         span = f"{number(e.low)} to {with_unit(number(e.high), e.unit)}"
         parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="value"))
         parts.append(whisker(along, y, (e.power.low, e.power.high), e.power.value, "after"))
-    caption = _scaling(exponents, whose)
+    caption = _scaling(exponents, subject)
     return figure(
         caption,
         panels(drawing(WIDTH, bottom + 30, caption, *parts)),
@@ -117,7 +117,7 @@ def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
     )
 
 
-def _scaling(exponents: tuple[Exponent, ...], whose: str) -> str:
+def _scaling(exponents: tuple[Exponent, ...], subject: str) -> str:
     """The scaling that the intervals of the exponents show, in one sentence."""
     bounded = [
         (e, e.power.low, e.power.high) for e in exponents if e.power.low is not None and e.power.high is not None
@@ -125,10 +125,10 @@ def _scaling(exponents: tuple[Exponent, ...], whose: str) -> str:
     sure = [e for e, low, high in bounded if low * high > 0]
     level = [e.variable for e, low, high in bounded if low * high <= 0 and high - low < LEVEL]
     if not sure and not level:
-        return f"The scaling of {whose} is not identifiable from these conditions"
+        return f"The scaling of {subject} is not identifiable from these conditions"
     if not sure:
-        return f"{capital(whose)} does not depend on " + listed(level, "or")
-    return f"{capital(whose)} scales with " + listed(f"{e.variable}^{number(e.power.value, 2)}" for e in sure)
+        return f"{capital(subject)} does not depend on " + listed(level, "or")
+    return f"{capital(subject)} scales with " + listed(f"{e.variable}^{number(e.power.value, 2)}" for e in sure)
 
 
 def _pieces(interval: Interval, *, turns: bool) -> list[tuple[float, float]]:

@@ -52,8 +52,8 @@ figcaption{font-weight:650;font-size:1.02rem;line-height:1.35;margin-bottom:.5re
 .panels.wide{grid-template-columns:repeat(auto-fill,minmax(min(100%,28rem),1fr))}
 .panels.wide figure>svg{max-width:40rem}
 .panels figure{margin:.4rem 0;min-width:0}
-.panels>svg,.panels figure>svg{display:block;width:100%;max-width:32rem;height:auto;background:var(--surface);border:1px solid var(--line);
-border-radius:8px}
+.panels>svg,.panels figure>svg{display:block;width:100%;max-width:32rem;height:auto;
+background:var(--surface);border:1px solid var(--line);border-radius:8px}
 svg text{fill:var(--ink);font-size:12px}
 svg .title{font-weight:650;font-size:12.5px}
 svg .value{paint-order:stroke;stroke:var(--surface);stroke-width:4px;stroke-linejoin:round}

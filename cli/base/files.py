@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import typer
@@ -27,6 +28,15 @@ def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) ->
         raise typer.BadParameter(f"there is no folder {place}; create it first", param_hint=option)
     if not os.access(place, os.W_OK):
         raise typer.BadParameter(f"{place} cannot be written; choose another place", param_hint=option)
+
+
+@contextmanager
+def refused(message: str) -> Iterator[None]:
+    """Turn an error in the input (ValueError) into a WingfitError with ``message``."""
+    try:
+        yield
+    except ValueError as error:
+        raise WingfitError(message, str(error)) from error
 
 
 def read_bytes(path: Path) -> bytes:

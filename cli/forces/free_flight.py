@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.files import check_file
+from wingfit.cli.base.files import check_file, refused
 
 
 def forces(
@@ -43,7 +43,7 @@ def forces(
         check_file(path, option, (kind,))
     from wingfit.cli.forces import free_flight_results as results  # imported late: other commands start faster
 
-    with results.refused():
+    with refused("no forces were estimated"):
         low_pass = results.LowPass(cutoff_hz or results.CUTOFF_PER_BEAT * flap_hz, order)
         flight = results.read_flight(tracks, body, mass_kg, low_pass, inertia)
         recording = results.recording(

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +11,7 @@ import typer
 
 from wingfit.cli.base.files import read_bytes, write_text
 from wingfit.cli.base.output import note, number, say, table
-from wingfit.client.client import WingfitError
-from wingfit.records import DatasetError, LowPass, Recording
+from wingfit.records import LowPass, Recording
 from wingfit.records.description.convert_vehicle import describe_recording
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.records.files.table import write_table
@@ -27,15 +25,6 @@ __all__ = ["CUTOFF_PER_BEAT", "PASCAL_PER_MBAR", "ZERO_CELSIUS", "LowPass", "rec
 CENTRE = "centre_of_mass"
 AXES = "xyz"
 CUTOFF_PER_BEAT = 3.2
-
-
-@contextmanager
-def refused() -> Iterator[None]:
-    """Errors in the given files as WingfitError."""
-    try:
-        yield
-    except (DatasetError, ValueError) as error:
-        raise WingfitError("no forces were estimated", str(error)) from error
 
 
 def write(flight: FreeFlight, made: Recording, output: Path | None, details: Path | None) -> None:

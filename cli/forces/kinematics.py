@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from wingfit.cli.base.files import check_file
+from wingfit.cli.base.files import check_file, refused
 
 Wing = Literal["upper-right", "upper-left", "lower-right", "lower-left"]
 
@@ -51,7 +51,7 @@ def kinematics(
     check_file(plot, "--plot", (".html",))
     from wingfit.cli.forces import kinematics_results as results  # imported late: other commands start faster
 
-    with results.refused():
+    with refused("no motion was estimated"):
         data = results.read_data(file, leading_edge, chord)
         angles, start = results.read_angles(data, leading_edge, chord, wing, dihedral_deg, hinge_m, flap_hz)
         motion = results.wing_motion(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +10,7 @@ import typer
 
 from wingfit.cli.base.files import read_bytes, write_text
 from wingfit.cli.base.output import note, number, say, table
-from wingfit.client.client import WingfitError
-from wingfit.records import Condition, DatasetError, Recording, WingMotion
+from wingfit.records import Condition, Recording
 from wingfit.records.description.convert_vehicle import describe_recording
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.report.charts import Chart, Curve, chart_page
@@ -28,15 +25,6 @@ ORDERS = ("", "/s", "/s²", "/s³")
 __all__ = ["wing_motion"]
 
 
-@contextmanager
-def refused() -> Iterator[None]:
-    """Errors in the given file as WingfitError."""
-    try:
-        yield
-    except (DatasetError, ValueError) as error:
-        raise WingfitError("no motion was estimated", str(error)) from error
-
-
 def read_data(file: Path, leading_edge: str, chord: str) -> Table:
     """The table in ``file``, after a check that it has all columns."""
     raw = read_bytes(file)
@@ -44,17 +32,12 @@ def read_data(file: Path, leading_edge: str, chord: str) -> Table:
     return read_table(raw, file.name)
 
 
-def write_motion(found: WingKinematics, path: Path) -> None:
+def write_motion(motion: WingKinematics, path: Path) -> None:
     """Write the ``motion:`` entry of dataset.yaml."""
-    write_text(path, write_yaml({"motion": motion_data(found.motion, found.frequency.hertz)}), "motion")
+    condition = Condition(motion.frequency.hertz, 0.0, 101325.0, 293.15)  # needed to describe it, not written
+    bare = Recording("motion", "wind_tunnel", condition, np.empty(0), (), np.empty((0, 0)), motion=motion.motion)
+    write_text(path, write_yaml({"motion": describe_recording(bare)["motion"]}), "motion")
     note("put it under vehicle:, or under a recording, of dataset.yaml")
-
-
-def motion_data(motion: WingMotion, flap_frequency: float) -> Any:
-    """``motion`` as the plain data of ``dataset.yaml``."""
-    condition = Condition(flap_frequency, 0.0, 101325.0, 293.15)
-    bare = Recording("motion", "wind_tunnel", condition, np.empty(0), (), np.empty((0, 0)), motion=motion)
-    return describe_recording(bare)["motion"]
 
 
 def _check_columns(header: list[str], file: str, markers: str) -> None:
@@ -122,31 +105,31 @@ def _pair(text: str) -> tuple[float, float]:
     return y, z
 
 
-def report(found: WingKinematics) -> None:
+def report(motion: WingKinematics) -> None:
     """Print the accuracy of the angles and of their derivatives, the flap frequency, and the start of a beat."""
-    rows = [row for name, fit in _fits(found) for row in _quality(name, fit)]
+    rows = [row for name, fit in _fits(motion) for row in _quality(name, fit)]
     table(["over the beat", ">RMS deg", ">noise", ">truncation, at most", ">error / RMS"], rows)
-    error = found.frequency.error
+    error = motion.frequency.error
     known = f" +/- {number(error, 2)}" if error is not None else ""
-    say(f"flap frequency {number(found.frequency.hertz, 6)}{known} Hz")
-    say(f"a beat starts at time_s {found.start:.5f} +/- {number(found.start_error, 2)} s (wings closest, opening)")
-    for name, fit in _fits(found):
+    say(f"flap frequency {number(motion.frequency.hertz, 6)}{known} Hz")
+    say(f"a beat starts at time_s {motion.start:.5f} +/- {number(motion.start_error, 2)} s (wings closest, opening)")
+    for name, fit in _fits(motion):
         chosen = "chosen by cross-validation" if fit.scores else "as given"
         cutoff = number(fit.harmonics * fit.frequency, 3)
         size = number(float(np.degrees(fit.noise.deviation)), 2)
         say(f"{name}: {fit.harmonics} harmonics ({chosen}), up to {cutoff} Hz; noise of one sample: {size} deg")
-    if found.law:
-        law, names = found.law, ("constant_rad", "flap", "flap_rate_s", "flap_rate_squared_s2")
+    if motion.law:
+        law, names = motion.law, ("constant_rad", "flap", "flap_rate_s", "flap_rate_squared_s2")
         values = (law.pitch.constant, law.pitch.flap, law.pitch.flap_rate, law.pitch.flap_rate_squared)
         for name, value, deviation in zip(names, values, law.errors, strict=True):
             say(f"Eq. 17, {name}: {number(value)} +/- {number(float(deviation), 2)}")
         say(f"RMS difference of Eq. 17 from the pitch: {number(float(np.degrees(law.misfit)), 3)} deg")
-    for remark in found.remarks:
+    for remark in motion.remarks:
         say(f"note: {remark}")
 
 
-def _fits(found: WingKinematics) -> list[tuple[str, PeriodicFit]]:
-    return [("flap angle", found.flap), ("wing pitch", found.pitch)]
+def _fits(motion: WingKinematics) -> list[tuple[str, PeriodicFit]]:
+    return [("flap angle", motion.flap), ("wing pitch", motion.pitch)]
 
 
 def _quality(name: str, fit: PeriodicFit) -> list[list[str]]:
@@ -160,18 +143,18 @@ def _quality(name: str, fit: PeriodicFit) -> list[list[str]]:
     return rows
 
 
-def write_plot(found: WingKinematics, path: Path, title: str) -> None:
+def write_plot(motion: WingKinematics, path: Path, title: str) -> None:
     """Write one HTML file: angles with their samples, rates and accelerations, with two standard errors."""
     phase, charts = np.arange(361) / 360, []
     for d in range(3):
-        for (name, fit), samples in zip(_fits(found), (found.angles.flap, found.angles.pitch), strict=True):
+        for (name, fit), samples in zip(_fits(motion), (motion.angles.flap, motion.angles.pitch), strict=True):
             middle, error = (np.degrees(values) for values in (fit.at(phase, d), 2 * fit.error_at(phase, d)))
             curves = [
                 Curve("2 standard errors", phase, middle, band=(middle - error, middle + error)),
                 Curve("Fourier series", phase, middle),
             ]
             if d == 0 and samples is not None:
-                folded = ((found.angles.times - fit.start) * fit.frequency) % 1.0
+                folded = ((motion.angles.times - fit.start) * fit.frequency) % 1.0
                 curves.insert(0, Curve("measured", folded, np.degrees(samples), dots=True))
             charts.append(Chart(f"{name}, deg{ORDERS[d]}", "t*", f"deg{ORDERS[d]}", curves))
     write_text(path, chart_page(title, charts), "plots")
