@@ -167,8 +167,7 @@ def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
 def genome(
     run_id: o.JobId,
     output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Also write {name: value} as JSON, for 'simulate --genome'."),
+        Path | None, typer.Option("--output", "-o", help="Also write {name: value} as JSON, for 'simulate --genome'.")
     ] = None,
     url: o.Url = DEFAULT_URL,
     as_json: o.AsJson = False,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from statistics import fmean
 
 from wingfit.diagnosis.evidence.intervals import reach
 from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
@@ -119,7 +120,7 @@ def _misfit_caption(finding: Finding, given: PhaseMap, scale: Scale) -> str:
 
 
 def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: Scale) -> Markup:
-    bands = _pooled([given.bands], MOST_ROWS, _mean)[0]
+    bands = _pooled([given.bands], MOST_ROWS, fmean)[0]
     classes: list[list[str | None]] = [[f"l{level(v, most)}" for v in row] for row in _small(values, _rms)]
     bar = colour_bar(
         Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
@@ -167,8 +168,8 @@ def _load_caption(load: MissingLoad, scale: Scale) -> str:
 
 
 def _load_map(load: MissingLoad, scale: Scale) -> Markup:
-    stations = _pooled([load.stations], MOST_ROWS, _mean)[0]
-    values, errors = _small(load.values, _mean), _small(load.errors, _rms)
+    stations = _pooled([load.stations], MOST_ROWS, fmean)[0]
+    values, errors = _small(load.values, fmean), _small(load.errors, _rms)
     most = max(abs(v) for row in values for v in row) or 1.0
     classes: list[list[str | None]] = [[f"d{side(v, most)}" for v in row] for row in values]
     faint: list[list[str | None]] = [
@@ -267,10 +268,6 @@ def _small(table: Sequence[Sequence[float]], pool: Pool) -> list[tuple[float, ..
 
 def _turned(table: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     return [tuple(column) for column in zip(*table, strict=True)]
-
-
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
 
 
 def _rms(values: Sequence[float]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import median
 
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
 from wingfit.report.layout import figure, folded, panels, table
@@ -40,10 +41,7 @@ def proof(finding: Finding) -> Markup | None:
     return figure(
         _proof_caption(finding, given),
         panels(drawing(WIDTH, 120, _proof_caption(finding, given), *parts)),
-        legend(
-            *stages(finding).items(),
-            ("floor", "floor: expected misfit of a correct model"),
-        ),
+        legend(*stages(finding).items(), ("floor", "floor: expected misfit of a correct model")),
         note=given.words or None,
     )
 
@@ -79,10 +77,7 @@ def recordings(finding: Finding) -> Markup | None:
         figure(
             _recordings_caption(finding),
             panels(*drawings),
-            legend(
-                *stages(finding).items(),
-                ("floor", "floor"),
-            ),
+            legend(*stages(finding).items(), ("floor", "floor")),
             note="Root mean square of one channel, with 90 % intervals.",
         ),
         folded("As a table", _table(finding, scale)),
@@ -95,7 +90,7 @@ def _recordings_caption(finding: Finding) -> str:
     group = [r for r in finding.recordings if r.held_out] or list(finding.recordings)
     kind = "held-out" if group[0].held_out else "fitted"
     better = sum(r.after.value < r.before.value for r in group)
-    before, after = (_median([getattr(r, name).value for r in group]) for name in ("before", "after"))
+    before, after = (median([getattr(r, name).value for r in group]) for name in ("before", "after"))
     values = change(finding, scale.text(before), scale.text(after))
     if len(group) == 1:
         return f"The {kind} recording: {values}"
@@ -114,17 +109,14 @@ def overlays(finding: Finding) -> Markup | None:
     return figure(
         _overlays_caption(finding, shown, scale),
         panels(*(_overlay(finding, o, scale) for o in shown), size="small"),
-        legend(
-            ("recorded", "recorded"),
-            *((f"{stage}-line", name) for stage, name in stages(finding).items()),
-        ),
+        legend(("recorded", "recorded"), *((f"{stage}-line", name) for stage, name in stages(finding).items())),
         note=f"{left} more in the JSON." if left else None,
     )
 
 
 def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
     """The typical distance between simulation and recording in one sentence."""
-    before, after = (_median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
+    before, after = (median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
     values = change(finding, scale.text(before), scale.text(after))
     return f"Median distance between simulated and recorded beats: {values}"
 
@@ -216,12 +208,6 @@ def _values(row: RecordingMisfit) -> list[float]:
 
 def _range(interval: Interval) -> str:
     return f"90 %: {bounds(interval, Scale(1.0, ''))}"
-
-
-def _median(values: Sequence[float]) -> float:
-    ordered = sorted(values)
-    middle = len(ordered) // 2
-    return ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
 
 
 def _distance(one: Sequence[float], other: Sequence[float]) -> float:

@@ -86,11 +86,7 @@ def _verdict(finding: Finding) -> list[object]:
         part = finding.probabilities.get(name, 0.0)
         chosen = " chosen" if name == finding.verdict else ""
         shown = bar(part, "strong" if chosen else "pale")
-        rows += [
-            tag("span", name, class_=f"name{chosen}"),
-            shown,
-            tag("span", percent(part), class_=f"value{chosen}"),
-        ]
+        rows += [tag("span", name, class_=f"name{chosen}"), shown, tag("span", percent(part), class_=f"value{chosen}")]
     return [
         tag("p", f"Diagnosis of {finding.dataset} · verdict: {finding.verdict}", class_="over"),
         tag("h1", headline(finding)),

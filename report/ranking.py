@@ -26,15 +26,7 @@ def ranking(finding: Finding) -> Markup | None:
     top = max((h.evidence for h in finding.hypotheses), default=0.0)
     rows = [_row(h, finding, top) for h in shown]
     rest = folded(f"{len(others)} weaker hypotheses", _table(others, finding)) if others else None
-    return joined(
-        figure(
-            caption(finding),
-            tag("ol", *rows, class_="ranking"),
-            note=_NOTE,
-        ),
-        rest,
-        _alike(finding),
-    )
+    return joined(figure(caption(finding), tag("ol", *rows, class_="ranking"), note=_NOTE), rest, _alike(finding))
 
 
 def caption(finding: Finding) -> str:

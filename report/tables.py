@@ -58,10 +58,7 @@ def law(given: FreeLaw | None) -> Markup | None:
         "Free-form law of the residual",
         tag("p", given.words),
         table(("term", "coefficient", "90 % interval", "unit"), rows, numbers=0) if rows else None,
-        tag(
-            "p",
-            f"It explains {percent(given.explained)} of the misfit beyond the noise (cross-validated).",
-        ),
+        tag("p", f"It explains {percent(given.explained)} of the misfit beyond the noise (cross-validated)."),
     )
 
 

@@ -141,10 +141,7 @@ def _directions(placed: Sequence[MarkerMisfit], plan: _Plan, scale: Scale) -> Ma
     size = (RIGHT - LEFT - 30) / (plan.y1 - plan.y0 + reach or 1.0)
 
     def at(x: float, y: float) -> tuple[float, float]:
-        return (
-            LEFT + 15 + (y - plan.y0 + (plan.x1 - x) * SLANT) * size,
-            TOP + ARROW + (x - plan.x0) * SLANT * size,
-        )
+        return (LEFT + 15 + (y - plan.y0 + (plan.x1 - x) * SLANT) * size, TOP + ARROW + (x - plan.x0) * SLANT * size)
 
     most = max(m.before for m in placed)
     arrows: list[Markup] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from wingfit.cli.base.files import write_csv, write_text
@@ -63,7 +64,7 @@ def force_beats(answer: f.Forces) -> None:
     for name, recorded in answer["recorded_n"].items():
         modelled = answer["modelled_n"][name]
         rms = (sum((m - r) ** 2 for m, r in zip(modelled, recorded, strict=True)) / len(recorded)) ** 0.5
-        means[QUANTITIES[name]] = (_mean(recorded), _mean(modelled), rms)
+        means[QUANTITIES[name]] = (fmean(recorded), fmean(modelled), rms)
     unit = force_unit(value for values in means.values() for value in values)
     heads = [f">{what} {unit.name}" for what in ("recorded", "modelled", "RMS difference")]
     table(["mean beat", *heads], [[name, *map(unit.show, values)] for name, values in means.items()])
@@ -175,7 +176,3 @@ def _rms(one: f.Agreement | None, unit: Unit) -> str:
 
 def _percent(value: float | None) -> str:
     return "–" if value is None else f"{rounded(value, 2)} %"
-
-
-def _mean(series: Sequence[float]) -> float:
-    return sum(series) / len(series)
