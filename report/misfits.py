@@ -188,7 +188,7 @@ def _table(finding: Finding, scale: Scale) -> Markup:
         for r in finding.recordings
     ]
     columns = [f"{stage}, {scale.unit}" for stage in stages(finding)]
-    head = ("recording", "", "condition", *columns, f"floor, {scale.unit}")
+    head = ("recording", "use", "condition", *columns, f"floor, {scale.unit}")
     return table(head, rows, numbers=len(columns) + 1)
 
 

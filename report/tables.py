@@ -19,7 +19,7 @@ from wingfit.report.number_format import (
 
 MOST_GENES = 12
 _ADVICE = (
-    "",
+    "rank",
     "flapping, Hz",
     "lag, °",
     "pressure, mbar",
