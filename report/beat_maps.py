@@ -9,7 +9,7 @@ from statistics import fmean
 
 from wingfit.diagnosis.evidence.intervals import reach
 from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
-from wingfit.report.layout import figure, panels
+from wingfit.report.layout import figure, folded, panels
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
     Scale,
@@ -46,7 +46,8 @@ BOTTOM = TOP + HEIGHT
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 NINETY = reach()
-MOST_ROWS, MOST_COLUMNS, MOST_LOADS = 32, 64, 6
+MOST_ROWS, MOST_COLUMNS = 32, 64
+MOST_LOADS, MOST_FOLDED = 6, 30  # recordings whose missing load is drawn, and drawn at least in folded details
 Pool = Callable[[Sequence[float]], float]
 
 
@@ -88,21 +89,26 @@ def missing_loads(finding: Finding) -> Markup | None:
     loads = [m for m in finding.missing if m.stations and m.phase]
     if not loads:
         return None
-    shown = sorted(loads, key=lambda m: -_peak(m)[2])[:MOST_LOADS]
-    scale = scale_for((v for load in shown for row in load.values for v in row), shown[0].unit)
+    loads.sort(key=lambda load: -_peak(load)[2])
+    shown, more = loads[:MOST_LOADS], loads[MOST_LOADS:MOST_FOLDED]
     single = all(len(load.stations) == 1 for load in shown)
-    drawings = panels(
-        *(_load_curve(load, scale) if len(load.stations) == 1 else _load_map(load, scale) for load in shown)
+    note = None if single else "Positive along the flap normal. Each map has its own scale."
+    key = legend(("band", "90 % interval") if single else ("hatched", "not significant (90 %)"))
+    hidden = len(loads) - len(shown) - len(more)
+    return joined(
+        figure(_load_caption(shown[0], _load_scale(shown)), _load_panels(shown), key, note=note),
+        folded(f"{len(more)} more, with smaller loads", _load_panels(more)) if more else None,
+        tag("p", f"{hidden} more, with smaller loads, are in the JSON.", class_="note") if hidden else None,
     )
-    hidden = len(loads) - len(shown)
-    more = f" {hidden} more, with smaller loads, are in the JSON." if hidden else ""
-    if single:
-        return figure(
-            _load_caption(shown[0], scale), drawings, legend(("band", "90 % interval")), note=more.strip() or None
-        )
-    note = f"Positive along the flap normal. Each map has its own scale.{more}"
-    key = legend(("hatched", "not significant (90 %)"))
-    return figure(_load_caption(shown[0], scale), drawings, key, note=note)
+
+
+def _load_panels(loads: Sequence[MissingLoad]) -> Markup:
+    scale = _load_scale(loads)
+    return panels(*((_load_curve if len(load.stations) == 1 else _load_map)(load, scale) for load in loads))
+
+
+def _load_scale(loads: Sequence[MissingLoad]) -> Scale:
+    return scale_for((v for load in loads for row in load.values for v in row), loads[0].unit)
 
 
 def _misfit_caption(finding: Finding, given: PhaseMap, scale: Scale) -> str:

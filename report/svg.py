@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
@@ -167,17 +168,18 @@ def side(value: float, most: float) -> int:
 
 
 def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> Markup:
-    """A grid of cells, rows downwards, one path per class; None: no cell."""
+    """A grid of cells, rows downwards; None: no cell. Equal neighbours of a row become one rectangle."""
     rows, columns = len(classes), len(classes[0])
     width, height = (across.end - across.start) / columns, (down.end - down.start) / rows
     paths: dict[str, list[str]] = {}
     for i, row in enumerate(classes):
-        for j, name in enumerate(row):
+        j, y = 0, down.start + i * height
+        for name, run in groupby(row):
+            count = len(list(run))
+            x, wide = across.start + j * width, count * width + 0.2  # slightly wider, so that no gap shows
+            j += count
             if name is not None:
-                x, y = across.start + j * width, down.start + i * height
-                # slightly wider than the cell, so that no gap shows
-                piece = f"M{x:.2f} {y:.2f}h{width + 0.2:.2f}v{height + 0.2:.2f}h-{width + 0.2:.2f}z"
-                paths.setdefault(name, []).append(piece)
+                paths.setdefault(name, []).append(f"M{x:.2f} {y:.2f}h{wide:.2f}v{height + 0.2:.2f}h-{wide:.2f}z")
     return joined(*(tag("path", d="".join(pieces), class_=name) for name, pieces in sorted(paths.items())))
 
 

@@ -213,7 +213,9 @@ def test_cells_that_are_not_significant_are_hatched() -> None:
     assert page(replace(finding, missing=(sure,))).count("path", "faint") == 0
     shown = page(replace(finding, missing=(unsure,)))
     hatched = [a["d"] or "" for tag, a in shown.tags if tag == "path" and a.get("class") == "faint"]
-    assert [d.count("M") for d in hatched] == [12 * 30]
+    (runs,) = [re.findall(r"h([\d.]+)v", d) for d in hatched]
+    assert len(runs) == 12, "a rectangle for each station"
+    assert [float(width) for width in runs] == pytest.approx([348 - 52 + 0.2] * 12), "over the whole beat"
     assert "No missing load is significant" in shown.text
 
 
@@ -233,4 +235,8 @@ def test_what_is_left_out_of_the_page_is_counted() -> None:
     finding = wing_finding()
     shown = page(replace(finding, overlays=finding.overlays * 3, missing=finding.missing * 4)).text
     assert "6 more in the JSON." in shown
-    assert "2 more, with smaller loads, are in the JSON." in shown
+    assert "2 more, with smaller loads" in shown
+    assert (
+        f"{len(finding.missing) * 20 - 30} more, with smaller loads, are in the JSON."
+        in page(replace(finding, missing=finding.missing * 20)).text
+    )
