@@ -9,6 +9,11 @@ export class ApiError extends Error {
     this.errors = errors;
   }
 
+  // The message, followed by those about single fields.
+  get text() {
+    return [this.message, ...this.errors.map((item) => item.message)].join(". ");
+  }
+
   // Whether the server could not be reached, as opposed to a refused request.
   get away() {
     return this.status === null || this.status === 502 || this.status === 503 || this.status === 504;

@@ -25,6 +25,10 @@ export const spoken = (name) => name.replaceAll("_", " ");
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+// Options of a choice of recordings.
+export const recordingOptions = ({ recordings }) =>
+  recordings.map(({ name, held_out: heldOut }) => new Option(`${name}${heldOut ? " (held out)" : ""}`, name));
+
 export const modelOf = (run) => (isForces(run)
   ? SHORT[run.spec.preset] ?? spoken(run.spec.preset)
   : `${run.spec.division} bodies`);

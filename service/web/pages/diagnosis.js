@@ -24,7 +24,7 @@ export async function diagnose(body) {
   try {
     return await postJson("diagnoses", body, { "Idempotency-Key": randomKey() });
   } catch (error) {
-    toast([error.message, ...error.errors.map((item) => item.message)].join(". "));
+    toast(error.text);
     return null;
   }
 }

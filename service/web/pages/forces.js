@@ -7,7 +7,7 @@ import { drawCorrelation, drawEstimates, fillEstimates } from "../parts/estimate
 import { $, el } from "../base/format.js";
 import { clearPrediction, redrawPrediction, setUpPrediction, showPrediction } from "../parts/predict.js";
 import { showRemarks } from "../base/form_errors.js";
-import { SOURCES } from "../base/labels.js";
+import { recordingOptions, SOURCES } from "../base/labels.js";
 
 let run = null;
 let dataset = null;
@@ -37,8 +37,7 @@ export function showForces(next, its, outcome) {
   if (changed) {
     forces = null;
     $("beats").hidden = true;
-    $("force-recording").replaceChildren(...dataset.recordings.map((recording) =>
-      new Option(`${recording.name}${recording.held_out ? " (held out)" : ""}`, recording.name)));
+    $("force-recording").replaceChildren(...recordingOptions(dataset));
   }
   if (!changed && !judged) return;
   showResult();

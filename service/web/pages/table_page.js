@@ -106,7 +106,7 @@ async function load(first = false) {
     cursor = page.next_cursor;
   } catch (error) {
     if (mine !== request) return;
-    toast([error.message, ...error.errors.map((one) => one.message)].join(". "));
+    toast(error.text);
   }
   $("listing-more").disabled = false;
   draw(true);

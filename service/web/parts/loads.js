@@ -1,7 +1,7 @@
 // Loads over one beat: torques, powers, forces, bending moments, energies.
 
 import { get, part } from "../base/api.js";
-import { $, el, rounded, significant } from "../base/format.js";
+import { $, keyNumber, rounded, significant } from "../base/format.js";
 import { lines } from "../base/plots.js";
 
 const OUTPUTS = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
@@ -67,11 +67,9 @@ async function load() {
 }
 
 function drawAverages(means) {
-  const cell = (label, value, unit) =>
-    el("div", {}, el("dt", {}, label), el("dd", {}, significant(value, 3), el("small", {}, ` ${unit}`)));
+  const cell = (label, value, unit) => keyNumber(label, significant(value, 3), unit);
   const { front, rear } = means.peak_motor_torque_n_m;
-  const peak = el("div", {}, el("dt", {}, "peak torque, front and rear motor, N m"),
-    el("dd", {}, `${significant(front, 2)}, ${significant(rear, 2)}`));
+  const peak = keyNumber("peak torque, front and rear motor, N m", `${significant(front, 2)}, ${significant(rear, 2)}`);
   $("loads-numbers").replaceChildren(
     cell("mean lift", means.lift_n, "N"), cell("mean thrust", means.thrust_n, "N"),
     cell("supplied by both motors", means.supplied_w, "W"), cell("transferred to the air", means.to_air_w, "W"),

@@ -1,7 +1,7 @@
 // Prediction of the global model for a given condition.
 
 import { part, postJson } from "../base/api.js";
-import { $, el, forceUnit, significant } from "../base/format.js";
+import { $, forceUnit, keyNumber, significant } from "../base/format.js";
 import { lines } from "../base/plots.js";
 import { showErrors, showRemarks } from "../base/form_errors.js";
 import { NO_NUMBER } from "../pages/submit.js";
@@ -81,12 +81,11 @@ async function predict() {
 
 function draw() {
   $("prediction").hidden = false;
-  const cell = (label, text, unit = "") => el("div", {}, el("dt", {}, label), el("dd", {}, text, unit && el("small", {}, ` ${unit}`)));
   const means = prediction.averages_n;
   const { unit, show } = forceUnit([means.lift, means.drag]);
   $("prediction-numbers").replaceChildren(
-    cell("mean lift", show(means.lift), unit), cell("mean drag", show(means.drag), unit),
-    ...Object.entries(prediction.coefficients).map(([name, value]) => cell(name, significant(value, 3))));
+    keyNumber("mean lift", show(means.lift), unit), keyNumber("mean drag", show(means.drag), unit),
+    ...Object.entries(prediction.coefficients).map(([name, value]) => keyNumber(name, significant(value, 3))));
   const { phase, lift_n: lift, drag_n: drag, x_n: x, z_n: z } = prediction;
   Promise.all([
     lines($("prediction-lift"), phase, [["lift", lift], ["drag", drag]], { unit: "N", x: "t*, beats; 0: wings closest" }),

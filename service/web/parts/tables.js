@@ -1,50 +1,48 @@
 // Tables of a run: key numbers, misfit by recording, genes.
 
-import { $, el, forceUnit, rounded, mm, plural, significant } from "../base/format.js";
+import { $, el, forceUnit, keyNumber, rounded, mm, plural, significant } from "../base/format.js";
 import { isForces, misfit, newtons } from "../base/labels.js";
 
 export function drawNumbers(run, result) {
-  const cell = (label, value, unit = "", main = false) =>
-    el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
   const { value, unit } = misfit(run);
   const what = isForces(run) ? "best so far, RMS difference" : "best so far, mean distance per marker";
-  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result, cell) : [
-    cell(what, value, unit, true),
-    cell("stage", run.stage ?? "–"),
-    cell("generations", String(run.generations)),
-    cell("evaluations", run.evaluations.toLocaleString("en")),
+  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result) : [
+    keyNumber(what, value, unit, true),
+    keyNumber("stage", run.stage ?? "–"),
+    keyNumber("generations", String(run.generations)),
+    keyNumber("evaluations", run.evaluations.toLocaleString("en")),
   ];
   $("numbers").replaceChildren(...cells);
 }
 
-function outcome(result, cell) {
+function outcome(result) {
   const judged = result.held_out_after_mm ?? result.after_mm;
   const cells = [
-    cell("before, fitted recordings", mm(result.before_mm), "mm"),
-    cell("after, fitted recordings", mm(result.after_mm), "mm", true),
+    keyNumber("before, fitted recordings", mm(result.before_mm), "mm"),
+    keyNumber("after, fitted recordings", mm(result.after_mm), "mm", true),
   ];
   if (result.held_out_after_mm !== null) {
-    cells.push(cell("before, held out", mm(result.held_out_before_mm), "mm"));
-    cells.push(cell("after, held out", mm(result.held_out_after_mm), "mm", true));
+    cells.push(keyNumber("before, held out", mm(result.held_out_before_mm), "mm"));
+    cells.push(keyNumber("after, held out", mm(result.held_out_after_mm), "mm", true));
   }
   if (result.noise_mm) {
-    cells.push(cell("floor: tracking noise alone", mm(result.noise_mm), "mm"));
-    cells.push(cell("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
+    cells.push(keyNumber("floor: tracking noise alone", mm(result.noise_mm), "mm"));
+    cells.push(keyNumber("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
   }
   return cells;
 }
 
-function forceOutcome(result, cell) {
+function forceOutcome(result) {
   const [before, after, heldBefore, heldAfter] = ["before_mn", "after_mn", "held_out_before_mn", "held_out_after_mn"]
     .map((key) => newtons(result[key]));
   const { unit, show } = forceUnit([before, after, heldBefore, heldAfter]);
   const cells = [
-    cell("before, RMS of the fitted forces", show(before), unit),
-    cell("after, RMS of the fitted forces", show(after), unit, true),
+    keyNumber("before, RMS of the fitted forces", show(before), unit),
+    keyNumber("after, RMS of the fitted forces", show(after), unit, true),
   ];
   if (heldAfter !== null) {
-    cells.push(cell("before, held out", show(heldBefore), unit));
-    cells.push(cell("after, held out, predicted", show(heldAfter), unit, true));
+    cells.push(keyNumber("before, held out", show(heldBefore), unit));
+    cells.push(keyNumber("after, held out, predicted", show(heldAfter), unit, true));
   }
   return cells;
 }

@@ -2,6 +2,7 @@
 
 import { get, part } from "../base/api.js";
 import { $, mm, significant } from "../base/format.js";
+import { recordingOptions } from "../base/labels.js";
 import { clearLoads, setUpLoads, showLoads } from "./loads.js";
 import { byPhase, drawBeat, drawWing, meanDistance } from "./wing.js";
 
@@ -35,7 +36,7 @@ export function showWing(next, dataset) {
     stop();
     tracks = null;
     clearLoads();
-    fillRecordings(dataset);
+    $("recording").replaceChildren(...recordingOptions(dataset));
   }
   const hasBest = run.generations > 0;
   document.querySelector("input[name=genome][value=best]").disabled = !hasBest;
@@ -55,14 +56,6 @@ export function hideWing() {
 
 export function redrawWing() {
   if (tracks) draw();
-}
-
-function fillRecordings(dataset) {
-  $("recording").replaceChildren(...dataset.recordings.map((recording) => {
-    const use = recording.held_out ? " (held out)" : "";
-    const option = new Option(`${recording.name}${use}`, recording.name);
-    return option;
-  }));
 }
 
 const key = () => `${run.id}/${$("recording").value}/${genome()}`;
