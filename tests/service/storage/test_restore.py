@@ -102,7 +102,7 @@ def test_a_backup_without_keys_and_data_says_so(tmp_path: Path) -> None:
     empty = snapshot(tmp_path / "source")
     done = CliRunner().invoke(commands, ["restore", str(empty), "--data", str(tmp_path / "new")])
     assert "none: there is no data" in done.stdout
-    assert "brings no good API key" in done.stderr
+    assert "has no valid API key" in done.stderr
 
 
 def test_names_in_a_backup_do_not_steer_a_terminal(copy: Path, tmp_path: Path) -> None:
