@@ -119,7 +119,7 @@ def _floors(finding: Finding) -> Markup:
     floors = finding.floors
     rows = [
         ("noise, from the scatter between beats", floors.noise, "pale"),
-        ("accuracy limit of the simulation", floors.simulation, "pale"),
+        ("tolerance of the simulation", floors.simulation, "pale"),
         ("floor: root sum of squares of these", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
