@@ -76,7 +76,7 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
             )
     return {
         "page-run": (f"run={runs[1]}", "beat"),
-        "page-diagnosis": (f"diagnosis={diagnosis}", "overlay-plot"),
+        "page-diagnosis": (f"diagnosis={diagnosis}", "report"),
         "page-compare": (f"compare={','.join(runs)}", "compare-plot"),
         "page-dataset": (f"dataset={its}", "conditions"),
     }
@@ -116,7 +116,10 @@ def _shot(
     tab.goto(f"{url}/#{address}")
     deadline = time.monotonic() + DRAWN_SECONDS
     # Polled from here: waiting inside the page needs eval, which its content security policy forbids.
-    while not tab.evaluate(f"document.getElementById('{figure}').data?.length > 0"):
+    drawn = (
+        f"[document.getElementById('{figure}')].some((one) => one.data?.length || one.shadowRoot?.querySelector('svg'))"
+    )
+    while not tab.evaluate(drawn):
         if time.monotonic() > deadline:
             raise RuntimeError(f"{figure} was not drawn within {DRAWN_SECONDS:g} s on #{address}")
         tab.wait_for_timeout(100)

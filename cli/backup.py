@@ -1,4 +1,4 @@
-"""``wingfit backup`` and ``wingfit restore``: a copy of everything, and back."""
+"""``wingfit backup`` and ``wingfit restore``: copy all data of a server into one file, and back."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wingfit.cli.base.output import Url, moment, note, progress, say, table
-from wingfit.cli.datasets import size
+from wingfit.cli.base.options import Url
+from wingfit.cli.base.output import moment, note, progress, say, size, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
 if TYPE_CHECKING:
@@ -16,45 +16,45 @@ if TYPE_CHECKING:
 
 
 def backup(
-    file: Annotated[Path, typer.Argument(help="Where to write the copy, e.g. wings.sqlite3.")],
+    file: Annotated[Path, typer.Argument(help="File to write, e.g. wings.sqlite3.")],
     data: Annotated[
-        Path | None, typer.Option(help="Folder of a server that is not running; else the server is asked.")
+        Path | None, typer.Option(help="Data folder of a server that is not running; default: use the running server.")
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE.")] = False,
     url: Url = DEFAULT_URL,
 ) -> None:
-    """Copy all datasets, runs, diagnoses and keys into one file, while the server works.
+    """Copy all datasets, runs, diagnoses and keys into one file, while the server continues to work.
 
     Example: wingfit backup wings.sqlite3
     """
     if file.exists() and not force:
         raise WingfitError("no backup was made", f"{file} exists; name another file, or add --force")
-    from wingfit.service.storage.backup import BackupError, check  # the database waits until it is needed
+    from wingfit.service.storage.backup import BackupError, check  # imported late: other commands start faster
 
     try:
         if data is not None:
             _copy_of(data, file)
         else:
-            with progress("copying") as tell, Client(url) as client:
-                client.backup(file, on_bytes=lambda done, total: tell(done / max(total, 1), note=size(total)))
+            with progress("copying") as report, Client(url) as client:
+                client.backup(file, on_bytes=lambda done, total: report(done / max(total, 1), note=size(total)))
             check(file)
     except BackupError as error:
         raise WingfitError("no backup was made", str(error)) from None
     except OSError as error:
         raise WingfitError("no backup was made", f"cannot write {file}: {error.strerror}") from error
-    note(f"{file}, {size(file.stat().st_size)}, whole and checked; wingfit restore {file} --data FOLDER puts it back")
+    note(f"{file}, {size(file.stat().st_size)}, complete and checked; restore it: wingfit restore {file} --data FOLDER")
 
 
 def restore(
-    file: Annotated[Path, typer.Argument(help="What 'wingfit backup' wrote.")],
-    data: Annotated[Path, typer.Option(help="Data folder without a database, which is created if missing.")],
+    file: Annotated[Path, typer.Argument(help="File that 'wingfit backup' wrote.")],
+    data: Annotated[Path, typer.Option(help="Data folder without a database; created if missing.")],
     keep_keys: Annotated[
-        bool, typer.Option("--keep-keys", help="Let the API keys of the backup in as before; else they are revoked.")
+        bool, typer.Option("--keep-keys", help="Keep the API keys of the backup valid; default: revoke them.")
     ] = False,
 ) -> None:
-    """Put a backup into an empty data folder; jobs that were under way go on when a server starts there.
+    """Restore a backup into an empty data folder; unfinished jobs continue when a server starts there.
 
-    Prints the API keys that are good in the backup, and whose data it brings.
+    Prints the valid API keys in the backup and the owners of its data.
 
     Example: wingfit restore wings.sqlite3 --data wingfit-data
     """
@@ -71,26 +71,26 @@ def restore(
 
 
 def _list(brought: Contents) -> None:
-    say("API keys that are good in the backup:")
+    say("valid API keys in the backup:")
     keys = [[key.id, key.name, key.owner, ", ".join(key.scopes), moment(key.created_at)] for key in brought.keys]
-    table(["id", "name", "owner", "good for", "made"], keys)
-    say("owners of what is in it:")
+    table(["id", "name", "owner", "scopes", "created"], keys)
+    say("owners of its data:")
     owners = [
-        ["(no key)" if one.owner is None else one.owner, str(one.datasets), str(one.runs), str(one.diagnoses)]
+        ["(no key)" if one.owner is None else one.owner, one.datasets, one.runs, one.diagnoses]
         for one in brought.owners
     ]
-    table(["owner", ">datasets", ">runs", ">diagnoses"], owners, "nobody: there is no data")
+    table(["owner", ">datasets", ">runs", ">diagnoses"], owners, "none: there is no data")
 
 
 def _about_keys(count: int, data: Path, keep_keys: bool) -> str:
-    make = f"make a new one: wingfit keys create NAME --scope admin --data {data}"
+    make = f"create one: wingfit keys create NAME --scope admin --data {data}"
     if not count:
-        return f"the backup brings no good API key; where the server needs one, {make}"
+        return f"the backup has no valid API key; if the server needs one, {make}"
     if keep_keys:
-        return f"{count} API keys of the backup are good in {data} too: whoever has one gets in"
+        return f"{count} API keys of the backup are valid in {data} too: everyone who has one has access"
     return (
-        f"{count} API keys of the backup are revoked in {data}: whoever made the backup may have them. "
-        f"If you trust it, restore with --keep-keys into another folder; else {make}"
+        f"{count} API keys of the backup are revoked in {data}: everyone who can read the backup may know them. "
+        f"If you trust it, restore with --keep-keys into another folder; otherwise {make}"
     )
 
 
@@ -104,7 +104,7 @@ def _copy_of(data: Path, file: Path) -> None:
     try:
         lock = FolderLock(data)
     except DataFolderError as error:
-        raise BackupError(f"{error}; or ask that server: leave --data out") from None
+        raise BackupError(f"{error}; or copy from the running server: leave --data out") from None
     try:
         move(snapshot(data), file)
     finally:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from wingfit.cli.base.files import refused
 from wingfit.cli.base.output import progress, say
 from wingfit.client.client import WingfitError
 
@@ -15,43 +16,38 @@ from wingfit.client.client import WingfitError
 def campaign(
     out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip).")],
     division: Annotated[str, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2.")] = "24",
-    small: Annotated[bool, typer.Option("--small", help="A few recordings instead of the whole campaign.")] = False,
-    seed: Annotated[int, typer.Option(help="Of the true genome, the noise and the gaps.")] = 1,
+    small: Annotated[bool, typer.Option("--small", help="A few recordings instead of the full campaign.")] = False,
+    seed: Annotated[int, typer.Option(help="Random seed of the true genome, the noise and the gaps.")] = 1,
 ) -> None:
-    """Write the thesis's experiment as a dataset, recorded on a simulated rig whose genome is known.
+    """Write the experiment of van der Grinten's thesis as a dataset, simulated with a known genome.
 
-    The true genome lies in a separate file beside the dataset, which a calibration never reads.
+    The true genome is written to a separate file next to the dataset, which a calibration never reads.
 
     Example: wingfit campaign my-campaign --division 11 --small --seed 7
     """
     _refuse_existing(out)
-    from wingfit.sim.virtual_rigs.campaign import write_campaign  # compiled kernels wait until they are needed
+    from wingfit.sim.virtual_rigs.campaign import write_campaign  # imported late: other commands start faster
 
-    try:
-        with progress("simulating the campaign") as report:
-            write_campaign(out, division=division, small=small, seed=seed, progress=report)
-    except ValueError as error:
-        raise WingfitError("no campaign written", str(error)) from error
+    with refused("no campaign written"), progress("simulating the campaign") as report:
+        write_campaign(out, division=division, small=small, seed=seed, progress=report)
     _written(out)
 
 
 def balance(
     out: Annotated[Path, typer.Argument(help="Folder to write the dataset to (or a name ending in .zip or .nc).")],
-    seed: Annotated[int, typer.Option(help="Of the noise.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed of the noise.")] = 1,
 ) -> None:
-    """Write the DelFly's wind-tunnel tests as a dataset of forces, recorded on a simulated balance.
+    """Write the DelFly's wind-tunnel tests as a dataset of forces, simulated with known coefficients.
 
-    The true coefficients lie in a separate file beside the dataset, which a calibration never reads.
+    The true coefficients are written to a separate file next to the dataset, which a calibration never reads.
 
     Example: wingfit balance my-balance --seed 7
     """
     _refuse_existing(out)
     from wingfit.sim.virtual_rigs.balance import write_campaign  # as above
 
-    try:
+    with refused("no campaign written"):
         write_campaign(out, seed)
-    except ValueError as error:
-        raise WingfitError("no campaign written", str(error)) from error
     _written(out)
 
 

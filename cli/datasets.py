@@ -1,4 +1,4 @@
-"""``wingfit datasets``: upload, look at and check recordings."""
+"""``wingfit datasets``: upload, inspect and check recordings."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.output import AsJson, Url, moment, number, print_json, progress, say, table
+from wingfit.cli.base.options import AsJson, Url
+from wingfit.cli.base.output import emit, moment, number, progress, say, size, table
+from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
@@ -24,19 +26,7 @@ def list_(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
     Example: wingfit datasets list
     """
     with Client(url) as client:
-        datasets = client.datasets()
-    if as_json:
-        print_json(datasets)
-        return
-    rows = [
-        [d["id"], d["name"], str(len(d["recordings"])), size(d["size_bytes"]), moment(d["created_at"])]
-        for d in datasets
-    ]
-    table(
-        ["id", "name", ">recordings", ">size", "uploaded"],
-        rows,
-        "no datasets; upload one: wingfit datasets upload",
-    )
+        emit(client.datasets(), _list, as_json=as_json)
 
 
 @app.command()
@@ -50,15 +40,8 @@ def upload(
 
     Example: wingfit datasets upload examples/robird
     """
-    with Client(url) as client, progress("uploading") as report:
-        dataset = client.upload_dataset(
-            path, name=name, on_bytes=lambda sent, total: report(sent / max(total, 1), note=size(total))
-        )
-    if as_json:
-        print_json(dataset)
-        return
-    say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
-    say(f"next: wingfit runs submit {dataset['id']} --watch")
+    with Client(url) as client:
+        emit(upload_dataset(client, path, name), _uploaded, as_json=as_json)
 
 
 @app.command()
@@ -68,17 +51,7 @@ def show(dataset_id: DatasetId, url: Url = DEFAULT_URL, as_json: AsJson = False)
     Example: wingfit datasets show ID
     """
     with Client(url) as client:
-        dataset = client.dataset(dataset_id)
-    if as_json:
-        print_json(dataset)
-        return
-    say(f"{dataset['name']}  {dataset['id']}")
-    say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
-    if dataset["description"]:
-        say(dataset["description"])
-    angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
-    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", f">{angle}", ">pressure", ">airspeed"]
-    table(columns, [_row(r) for r in dataset["recordings"]])
+        emit(client.dataset(dataset_id), _show, as_json=as_json)
 
 
 @app.command()
@@ -87,7 +60,7 @@ def download(
     output: Annotated[Path, typer.Option("--output", "-o", help="File or folder to write to.")] = Path(),
     url: Url = DEFAULT_URL,
 ) -> None:
-    """Fetch the bytes that were uploaded.
+    """Download a dataset as it was uploaded.
 
     Example: wingfit datasets download ID -o robird.zip
     """
@@ -113,7 +86,7 @@ def check(path: Source) -> None:
 
     Example: wingfit datasets check my-campaign/
     """
-    from wingfit.records import load_dataset  # imports wait until they are needed
+    from wingfit.records import load_dataset  # imported late: other commands start faster
 
     try:
         dataset = load_dataset(path)
@@ -128,7 +101,7 @@ def check(path: Source) -> None:
             r.name,
             r.rig,
             "held out" if r.name in dataset.held_out else "fitted",
-            str(len(r.times)),
+            len(r.times),
             f"{100 * float((~r.valid).mean()) if r.valid.size else 0:.1f} %",
         ]
         for r in dataset.recordings
@@ -136,17 +109,35 @@ def check(path: Source) -> None:
     table(["recording", "rig", "use", ">frames", ">missing"], rows)
 
 
-def size(count: int) -> str:
-    """Bytes as kB or MB."""
-    return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+def _list(datasets: list[a.Dataset]) -> None:
+    rows = [
+        [d["id"], d["name"], len(d["recordings"]), size(d["size_bytes"]), moment(d["created_at"])] for d in datasets
+    ]
+    empty = "no datasets; upload one: wingfit datasets upload FOLDER"
+    table(["id", "name", ">recordings", ">size", "uploaded"], rows, empty)
 
 
-def _row(r: a.RecordingInfo) -> list[str]:
+def _uploaded(dataset: a.Dataset) -> None:
+    say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
+    say(f"next: wingfit runs submit {dataset['id']} --watch")
+
+
+def _show(dataset: a.Dataset) -> None:
+    say(f"{dataset['name']}  {dataset['id']}")
+    say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
+    if dataset["description"]:
+        say(dataset["description"])
+    angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
+    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", f">{angle}", ">pressure", ">airspeed"]
+    table(columns, [_row(r) for r in dataset["recordings"]])
+
+
+def _row(r: a.RecordingInfo) -> list[object]:
     return [
         r["name"],
         r["rig"],
         "held out" if r["held_out"] else "fitted",
-        str(r["frames"]),
+        r["frames"],
         f"{r['missing_percent']:.1f} %",
         number(r["flap_frequency_hz"], unit="Hz"),
         number(r["angle_of_attack_deg"] if r["channels"] else r["phase_lag_deg"], unit="deg"),

@@ -1,4 +1,4 @@
-"""``wingfit diagnose``: what a model left out; and ``wingfit diagnoses``, to come back to one."""
+"""``wingfit diagnose``: the physics missing from a model; and ``wingfit diagnoses``, to return to a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,94 +7,95 @@ from typing import Annotated, Any
 
 import typer
 
+from wingfit.cli.base import options as o
 from wingfit.cli.base.files import check_file, write_text
-from wingfit.cli.base.output import AsJson, Url, duration, moment, note, print_json, progress, say, table
-from wingfit.cli.datasets import size
-from wingfit.cli.effects import With, names
-from wingfit.cli.exports import DiagnosisId, export_diagnosis
+from wingfit.cli.base.output import emit, note, progress
 from wingfit.cli.findings import print_finding
-from wingfit.cli.simulate import read_genome
+from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.service.limits import MOST_WORKERS
 
-app = typer.Typer(no_args_is_help=True, help="List, watch, export, cancel and delete diagnoses.")
-app.command("export")(export_diagnosis)
-
-INTERRUPTED = 130
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Save the report, one HTML file: FILE.html.")]
 FindingJson = Annotated[bool, typer.Option("--json", help="Print the finding as JSON.")]
 
 
+def _stage(one: Diagnosis) -> str:
+    return one["stage"] or "starting" if one["state"] == "RUNNING" else one["state"].lower()
+
+
+DIAGNOSES = JobKind(
+    name="diagnosis",
+    plural="diagnoses",
+    help="List, follow, export, cancel and delete diagnoses.",
+    work="diagnosing",
+    submit="wingfit diagnose DATASET",
+    outcome="verdict",
+    outcome_of=lambda one: one["verdict"] or "–",
+    stage_of=_stage,
+    exported="csv holds the ranking, netcdf the maps and misfits",
+    find=Client.diagnoses,
+    wait=Client.wait_for_diagnosis,
+    cancel=Client.cancel_diagnosis,
+    delete=Client.delete_diagnosis,
+    export=Client.export_diagnosis,
+)
+app = commands(DIAGNOSES)
+
+
 def diagnose(
-    dataset: Annotated[
-        str | None, typer.Argument(help="Folder, .zip or .nc, which is uploaded; or the id of a dataset.")
-    ] = None,
-    run: Annotated[str | None, typer.Option(help="Id of a run: start from its best genome, with its settings.")] = None,
-    division: Annotated[
-        str | None, typer.Option(help="4, 11, 24, or bodies per strip, e.g. 3,3,3,2; 11 if left out.")
-    ] = None,
-    preset: Annotated[
-        str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; proposed if left out.")
-    ] = None,
-    without: Annotated[
-        list[str] | None, typer.Option(help="Vehicles: leave out this term, e.g. clap-and-peel; repeatable.")
-    ] = None,
-    axis: Annotated[
-        list[str] | None, typer.Option(help="Vehicles: fit this force axis, x or z; repeatable; all if left out.")
-    ] = None,
-    low_pass_hz: Annotated[
-        float | None, typer.Option(help="Vehicles: cut-off; 3.2 x flap frequency if left out, 0: none.")
-    ] = None,
-    peel_width_beats: Annotated[
-        float | None, typer.Option(help="Vehicles: beats over which the end of the peel is smoothed.")
-    ] = None,
-    with_: With = None,
+    dataset: o.DatasetOrPath = None,
+    run: Annotated[str | None, typer.Option(help="Id of a run: start from its best genome and its settings.")] = None,
+    division: o.Division = None,
+    preset: o.Preset = None,
+    without: o.Without = None,
+    axes: o.Axes = None,
+    low_pass_hz: o.LowPass = None,
+    peel_width_beats: o.PeelWidth = None,
+    with_: o.With = None,
     suspect: Annotated[
         list[str] | None, typer.Option(help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable.")
     ] = None,
-    recording: Annotated[list[str] | None, typer.Option(help="Fit only this recording; repeatable.")] = None,
-    gene: Annotated[list[str] | None, typer.Option(help="Free only this gene; repeatable.")] = None,
-    fixed: Annotated[list[str] | None, typer.Option(help="NAME=VALUE or FILE.json: a gene that keeps a value.")] = None,
-    bounds_factor: Annotated[
-        float | None, typer.Option(help="Genes from estimate / factor to estimate * factor.")
+    recordings: o.Recordings = None,
+    gene: o.Genes = None,
+    fixed: Annotated[
+        list[str] | None, typer.Option(help="NAME=VALUE or FILE.json: genes that are not estimated; repeatable.")
     ] = None,
-    accuracy_mm: Annotated[
-        float | None, typer.Option(help="Largest error of a simulated marker, 0.02 to 1; 0.1 if left out.")
-    ] = None,
-    refits: Annotated[int | None, typer.Option(help="Effects refitted in full at most; 8 if left out.")] = None,
+    bounds_factor: o.BoundsFactor = None,
+    accuracy_mm: o.Accuracy = None,
+    refits: Annotated[int | None, typer.Option(help="Largest number of effects refitted in full; default: 8.")] = None,
     refine: Annotated[
-        bool, typer.Option(help="Whether a finer division may be taken where the division limits.")
+        bool, typer.Option(help="Allow a finer discretisation where the number of bodies limits the accuracy.")
     ] = True,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same finding.")] = None,
-    name: Annotated[str | None, typer.Option(help="A name to find the diagnosis by.")] = None,
+    name: Annotated[str | None, typer.Option(help="A name for the diagnosis.")] = None,
     report: ReportFile = None,
     as_json: FindingJson = False,
     local: Annotated[bool, typer.Option("--local", help="Compute here, without a server; DATASET is a path.")] = False,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, max=MOST_WORKERS, help="With --local: processes; one per processor if left out."),
+        typer.Option(min=1, max=MOST_WORKERS, help="With --local: number of processes; default: one per processor."),
     ] = None,
-    url: Url = DEFAULT_URL,
+    url: o.Url = DEFAULT_URL,
 ) -> None:
-    """Find the physics that a model left out: where, what, how sure, and the proof on held-out recordings.
+    """Identify the physics missing from a model: what, where, how certain, validated on held-out recordings.
 
     Example: wingfit diagnose examples/robird --division 11 --report robird.html
     """
     check_file(report, "--report", (".html",))
-    asked: dict[str, Any] = {
+    settings: dict[str, Any] = {
         "run_id": run,
         "division": division,
         "preset": preset,
-        "without": _names(without, "--without"),
-        "axes": axis or None,
+        "without": o.names(without, "--without"),
+        "axes": axes or None,
         "low_pass_hz": low_pass_hz,
         "peel_width_beats": peel_width_beats,
-        "effects": _names(names(with_), "--with"),
-        "suspects": _names(suspect, "--suspect"),
-        "recordings": recording or None,
+        "effects": o.names(with_, "--with"),
+        "suspects": o.names(suspect, "--suspect"),
+        "recordings": recordings or None,
         "genes": gene or None,
-        "fixed": read_genome(fixed, "--fixed") if fixed else None,
+        "fixed": o.read_genome(fixed, "--fixed") if fixed else None,
         "bounds_factor": bounds_factor,
         "accuracy_mm": accuracy_mm,
         "refits": refits,
@@ -102,163 +103,59 @@ def diagnose(
         "seed": seed,
         "name": name,
     }
-    asked = {key: value for key, value in asked.items() if value is not None}
+    settings = {key: value for key, value in settings.items() if value is not None}
     if local:
-        _here(dataset, asked, workers, report, as_json=as_json)
+        _diagnose_here(dataset, settings, workers, report, as_json=as_json)
         return
     if workers is not None:
         raise typer.BadParameter("the server has its own; give it with --local", param_hint="--workers")
     if dataset is None and run is None:
         raise typer.BadParameter("name a dataset, or a run with --run", param_hint="DATASET")
     with Client(url) as client:
-        submitted = client.submit_diagnosis(_dataset_id(client, dataset), **asked)
+        submitted = client.submit_diagnosis(dataset and dataset_id(client, dataset), **settings)
         note(f"diagnosis {submitted['id']}")
-        _tell(client, submitted["id"], report, as_json=as_json)
-
-
-@app.command("list")
-def list_(
-    dataset: Annotated[str | None, typer.Option(help="Only diagnoses of this dataset id.")] = None,
-    state: Annotated[str | None, typer.Option(help="Only diagnoses in this state, e.g. RUNNING.")] = None,
-    url: Url = DEFAULT_URL,
-    as_json: AsJson = False,
-) -> None:
-    """List the diagnoses on the server.
-
-    Example: wingfit diagnoses list --state SUCCEEDED
-    """
-    with Client(url) as client:
-        found = client.diagnoses(dataset_id=dataset, state=state.upper() if state else None)
-    if as_json:
-        print_json(found)
-        return
-    rows = [
-        [
-            one["id"],
-            one["name"],
-            one["state"],
-            f"{100 * one['progress']:.0f} %",
-            duration(one["eta_seconds"]),
-            one["verdict"] or "–",
-            moment(one["created_at"]),
-        ]
-        for one in found
-    ]
-    columns = ["id", "name", "state", ">progress", ">left", "verdict", "submitted"]
-    table(columns, rows, "no diagnoses; make one: wingfit diagnose DATASET")
+        _print_when_done(client, submitted["id"], report, as_json=as_json)
 
 
 @app.command()
 def watch(
-    diagnosis_id: DiagnosisId, report: ReportFile = None, url: Url = DEFAULT_URL, as_json: FindingJson = False
+    diagnosis_id: o.JobId, report: ReportFile = None, url: o.Url = DEFAULT_URL, as_json: FindingJson = False
 ) -> None:
-    """Show the progress of a diagnosis until it ends, then what it found; Ctrl-C leaves it going.
+    """Show the progress of a diagnosis, then its finding. Ctrl-C ends this command; the diagnosis continues.
 
-    Example: wingfit diagnoses watch ID --report found.html
+    Example: wingfit diagnoses watch ID --report finding.html
     """
     check_file(report, "--report", (".html",))
     with Client(url) as client:
-        _tell(client, diagnosis_id, report, as_json=as_json)
+        _print_when_done(client, diagnosis_id, report, as_json=as_json)
 
 
-@app.command()
-def cancel(diagnosis_id: DiagnosisId, url: Url = DEFAULT_URL) -> None:
-    """Stop a diagnosis for good.
-
-    Example: wingfit diagnoses cancel ID
-    """
-    with Client(url) as client:
-        found = client.cancel_diagnosis(diagnosis_id)
-    say(f"diagnosis {found['id']} {found['state']}")
-
-
-@app.command()
-def delete(diagnosis_id: DiagnosisId, url: Url = DEFAULT_URL) -> None:
-    """Delete a diagnosis that has ended, with its finding.
-
-    Example: wingfit diagnoses delete ID
-    """
-    with Client(url) as client:
-        client.delete_diagnosis(diagnosis_id)
-    say(f"diagnosis {diagnosis_id} deleted")
-
-
-def _tell(client: Client, diagnosis_id: str, report: Path | None, *, as_json: bool) -> None:
-    """Wait for a diagnosis, then say what it found."""
-    ended = _follow(client, diagnosis_id)
-    if ended["state"] == "FAILED":
-        raise WingfitError(f"diagnosis {diagnosis_id} failed", ended["error"] or "the server gives no reason")
-    if ended["state"] == "CANCELLED":
-        raise WingfitError(f"diagnosis {diagnosis_id} was cancelled")
+def _print_when_done(client: Client, diagnosis_id: str, report: Path | None, *, as_json: bool) -> None:
+    check_ended_well(DIAGNOSES, follow(client, DIAGNOSES, diagnosis_id))
     if report:
-        _save(report, client.report(diagnosis_id))
-    found = client.finding(diagnosis_id)
-    print_json(found) if as_json else print_finding(found)
+        write_text(report, client.report(diagnosis_id), "report")
+    emit(client.finding(diagnosis_id), print_finding, as_json=as_json)
 
 
-def _follow(client: Client, diagnosis_id: str) -> Diagnosis:
-    try:
-        with progress("diagnosing") as tell:
-            return client.wait_for_diagnosis(
-                diagnosis_id, lambda one: tell(one["progress"], one["eta_seconds"], _stage(one))
-            )
-    except KeyboardInterrupt:
-        note(
-            f"\ndiagnosis {diagnosis_id} goes on without you; 'wingfit diagnoses watch {diagnosis_id}' to come back, "
-            f"'wingfit diagnoses cancel {diagnosis_id}' to stop it"
-        )
-        raise typer.Exit(INTERRUPTED) from None
-
-
-def _stage(one: Diagnosis) -> str:
-    return one["stage"] or "starting" if one["state"] == "RUNNING" else one["state"].lower()
-
-
-def _here(
-    dataset: str | None, asked: dict[str, Any], workers: int | None, report: Path | None, *, as_json: bool
+def _diagnose_here(
+    dataset: str | None, settings: dict[str, Any], workers: int | None, report: Path | None, *, as_json: bool
 ) -> None:
-    if "run_id" in asked:
+    if "run_id" in settings:
         raise typer.BadParameter("runs are on a server; leave --run or --local out", param_hint="--run")
     if dataset is None:
         raise typer.BadParameter("name the folder, .zip or .nc", param_hint="DATASET")
     path = Path(dataset)
     if not path.exists():
         raise WingfitError("no such dataset", f"{path} does not exist; give a folder, a .zip or a .nc file")
-    from wingfit.report import finding_json, html  # what computes waits until it is needed
+    from wingfit.report import finding_json, html  # imported late: other commands start faster
     from wingfit.service.diagnoses.local import diagnose as diagnose_here
 
     try:
-        with progress("diagnosing") as tell:
-            found = diagnose_here(path, asked, workers, tell)
+        with progress("diagnosing") as show:
+            finding = diagnose_here(path, settings, workers, show)
     except KeyboardInterrupt:
-        note("\nthe diagnosis was given up; nothing was kept")
+        note("\nthe diagnosis was stopped; nothing was stored")
         raise typer.Exit(INTERRUPTED) from None
     if report:
-        _save(report, html(found))
-    plain = finding_json(found)
-    print_json(plain) if as_json else print_finding(plain)
-
-
-def _dataset_id(client: Client, dataset: str | None) -> str | None:
-    """The id of ``dataset``, which is uploaded if it is a path."""
-    if dataset is None or not Path(dataset).exists():
-        return dataset
-    with progress("uploading") as tell:
-        uploaded = client.upload_dataset(
-            dataset, on_bytes=lambda sent, total: tell(sent / max(total, 1), note=size(total))
-        )
-    note(f"dataset {uploaded['id']} '{uploaded['name']}'")
-    return uploaded["id"]
-
-
-def _names(words: list[str] | None, option: str) -> list[str] | None:
-    """Names of effects or terms as the server writes them: clap-and-peel and added_mass,damage are understood."""
-    found = [name.strip().replace("-", "_") for word in words or [] for name in word.split(",")]
-    if "" in found:
-        raise typer.BadParameter("a name is empty; leave the option or the comma out", param_hint=option)
-    return found or None
-
-
-def _save(path: Path, text: str) -> None:
-    write_text(path, text)
-    note(f"report written to {path}; open it in a browser")
+        write_text(report, html(finding), "report")
+    emit(finding_json(finding), print_finding, as_json=as_json)

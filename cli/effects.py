@@ -1,4 +1,4 @@
-"""``wingfit effects``: what a model can be made to contain; and the option that names effects."""
+"""``wingfit effects``: the effects that a model can include."""
 
 from __future__ import annotations
 
@@ -6,32 +6,16 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.output import AsJson, Url, number, print_json, say, table
+from wingfit.cli.base.options import AsJson, Url
+from wingfit.cli.base.output import emit, interval, number, say, table
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.client.effect_answers import Effect, EffectParameter
-
-With = Annotated[
-    list[str] | None,
-    typer.Option("--with", help="Include these effects of 'wingfit effects', e.g. added_mass,hinge_offset."),
-]
 
 MEASURES = {"span": "span", "chord": "mean chord", "mass": "mass of the wing"}
 
 
-def names(words: list[str] | None) -> list[str] | None:
-    """Effects named in ``words``, each of which may name several, separated by commas; None where none is."""
-    found = [name.strip() for word in words or [] for name in word.split(",")]
-    if "" in found:
-        raise typer.BadParameter(
-            "an effect without a name; give names of 'wingfit effects', such as added_mass,hinge_offset, or leave the "
-            "option out",
-            param_hint="--with",
-        )
-    return found or None
-
-
 def effects(
-    name: Annotated[str | None, typer.Argument(help="An effect, for its details; all if left out.")] = None,
+    name: Annotated[str | None, typer.Argument(help="An effect, for its details; default: list all.")] = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
@@ -40,18 +24,16 @@ def effects(
     Example: wingfit effects hinge_offset
     """
     with Client(url) as client:
-        found = [client.effect(name)] if name else client.effects()
-    if as_json:
-        print_json(found[0] if name else found)
-    elif name:
-        _describe(found[0])
-    else:
-        columns = ["effect", "family", "of", "genes", "what it looks like"]
-        table(columns, [[e["name"], e["family"], _of(e), _genes(e), e["signature"]] for e in found])
+        if name:
+            emit(client.effect(name), _describe, as_json=as_json)
+        else:
+            emit(client.effects(), _list, as_json=as_json)
 
 
-def _of(effect: Effect) -> str:
-    return " ".join(effect["applies_to"])
+def _list(effects: list[Effect]) -> None:
+    columns = ["effect", "family", "rig", "genes", "signature"]
+    rows = [[e["name"], e["family"], " ".join(e["applies_to"]), _genes(e), e["signature"]] for e in effects]
+    table(columns, rows)
 
 
 def _genes(effect: Effect) -> str:
@@ -67,20 +49,26 @@ def _describe(effect: Effect) -> None:
         ["memory", effect["memory"] or "none"],
         *(["law" if k == 0 else "", line] for k, line in enumerate(effect["law"].splitlines())),
         ["source", effect["source"]],
-        ["looks like", effect["signature"]],
+        ["signature", effect["signature"]],
         ["confused with", ", ".join(effect["confused_with"]) or "–"],
     ]
     table(["", ""], rows)
     say("")
-    columns = ["gene", ">typical", "bounds", "unit", "what it is"]
+    columns = ["gene", ">typical", "bounds", "unit", "description"]
     table(columns, [_row(parameter) for parameter in effect["parameters"]])
     for of, unit in dict.fromkeys((p["of"], p["unit"]) for p in effect["parameters"] if p["of"]):
-        say(f"'x {of}' is in parts of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
-    say("zero in all genes marked 'size' switches it off; fit it: wingfit runs submit ID --with " + effect["name"])
+        say(f"'x {of}': multiples of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
+    say("the effect is off where all genes marked 'size' are zero")
+    say(f"estimate its genes: wingfit runs submit ID --with {effect['name']}")
 
 
 def _row(one: EffectParameter) -> list[str]:
     unit = one["unit"] if one["of"] is None else f"x {one['of']}"
-    bounds = f"[{number(one['lower'], 3)}, {number(one['upper'], 3)}]"
     role = "size" if one["size"] else "place" if one["place"] else "shape"
-    return [one["name"], number(one["typical"], 3), bounds, unit, f"{one['description']} ({role})"]
+    return [
+        one["name"],
+        number(one["typical"], 3),
+        interval(one["lower"], one["upper"]),
+        unit,
+        f"{one['description']} ({role})",
+    ]

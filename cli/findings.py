@@ -1,94 +1,82 @@
-"""What a diagnosis found, as people read it in a terminal."""
+"""The finding of a diagnosis, printed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
-from wingfit.cli.base.output import note, number, say, table
-from wingfit.cli.base.rounding import force_unit, kept
+from wingfit.cli.base.output import interval, percent, remarks, say, table
+from wingfit.cli.base.rounding import Unit, force_unit
 from wingfit.service.units import MM
 
 Json = dict[str, Any]
 SHOWN = 12
-NOMINAL = "nothing more (nominal model)"
+NOMINAL = "nominal model alone"
 
 
-def print_finding(found: Json) -> None:
-    """Verdict, summary, where, ranking, proof, what to record next; remarks on standard error."""
-    probable = found["probabilities"].get(found["verdict"])
-    about = "" if probable is None else f" ({_probable(probable)})"
-    named = f": {', '.join(found['named'])}" if found["named"] else ""
-    say(f"verdict: {found['verdict']}{about}{named}")
-    say(found["summary"])
-    if found["where"]:
-        say(f"where: {found['where']['words']}")
+def print_finding(finding: Json) -> None:
+    """Verdict, summary, location, ranking, validation and next recording; remarks go to standard error."""
+    probability = finding["probabilities"].get(finding["verdict"])
+    about = "" if probability is None else f" ({_probability(probability)})"
+    named = f": {', '.join(finding['named'])}" if finding["named"] else ""
+    say(f"verdict: {finding['verdict']}{about}{named}")
+    say(finding["summary"])
+    if finding["where"]:
+        say(f"location: {finding['where']['words']}")
     say("")
-    _ranking(found)
-    if found["alike"]:
-        say(f"these recordings cannot tell apart: {'; '.join(' and '.join(names) for names in found['alike'])}")
-    _genes(found)
-    if found["law"]:
-        say(f"free-form law: {found['law']['words']}")
-    if found["proof"]:
-        say(f"held out: {found['proof']['words']}")
-    if found["advice"]:
-        say(f"record next: {found['advice'][0]['words']}")
-    for remark in found["remarks"]:
-        note(f"note: {remark}")
+    _ranking(finding)
+    if finding["alike"]:
+        say(f"not distinguishable by these recordings: {'; '.join(' and '.join(names) for names in finding['alike'])}")
+    _genes(finding)
+    for key, label in (("law", "free-form law of the residual"), ("proof", "held-out recordings")):
+        if finding[key]:
+            say(f"{label}: {finding[key]['words']}")
+    if finding["advice"]:
+        say(f"next recording: {finding['advice'][0]['words']}")
+    remarks(finding["remarks"])
 
 
-def _ranking(found: Json) -> None:
-    unit, show = _misfits(found)
-    columns = ["hypothesis", ">probable", ">ln evidence", ">explains", ">held-out", f">leaves {unit}", "refitted"]
+def _ranking(finding: Json) -> None:
+    hypotheses = finding["hypotheses"]
+    misfits = [one["misfit"] for one in hypotheses]
+    unit = Unit("mm", MM) if finding["unit"] == "m" else force_unit(misfits)
     rows = [
         [
             " + ".join(one["effects"]) or NOMINAL,
-            _probable(one["probability"]),
+            _probability(one["probability"]),
             f"{one['evidence'] + 0.0:.1f}",
-            _percent(one["explained"]),
-            _percent(one["predicted"]),
-            show(one["misfit"]),
-            "yes" if one["refitted"] else "no",
+            percent(one["explained"]),
+            percent(one["predicted"]),
+            unit.show(one["misfit"]),
+            one["refitted"],
         ]
-        for one in found["hypotheses"][:SHOWN]
+        for one in hypotheses[:SHOWN]
     ]
-    table(columns, rows, "no hypothesis was compared")
-    if len(found["hypotheses"]) > SHOWN:
-        say(f"and {len(found['hypotheses']) - SHOWN} less probable ones; --json or the report has all")
+    columns = [">probability", ">ln evidence", ">explained", ">predicted", f">residual {unit.name}", "refitted"]
+    table(["hypothesis", *columns], rows, "no hypothesis was compared")
+    if len(hypotheses) > SHOWN:
+        say(f"{len(hypotheses) - SHOWN} less probable hypotheses are not shown; --json and the report list all")
 
 
-def _genes(found: Json) -> None:
-    """Genes of what was found, with their 90 % intervals."""
+def _genes(finding: Json) -> None:
+    """Print the genes of the named effects with their 90 % intervals."""
     rows = [
-        [gene["name"], number(gene["value"]["value"]), gene["unit"], _interval(gene["value"]), gene["description"]]
-        for gene in found["genes"]
-        if gene["name"].partition(".")[0] in found["named"]
+        [
+            gene["name"],
+            gene["value"]["value"],
+            gene["unit"],
+            interval(gene["value"]["low"], gene["value"]["high"]),
+            gene["description"],
+        ]
+        for gene in finding["genes"]
+        if gene["name"].partition(".")[0] in finding["named"]
     ]
     if rows:
         say("")
-        table(["gene", ">value", "unit", "90 % interval", "what it is"], rows)
+        table(["gene", ">value", "unit", "90 % interval", "description"], rows)
 
 
-def _interval(value: Json) -> str:
-    low, high = (number(value[end], 3) if value[end] is not None else "open" for end in ("low", "high"))
-    return f"[{low}, {high}]"
-
-
-def _misfits(found: Json) -> tuple[str, Callable[[float | None], str]]:
-    """The unit of misfits and how one is shown in it."""
-    if found["unit"] == "m":
-        return "mm", lambda metres: kept(None if metres is None else MM * metres)
-    unit = force_unit(one["misfit"] for one in found["hypotheses"])
-    return unit.name, unit.show
-
-
-def _probable(part: float) -> str:
-    """A probability in per cent; what is not certain is not shown as certain."""
+def _probability(part: float) -> str:
+    """A probability in per cent, never rounded to 0 or 100 %."""
     if part < 0.005:
         return "<1 %"
-    return _percent(part) if part <= 0.995 else ">99 %"
-
-
-def _percent(part: float | None) -> str:
-    return "–" if part is None else f"{100 * part:.0f} %"
+    return percent(part) if part <= 0.995 else ">99 %"

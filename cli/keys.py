@@ -1,4 +1,4 @@
-"""``wingfit keys``: who may use a server that other machines can reach."""
+"""``wingfit keys``: API keys of a server that other machines can reach."""
 
 from __future__ import annotations
 
@@ -7,34 +7,33 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.output import AsJson, Url, moment, note, print_json, say, table
+from wingfit.cli.base.options import AsJson, Url
+from wingfit.cli.base.output import emit, moment, note, say, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.key_client import Key, NewKey
 
-app = typer.Typer(no_args_is_help=True, help="Make, list and revoke API keys.")
+app = typer.Typer(no_args_is_help=True, help="Create, list and revoke API keys.")
 
 SCOPES = ("read", "write", "admin")
 Data = Annotated[
     Path | None,
-    typer.Option(help="Folder of a server that is not running: how the first key is made. Else the server is asked."),
+    typer.Option(help="Data folder of a stopped server, for the first key; default: use the running server."),
 ]
 
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Argument(help="What it is for.")],
-    owner: Annotated[
-        str | None, typer.Option(help="To whom belongs what is made with it; the name if left out.")
-    ] = None,
+    name: Annotated[str, typer.Argument(help="Name of the key, e.g. its purpose.")],
+    owner: Annotated[str | None, typer.Option(help="Owner of everything created with the key; default: NAME.")] = None,
     scope: Annotated[
         list[str] | None,
-        typer.Option(help="read, write, or admin (everyone's data, and keys); repeatable; read and write if left out."),
+        typer.Option(help="read, write, or admin (all owners' data, and keys); repeatable; default: read and write."),
     ] = None,
     data: Data = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
-    """Make a key and print its secret, which is told this once.
+    """Create a key and print its secret, which is not shown again.
 
     Example: wingfit keys create bench --owner tunnel-group --data ~/wingfit-data
     """
@@ -49,14 +48,7 @@ def create(
     else:
         with Client(url) as client:
             made = client.create_key(name, owner=owner, scopes=scopes)
-    if as_json:
-        print_json(made)
-        return
-    say(made["secret"])
-    note(
-        f"key {made['id']} of {made['owner']!r}, good for {', '.join(made['scopes'])}; it is not shown again. "
-        "Use it: export WINGFIT_API_KEY=..., or paste it into the page"
-    )
+    emit(made, _created, as_json=as_json)
 
 
 @app.command("list")
@@ -66,44 +58,48 @@ def list_(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
     Example: wingfit keys list
     """
     with Client(url) as client:
-        found = client.keys()
-    if as_json:
-        print_json(found)
-        return
-    table(["id", "name", "owner", "good for", "made", "revoked"], [_row(key) for key in found], "no keys")
+        emit(client.keys(), _list, as_json=as_json)
 
 
 @app.command()
 def revoke(key_id: Annotated[str, typer.Argument(help="From 'wingfit keys list'.")], url: Url = DEFAULT_URL) -> None:
-    """Make a key good for nothing, at once; what was made with it stays.
+    """Revoke a key at once; the data created with it are kept.
 
     Example: wingfit keys revoke KEY_ID
     """
     with Client(url) as client:
-        found = client.revoke_key(key_id)
-    say(f"key {found['id']} revoked at {moment(found['revoked_at'])}")
+        key = client.revoke_key(key_id)
+    say(f"key {key['id']} revoked at {moment(key['revoked_at'])}")
 
 
-def _row(key: Key) -> list[str]:
-    return [
-        key["id"],
-        key["name"],
-        key["owner"],
-        ", ".join(key["scopes"]),
-        moment(key["created_at"]),
-        moment(key["revoked_at"]),
+def _created(key: NewKey) -> None:
+    say(key["secret"])
+    note(
+        f"key {key['id']} of {key['owner']!r}, scopes {', '.join(key['scopes'])}; the secret is not shown again. "
+        "Use it: export WINGFIT_API_KEY=..., or paste it into the page"
+    )
+
+
+def _list(keys: list[Key]) -> None:
+    rows = [
+        [
+            *(key["id"], key["name"], key["owner"], ", ".join(key["scopes"])),
+            *(moment(key["created_at"]), moment(key["revoked_at"])),
+        ]
+        for key in keys
     ]
+    table(["id", "name", "owner", "scopes", "created", "revoked"], rows, "no keys")
 
 
 def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
-    """Make a key in the folder of a server that is not running."""
-    from wingfit.service.auth import keys  # the database waits until it is needed
+    """Create a key in the data folder of a server that is not running."""
+    from wingfit.service.auth import keys  # imported late: other commands start faster
     from wingfit.service.storage.database import Database, DataFolderError
 
     try:
         database = Database(data)
     except DataFolderError as error:
-        remedy = "a server that runs is asked without --data, with WINGFIT_API_KEY set to a key that manages keys"
+        remedy = "for a running server leave out --data, and set WINGFIT_API_KEY to an admin key"
         raise WingfitError("no key was made", f"{error}; {remedy}") from None
     try:
         with database.write() as session:

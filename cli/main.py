@@ -1,6 +1,6 @@
-"""The command line: ``wingfit serve | datasets | runs | simulate | models | effects``, and what prepares data.
+"""The command line: ``wingfit``, with one module for each command or group of commands.
 
-Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a wrong use of the command, 130 Ctrl-C.
+Exit codes: 0 done, 1 an error (a line or two on standard error), 2 a usage error, 130 Ctrl-C.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ app = typer.Typer(
     name="wingfit",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Calibrate flapping-wing simulations on recordings of markers or of forces, and find what they left out.",
+    help="Calibrate flapping-wing simulations on recordings of markers or of forces, and identify missing physics.",
     epilog="Example: wingfit serve, then wingfit datasets upload examples/robird",
 )
 app.command()(serve.serve)
@@ -50,7 +50,7 @@ def main() -> None:
         note(f"error: {error}")
         sys.exit(ERROR)
     except BrokenPipeError:
-        # The reader of the pipe has gone (as with "| head"); Python would complain again at exit.
+        # The reader of the pipe has closed it (as "| head" does); without this Python prints another error at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(ERROR)
     except OSError as error:

@@ -16,16 +16,16 @@ def serve(
         Path | None, typer.Option(help="Folder of the database; default: $WINGFIT_DATA or ./wingfit-data.")
     ] = None,
     host: Annotated[str | None, typer.Option(help="Address to listen on; default 127.0.0.1.")] = None,
-    port: Annotated[int | None, typer.Option(help="TCP port; default 8321; 0 takes a free one.")] = None,
+    port: Annotated[int | None, typer.Option(help="TCP port; default 8321; 0: any free port.")] = None,
     evaluator: Annotated[str | None, typer.Option(help="ray (default), processes or in_process.")] = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes; default: one per core.")] = None,
-    ray_address: Annotated[str | None, typer.Option(help="A standing Ray cluster; default: start one.")] = None,
+    ray_address: Annotated[str | None, typer.Option(help="Existing Ray cluster; default: start one.")] = None,
 ) -> None:
-    """Serve the API and the page until Ctrl-C; runs under way go on at the next start.
+    """Serve the API and the page until Ctrl-C; unfinished runs continue at the next start.
 
     Example: wingfit serve --data ~/wingfit-data --port 8321
     """
-    from wingfit.service.server import ServeError  # the web framework waits until it is needed
+    from wingfit.service.server import ServeError  # imported late: other commands start faster
     from wingfit.service.server import serve as run_server
     from wingfit.service.settings import Settings, SettingsError
 

@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any, NoReturn, cast
 
 from wingfit.cli.base.output import mm, note, number, progress, say, table
-from wingfit.cli.runs import misfits, told
+from wingfit.cli.results import identifiable, misfits
 from wingfit.client import answers as a
 from wingfit.client.client import Client, ServerAwayError, WingfitError
 
@@ -132,7 +132,7 @@ def _print_genes(genes: list[a.GeneInfo]) -> None:
             number(gene["best"]),
             number(truth[gene["name"]]),
             gene["unit"],
-            told(gene),
+            identifiable(gene),
             f"{off[gene['name']]:+.1f} %" if gene["identifiable"] else "–",
         ]
         for gene in genes

@@ -1,4 +1,4 @@
-"""A diagnosis for people and for programs: one HTML file that needs nothing else, and the same as JSON."""
+"""The finding of a diagnosis as a report (one self-contained HTML file) and as JSON."""
 
 from wingfit.report.finding_file import finding_from_json, finding_json
 from wingfit.report.page import html

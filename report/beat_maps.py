@@ -1,14 +1,15 @@
-"""The misfit and the missing load over span and phase."""
+"""Maps of the misfit and of the missing load over span and phase."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from statistics import fmean
 
 from wingfit.diagnosis.evidence.intervals import reach
 from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
-from wingfit.report.layout import figure, panels
+from wingfit.report.layout import figure, folded, panels
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
     Scale,
@@ -45,30 +46,31 @@ BOTTOM = TOP + HEIGHT
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 NINETY = reach()
-MOST_ROWS, MOST_COLUMNS, MOST_LOADS = 32, 64, 6
+MOST_ROWS, MOST_COLUMNS = 32, 64
+MOST_LOADS, MOST_FOLDED = 6, 30  # recordings whose missing load is drawn, and drawn at least in folded details
 Pool = Callable[[Sequence[float]], float]
 
 
 def misfit_maps(finding: Finding) -> Markup | None:
-    """Misfit over span and phase, before and after, against the noise; curves where there is one row."""
+    """Misfit over span and phase, before and after, with the noise; curves where there is one row."""
     given = finding.phase_map
     if given is None or not given.bands or not given.phase:
         return None
     scale = channel_scale(finding)
     if len(given.bands) == 1:
         lines = [(f"{stage}-line", name) for stage, name in stages(finding).items()]
-        key = legend(*lines, ("noise-line", "what noise alone leaves"))
-        return figure(_misfit_told(finding, given, scale), panels(_misfit_curves(finding, given, scale)), key)
+        key = legend(*lines, ("noise-line", "expected from noise alone"))
+        return figure(_misfit_caption(finding, given, scale), panels(_misfit_curves(finding, given, scale)), key)
     most = max(max(map(max, given.before)), max(map(max, given.after)), given.noise)
     drawings = panels(
         *(_misfit_map(capital(name), given, getattr(given, s), most, scale) for s, name in stages(finding).items())
     )
-    note = "Root mean square over all recordings. The line on the colour bar is what noise alone leaves in a cell."
-    return figure(_misfit_told(finding, given, scale), drawings, note=note)
+    note = "Root mean square over all recordings. The line on the colour bar is the misfit expected from noise alone."
+    return figure(_misfit_caption(finding, given, scale), drawings, note=note)
 
 
-def lacking(finding: Finding) -> str:
-    """What is missing: a load, or a motion of the drive."""
+def missing_kind(finding: Finding) -> str:
+    """Kind of the missing physics: "load" or "motion of the drive"."""
     return _kind(finding.missing[0]) if finding.missing else "load"
 
 
@@ -77,49 +79,54 @@ def _kind(load: MissingLoad) -> str:
 
 
 def _name(load: MissingLoad, letters: int) -> str:
-    """Of which rod, if of one, under which recording's condition."""
+    """The recording, and the rod where the load belongs to one."""
     of = f"{load.rod} rod, " if load.rod else ""
     return of + shortened(load.recording, letters - len(of))
 
 
 def missing_loads(finding: Finding) -> Markup | None:
-    """The load, or motion, that the nominal model lacks, under the conditions where it is largest."""
+    """The load, or motion, missing from the nominal model, in the recordings where it is largest."""
     loads = [m for m in finding.missing if m.stations and m.phase]
     if not loads:
         return None
-    shown = sorted(loads, key=lambda m: -_peak(m)[2])[:MOST_LOADS]
-    scale = scale_for((v for load in shown for row in load.values for v in row), shown[0].unit)
+    loads.sort(key=lambda load: -_peak(load)[2])
+    shown, more = loads[:MOST_LOADS], loads[MOST_LOADS:MOST_FOLDED]
     single = all(len(load.stations) == 1 for load in shown)
-    drawings = panels(
-        *(_load_curve(load, scale) if len(load.stations) == 1 else _load_map(load, scale) for load in shown)
+    note = None if single else "Positive along the flap normal. Each map has its own scale."
+    key = legend(("band", "90 % interval") if single else ("hatched", "not significant (90 %)"))
+    hidden = len(loads) - len(shown) - len(more)
+    return joined(
+        figure(_load_caption(shown[0], _load_scale(shown)), _load_panels(shown), key, note=note),
+        folded(f"{len(more)} more, with smaller loads", _load_panels(more)) if more else None,
+        tag("p", f"{hidden} more, with smaller loads, are in the JSON.", class_="note") if hidden else None,
     )
-    left = len(loads) - len(shown)
-    more = f" {left} more, where it is smaller, are in the JSON." if left else ""
-    if single:
-        return figure(
-            _load_told(shown[0], scale), drawings, legend(("band", "90 % interval")), note=more.strip() or None
-        )
-    note = f"Positive along the flap normal. Each map has its own scale.{more}"
-    key = legend(("hatched", "cannot be told from nothing (90 %)"))
-    return figure(_load_told(shown[0], scale), drawings, key, note=note)
 
 
-def _misfit_told(finding: Finding, given: PhaseMap, scale: Scale) -> str:
+def _load_panels(loads: Sequence[MissingLoad]) -> Markup:
+    scale = _load_scale(loads)
+    return panels(*((_load_curve if len(load.stations) == 1 else _load_map)(load, scale) for load in loads))
+
+
+def _load_scale(loads: Sequence[MissingLoad]) -> Scale:
+    return scale_for((v for load in loads for row in load.values for v in row), loads[0].unit)
+
+
+def _misfit_caption(finding: Finding, given: PhaseMap, scale: Scale) -> str:
     i, j = _largest(given.before)
     before, after = given.before[i][j], given.after[i][j]
     where = f"phase {number(given.phase[j], 2)}"
     if len(given.bands) > 1:
         where += f" and {share(given.bands[i])} of the span"
     if before <= given.noise:
-        return f"Nowhere in the beat does the misfit rise above the noise of {scale.text(given.noise)}"
+        return f"The misfit does not exceed the noise of {scale.text(given.noise)} at any phase of the beat"
     return (
         f"The misfit peaks at {where}: {change(finding, scale.text(before), scale.text(after))}, "
-        f"where noise alone leaves {scale.text(given.noise)}"
+        f"noise alone gives {scale.text(given.noise)}"
     )
 
 
 def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: Scale) -> Markup:
-    bands = _pooled([given.bands], MOST_ROWS, _mean)[0]
+    bands = _pooled([given.bands], MOST_ROWS, fmean)[0]
     classes: list[list[str | None]] = [[f"l{level(v, most)}" for v in row] for row in _small(values, _rms)]
     bar = colour_bar(
         Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
@@ -141,7 +148,7 @@ def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
     return drawing(
         WIDTH,
         BOTTOM + 34,
-        _misfit_told(finding, given, scale),
+        _misfit_caption(finding, given, scale),
         text(LEFT, 14, "Misfit over the beat", class_="title"),
         x_axis(across, TOP, BOTTOM, PHASE, BEATS),
         y_axis(up, LEFT, RIGHT, f"misfit, {scale.unit}"),
@@ -153,22 +160,22 @@ def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
     )
 
 
-def _load_told(load: MissingLoad, scale: Scale) -> str:
+def _load_caption(load: MissingLoad, scale: Scale) -> str:
     i, j, ratio = _peak(load)
     if ratio < NINETY:
-        return f"No missing {_kind(load)} stands out from its error"
+        return f"No missing {_kind(load)} is significant"
     where = f"phase {number(load.phase[j], 2)}"
     if len(load.stations) > 1:
         where += f" and {share(load.stations[i])} of the span"
     size = number(load.values[i][j] * scale.factor)
     error = number(NINETY * load.errors[i][j] * scale.factor, 2)
-    told = f"{size} ± {error} {scale.unit} ({_name(load, 40)})"
-    return f"The missing {_kind(load)} is clearest at {where}: {told}"
+    value = f"{size} ± {error} {scale.unit} ({_name(load, 40)})"
+    return f"The missing {_kind(load)} is most significant at {where}: {value}"
 
 
 def _load_map(load: MissingLoad, scale: Scale) -> Markup:
-    stations = _pooled([load.stations], MOST_ROWS, _mean)[0]
-    values, errors = _small(load.values, _mean), _small(load.errors, _rms)
+    stations = _pooled([load.stations], MOST_ROWS, fmean)[0]
+    values, errors = _small(load.values, fmean), _small(load.errors, _rms)
     most = max(abs(v) for row in values for v in row) or 1.0
     classes: list[list[str | None]] = [[f"d{side(v, most)}" for v in row] for row in values]
     faint: list[list[str | None]] = [
@@ -209,7 +216,7 @@ def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
 def _grid(
     title: str, bands: Numbers, classes: list[list[str | None]], over: list[list[str | None]] | None = None
 ) -> Markup:
-    """Cells with the tip on top; phase to the right."""
+    """Cells over phase (to the right) and span (tip on top), with axes."""
     across, down = Axis(0, 1, LEFT, RIGHT), Axis(0, 1, TOP, BOTTOM)
     tall = HEIGHT / len(bands)
     labels: list[Markup] = []
@@ -241,7 +248,7 @@ def _largest(table: Table) -> tuple[int, int]:
 
 
 def _peak(load: MissingLoad) -> tuple[int, int, float]:
-    """Row and column where the load is largest in standard errors, and how many."""
+    """Row and column where the load is largest in standard errors, and that ratio."""
     ratios = tuple(
         tuple(abs(v) / e if e > 0 else 0.0 for v, e in zip(row, errs, strict=True))
         for row, errs in zip(load.values, load.errors, strict=True)
@@ -251,7 +258,7 @@ def _peak(load: MissingLoad) -> tuple[int, int, float]:
 
 
 def _pooled(table: Sequence[Sequence[float]], most: int, pool: Pool) -> list[tuple[float, ...]]:
-    """The same with at most ``most`` columns: neighbours are pooled."""
+    """``table`` with at most ``most`` columns: neighbours are pooled."""
     columns = len(table[0])
     if columns <= most:
         return [tuple(row) for row in table]
@@ -260,17 +267,13 @@ def _pooled(table: Sequence[Sequence[float]], most: int, pool: Pool) -> list[tup
 
 
 def _small(table: Sequence[Sequence[float]], pool: Pool) -> list[tuple[float, ...]]:
-    """The same with at most as many rows and columns as a drawing shows."""
+    """``table`` with at most MOST_ROWS rows and MOST_COLUMNS columns."""
     rows = _turned(_pooled(_turned(table), MOST_ROWS, pool))
     return _pooled(rows, MOST_COLUMNS, pool)
 
 
 def _turned(table: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
     return [tuple(column) for column in zip(*table, strict=True)]
-
-
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
 
 
 def _rms(values: Sequence[float]) -> float:

@@ -1,6 +1,6 @@
-"""A finding as JSON, exactly, both ways.
+"""A finding as JSON, and back, without loss.
 
-Numbers stay in the units of :mod:`wingfit.diagnosis.finding`: JSON is for programs, the page for people.
+Numbers have the SI units of :mod:`wingfit.diagnosis.finding`; the report converts them for reading.
 """
 
 from __future__ import annotations

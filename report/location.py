@@ -1,4 +1,4 @@
-"""Where and when the model and the recordings differ, along which axis, and how it scales."""
+"""Location of the misfit in span, chord and phase, its axis, and its scaling with the condition."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from wingfit.report.svg import Axis, drawing, line, text, whisker, x_axis
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 MOST_HARMONICS = 8
-LEVEL = 1.0  # an interval of a power that holds zero and is narrower says that there is no dependence
+LEVEL = 1.0  # an interval of an exponent that contains zero and is narrower shows that there is no dependence
 
 
 def place(finding: Finding) -> Markup | None:
-    """Strips for span, chord and phase; harmonics; powers."""
+    """Bars for span, chord and phase; harmonics; exponents."""
     where = finding.where
     if where is None:
         return None
-    whose = "what the named effect does" if finding.verdict in ("named", "measurement fault") else "the misfit"
-    drawings = [d for d in (_strips(where), _harmonics(where, whose)) if d is not None]
-    found = figure(where.words or "Where they differ", panels(*drawings)) if drawings else tag("p", where.words)
-    return joined(found, _powers(where.exponents, whose))
+    subject = "the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
+    drawings = [d for d in (_strips(where), _harmonics(where, subject)) if d is not None]
+    found = figure(where.words or "Location of the misfit", panels(*drawings)) if drawings else tag("p", where.words)
+    return joined(found, _powers(where.exponents, subject))
 
 
 def _strips(where: Where) -> Markup | None:
@@ -46,7 +46,7 @@ def _strips(where: Where) -> Markup | None:
         at = along.at(interval.value % 1 if turns else interval.value)
         extent = f"{name}: {centre}{_within(interval, factor, unit)}"
         parts += [
-            text(LEFT, y - 6, extent, class_="said"),
+            text(LEFT, y - 6, extent, class_="value"),
             tag("rect", x=LEFT, y=y, width=RIGHT - LEFT, height=12.0, class_="trough"),
             *(
                 tag("rect", x=along.at(a), y=y, width=max(along.at(b) - along.at(a), 2.0), height=12.0, class_="strong")
@@ -56,7 +56,7 @@ def _strips(where: Where) -> Markup | None:
             text(LEFT, y + 24, first, class_="tick"),
             text(RIGHT, y + 24, last, anchor="end", class_="tick"),
         ]
-    title = f"Where and when, mostly along {where.axis}" if where.axis else "Where and when"
+    title = f"Location, mainly along {where.axis}" if where.axis else "Location"
     return drawing(WIDTH, 22 + 54.0 * len(rows) + 4, title, text(LEFT, 14, title, class_="title"), *parts)
 
 
@@ -66,7 +66,7 @@ def _within(interval: Interval, factor: float, unit: str) -> str:
     return f", 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
 
 
-def _harmonics(where: Where, whose: str) -> Markup | None:
+def _harmonics(where: Where, subject: str) -> Markup | None:
     shown = where.harmonics[:MOST_HARMONICS]
     if not shown or not any(shown):
         return None
@@ -79,20 +79,20 @@ def _harmonics(where: Where, whose: str) -> Markup | None:
         parts.append(tag("rect", x=x + 0.15 * wide, y=bottom - tall, width=0.7 * wide, height=tall, class_="strong"))
         parts.append(text(x + wide / 2, bottom - tall - 4, percent(part), anchor="middle", class_="tick"))
         parts.append(text(x + wide / 2, bottom + 13, "mean" if k == 0 else str(k), anchor="middle", class_="tick"))
-    title = "In which harmonics of the beat"
+    title = "Harmonics of the flap frequency"
     return drawing(
         WIDTH,
         bottom + 32,
         title,
         text(LEFT, 14, title, class_="title"),
-        text(LEFT, 29, f"part of the mean square of {whose}", class_="tick"),
+        text(LEFT, 29, f"fraction of the mean square of {subject}", class_="tick"),
         *parts,
         line(LEFT, bottom, RIGHT, bottom, "axis"),
         text((LEFT + RIGHT) / 2, bottom + 28, "harmonic", anchor="middle", class_="label"),
     )
 
 
-def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
+def _powers(exponents: tuple[Exponent, ...], subject: str) -> Markup | None:
     if not exponents:
         return None
     ends = [v for e in exponents for v in (e.power.value, e.power.low, e.power.high) if v is not None]
@@ -101,37 +101,38 @@ def _powers(exponents: tuple[Exponent, ...], whose: str) -> Markup | None:
     along = Axis(low - 0.3, high + 0.3, LEFT, RIGHT)
     bottom = 10 + 44.0 * len(exponents)
     parts: list[Markup] = [
-        x_axis(along, 8, bottom, "power", [float(v) for v in range(low, high + 1, every)]),
+        x_axis(along, 8, bottom, "exponent", [float(v) for v in range(low, high + 1, every)]),
         line(along.at(0), 8, along.at(0), bottom, "axis"),
     ]
     for k, e in enumerate(exponents):
         y = 44.0 * k + 40
         span = f"{number(e.low)} to {with_unit(number(e.high), e.unit)}"
-        parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="said"))
+        parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="value"))
         parts.append(whisker(along, y, (e.power.low, e.power.high), e.power.value, "after"))
-    told = _scaling(exponents, whose)
+    caption = _scaling(exponents, subject)
     return figure(
-        told,
-        panels(drawing(WIDTH, bottom + 30, told, *parts)),
-        note=f"Power with which {whose} grows with each variable, 90 % intervals; in brackets the range of the "
-        "recordings.",
+        caption,
+        panels(drawing(WIDTH, bottom + 30, caption, *parts)),
+        note="Exponents of power laws in each variable, with 90 % intervals; in brackets the range of the recordings.",
     )
 
 
-def _scaling(exponents: tuple[Exponent, ...], whose: str) -> str:
-    """In words what grows, and how surely."""
-    told = [(e, e.power.low, e.power.high) for e in exponents if e.power.low is not None and e.power.high is not None]
-    sure = [e for e, low, high in told if low * high > 0]
-    level = [e.variable for e, low, high in told if low * high <= 0 and high - low < LEVEL]
+def _scaling(exponents: tuple[Exponent, ...], subject: str) -> str:
+    """The scaling that the intervals of the exponents show, in one sentence."""
+    bounded = [
+        (e, e.power.low, e.power.high) for e in exponents if e.power.low is not None and e.power.high is not None
+    ]
+    sure = [e for e, low, high in bounded if low * high > 0]
+    level = [e.variable for e, low, high in bounded if low * high <= 0 and high - low < LEVEL]
     if not sure and not level:
-        return f"How {whose} scales cannot be told from these conditions"
+        return f"The scaling of {subject} is not identifiable from these conditions"
     if not sure:
-        return f"{capital(whose)} does not depend on " + listed(level, "or")
-    return f"{capital(whose)} goes as " + listed(f"{e.variable} to the power {number(e.power.value, 2)}" for e in sure)
+        return f"{capital(subject)} does not depend on " + listed(level, "or")
+    return f"{capital(subject)} scales with " + listed(f"{e.variable}^{number(e.power.value, 2)}" for e in sure)
 
 
 def _pieces(interval: Interval, *, turns: bool) -> list[tuple[float, float]]:
-    """The parts of 0 to 1 that an interval covers; phases go round."""
+    """Parts of 0 to 1 that an interval covers; phases are periodic."""
     low, high = (interval.value if v is None else v for v in (interval.low, interval.high))
     if not turns:
         return [(max(low, 0.0), min(high, 1.0))]

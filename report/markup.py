@@ -1,4 +1,4 @@
-"""HTML and SVG from parts. Text that is not :class:`Markup` is escaped, so nothing a dataset says becomes markup."""
+"""HTML and SVG elements. Text that is not :class:`Markup` is escaped, so text of a dataset never becomes markup."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ _EMPTY = frozenset({"meta", "br", "line", "rect", "circle", "path"})
 
 
 class Markup(str):
-    """Text that is markup already."""
+    """Text that is already markup."""
 
     __slots__ = ()
 
 
 def escaped(value: object) -> Markup:
-    """``value`` as markup: itself where it is, else its text, escaped."""
+    """``value`` as markup: unchanged if it is Markup, else its text, escaped."""
     return value if isinstance(value, Markup) else Markup(escape(_CONTROL.sub("\ufffd", str(value))))
 
 
 def tag(element: str, *children: object, **attributes: object) -> Markup:
-    """An element; children that are None and attributes that are None are left out.
+    """An element; children and attributes that are None are omitted.
 
     Names of attributes: ``class_`` is "class", ``stroke_width`` is "stroke-width"; numbers are rounded to 1/100.
     """
@@ -33,7 +33,7 @@ def tag(element: str, *children: object, **attributes: object) -> Markup:
 
 
 def joined(*children: object) -> Markup:
-    """Children one after the other."""
+    """The children, concatenated."""
     return Markup("".join(escaped(child) for child in children if child is not None))
 
 

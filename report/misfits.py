@@ -1,9 +1,10 @@
-"""Before and after: against the floor, for every recording, and in the samples themselves."""
+"""Misfit before and after: over the floor, by recording, and in the samples."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import median
 
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
 from wingfit.report.layout import figure, folded, panels, table
@@ -13,53 +14,50 @@ from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, t
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 ROW, MOST_ROWS, MOST_OVERLAYS = 38.0, 18, 12
-DECADE = 12.0  # an axis whose ends are further apart than this is logarithmic
+DECADE = 12.0  # ratio of the ends from which an axis is logarithmic
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def proof(finding: Finding) -> Markup | None:
-    """Misfit on held-out recordings, in floors."""
+    """Misfit on held-out recordings, as multiples of the floor."""
     given = finding.proof
     if given is None:
         if finding.verdict == "adequate":
             return None
         held_out = any(r.held_out for r in finding.recordings)
-        why = "They were not judged together" if held_out else "No recording was held out"
-        words = f"{why}, so nothing here proves that the fit is better on recordings it has not seen."
+        why = "The held-out recordings were not evaluated together" if held_out else "No recording was held out"
+        words = f"{why}, so the improvement is not validated."
         return tag("p", words, class_="warning")
     rows: list[tuple[str, Interval]] = [(stage, getattr(given, stage)) for stage in stages(finding)]
     ends = [v for _, i in rows for v in (i.value, i.low, i.high) if v is not None]
     along = _along([*ends, 1.0])
-    parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings, over the floor")]
+    parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings / floor")]
     for k, (name, interval) in enumerate(rows):
         y = 34.0 + 38 * k
-        said = f"{number(interval.value)} ({_range(interval)})"
-        parts.append(text(LEFT, y - 10, f"{name}: {said}" if len(rows) > 1 else said, class_="said"))
+        value = f"{number(interval.value)} ({_range(interval)})"
+        parts.append(text(LEFT, y - 10, f"{name}: {value}" if len(rows) > 1 else value, class_="value"))
         parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
         parts.append(whisker(along, y + 1, (interval.low, interval.high), interval.value, name))
     return figure(
-        proof_told(finding, given),
-        panels(drawing(WIDTH, 120, proof_told(finding, given), *parts)),
-        legend(
-            *stages(finding).items(),
-            ("floor", "floor: what a right model would leave"),
-        ),
+        _proof_caption(finding, given),
+        panels(drawing(WIDTH, 120, _proof_caption(finding, given), *parts)),
+        legend(*stages(finding).items(), ("floor", "floor: expected misfit of a correct model")),
         note=given.words or None,
     )
 
 
-def proof_told(finding: Finding, given: Proof) -> str:
-    """What the proof shows, in a sentence."""
+def _proof_caption(finding: Finding, given: Proof) -> str:
+    """The result of the validation in one sentence."""
     if "after" not in stages(finding):
-        return f"On recordings that the fit has not seen, the misfit is {number(given.before.value)} times the floor"
+        return f"On held-out recordings the misfit is {number(given.before.value)} times the floor"
     times = f"from {number(given.before.value)} to {number(given.after.value)} times the floor"
     if given.improved:
-        return f"On recordings that the fit has not seen, the misfit falls {times}"
-    return f"On recordings that the fit has not seen, the misfit does not improve surely: {times}"
+        return f"On held-out recordings the misfit falls {times}"
+    return f"On held-out recordings the misfit does not improve significantly: {times}"
 
 
 def recordings(finding: Finding) -> Markup | None:
-    """A row for every recording, those held out first."""
+    """A row for every recording, held-out ones first."""
     if not finding.recordings:
         return None
     scale = channel_scale(finding)
@@ -77,56 +75,50 @@ def recordings(finding: Finding) -> Markup | None:
             drawings.append(_recordings(finding, title, chunk, along, scale))
     return joined(
         figure(
-            recordings_told(finding),
+            _recordings_caption(finding),
             panels(*drawings),
-            legend(
-                *stages(finding).items(),
-                ("floor", "floor"),
-            ),
+            legend(*stages(finding).items(), ("floor", "floor")),
             note="Root mean square of one channel, with 90 % intervals.",
         ),
-        folded("The same in numbers", _table(finding, scale)),
+        folded("As a table", _table(finding, scale)),
     )
 
 
-def recordings_told(finding: Finding) -> str:
-    """What the rows show, in a sentence."""
+def _recordings_caption(finding: Finding) -> str:
+    """The result by recording in one sentence."""
     scale = channel_scale(finding)
     group = [r for r in finding.recordings if r.held_out] or list(finding.recordings)
     kind = "held-out" if group[0].held_out else "fitted"
     better = sum(r.after.value < r.before.value for r in group)
-    before, after = (_median([getattr(r, name).value for r in group]) for name in ("before", "after"))
+    before, after = (median([getattr(r, name).value for r in group]) for name in ("before", "after"))
     values = change(finding, scale.text(before), scale.text(after))
     if len(group) == 1:
         return f"The {kind} recording: {values}"
     if "after" not in stages(finding):
         return f"Over {len(group)} {kind} recordings the median misfit is {values}"
-    return f"{better} of {len(group)} {kind} recordings are fitted better; median {values}"
+    return f"{better} of {len(group)} {kind} recordings improve; median {values}"
 
 
 def overlays(finding: Finding) -> Markup | None:
-    """Recorded samples with both simulations, as small multiples."""
+    """Recorded samples with both simulations, one small chart each."""
     shown = [o for o in finding.overlays if o.phase][:MOST_OVERLAYS]
     if not shown:
         return None
     scale = channel_scale(finding)
     left = len(finding.overlays) - len(shown)
     return figure(
-        overlays_told(finding, shown, scale),
-        panels(*(_overlay(finding, o, scale) for o in shown), small=True),
-        legend(
-            ("recorded", "recorded"),
-            *((f"{stage}-line", name) for stage, name in stages(finding).items()),
-        ),
+        _overlays_caption(finding, shown, scale),
+        panels(*(_overlay(finding, o, scale) for o in shown), size="small"),
+        legend(("recorded", "recorded"), *((f"{stage}-line", name) for stage, name in stages(finding).items())),
         note=f"{left} more in the JSON." if left else None,
     )
 
 
-def overlays_told(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
-    """What the overlays show, in a sentence."""
-    before, after = (_median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
+def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
+    """The typical distance between simulation and recording in one sentence."""
+    before, after = (median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
     values = change(finding, scale.text(before), scale.text(after))
-    return f"Distance between simulated and recorded beats, typically: {values}"
+    return f"Median distance between simulated and recorded beats: {values}"
 
 
 def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], along: Axis, scale: Scale) -> Markup:
@@ -134,7 +126,7 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
     parts: list[Markup] = [x_axis(along, 22, bottom, f"misfit, {scale.unit}")]
     for k, row in enumerate(rows):
         y = 24 + ROW * k
-        parts.append(tag("text", tag("title", row.name), _held(row, 48), x=LEFT, y=y + 11, class_="said"))
+        parts.append(tag("text", tag("title", row.name), _label(row, 48), x=LEFT, y=y + 11, class_="value"))
         floor = along.at(row.floor * scale.factor)
         parts.append(line(floor, y + 15, floor, y + 35, "floor"))
         for at, name in zip((y + 21, y + 29), stages(finding), strict=False):
@@ -145,37 +137,37 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
     return drawing(WIDTH, bottom + 30, label, text(LEFT, 14, title, class_="title"), *parts)
 
 
-def _held(row: RecordingMisfit, letters: int) -> str:
-    said = condition(row)
-    return f"{shortened(row.name, max(14, letters - len(said)))} \u2002 {said}"
+def _label(row: RecordingMisfit, letters: int) -> str:
+    about = condition(row)
+    return f"{shortened(row.name, max(14, letters - len(about)))} \u2002 {about}"
 
 
 def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
-    """The beat, and below it on a scale of its own what either simulation leaves of it."""
+    """Recorded and simulated beat, and below it, to another scale, the residuals."""
     left, right = 50.0, 292.0
     simulated = {name: [v * scale.factor for v in getattr(overlay, name)] for name in stages(finding)}
     recorded = [v * scale.factor for v in overlay.recorded]
-    left_over = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
+    residuals = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
     across = Axis(0, 1, left, right)
     places = [across.at(p) for p in overlay.phase]
     up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
-    rest = axis([v for values in left_over.values() for v in values], 226, 160, zero=True)
+    rest = axis([v for values in residuals.values() for v in values], 226, 160, zero=True)
     title = shortened(overlay.channel, 28)
     below = f"{shortened(overlay.recording, 30)}, {'held out' if overlay.held_out else 'fitted'}"
     return drawing(
         300,
         258,
-        f"{title}, {below}: recorded and simulated over one beat, and their difference",
+        f"{title}, {below}: recorded and simulated over one beat, and the residuals",
         text(left, 14, title, class_="title"),
         text(left, 30, below, class_="tick"),
         x_axis(across, 42, 226, "phase of the beat", BEATS),
         y_axis(up, left, right, scale.unit),
-        y_axis(rest, left, right, f"left over, {scale.unit}", count=3),
+        y_axis(rest, left, right, f"residual, {scale.unit}", count=3),
         line(left, rest.at(0), right, rest.at(0), "axis"),
         dots([(x, up.at(v)) for x, v in zip(places, recorded, strict=True)], "samples"),
         *(
             curve([(x, on.at(v)) for x, v in zip(places, values[name], strict=True)], f"curve {name}")
-            for on, values in ((up, simulated), (rest, left_over))
+            for on, values in ((up, simulated), (rest, residuals))
             for name in simulated
         ),
     )
@@ -196,12 +188,12 @@ def _table(finding: Finding, scale: Scale) -> Markup:
         for r in finding.recordings
     ]
     columns = [f"{stage}, {scale.unit}" for stage in stages(finding)]
-    head = ("recording", "", "condition", *columns, f"floor, {scale.unit}")
+    head = ("recording", "use", "condition", *columns, f"floor, {scale.unit}")
     return table(head, rows, numbers=len(columns) + 1)
 
 
 def _along(values: Sequence[float]) -> Axis:
-    """From zero, or logarithmic where the values are too far apart to be told apart near zero."""
+    """An axis from zero, or logarithmic where the values span more than DECADE."""
     positive = [v for v in values if v > 0]
     low, high = min(positive, default=1.0), max(positive, default=1.0)
     if high > DECADE * low:
@@ -216,12 +208,6 @@ def _values(row: RecordingMisfit) -> list[float]:
 
 def _range(interval: Interval) -> str:
     return f"90 %: {bounds(interval, Scale(1.0, ''))}"
-
-
-def _median(values: Sequence[float]) -> float:
-    ordered = sorted(values)
-    middle = len(ordered) // 2
-    return ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
 
 
 def _distance(one: Sequence[float], other: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""Numbers with units, as people read them: millimetres, millinewtons, degrees, at most four digits."""
+"""Numbers with units: millimetres, millinewtons, degrees, at most four digits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 
 class Scale(NamedTuple):
-    """What SI values are multiplied by, and the unit that they then have."""
+    """A factor on SI values, and the unit of the product."""
 
     factor: float
     unit: str
@@ -29,7 +29,7 @@ def channel_scale(finding: Finding) -> Scale:
 
 
 def scale_for(values: Iterable[float | None], unit: str) -> Scale:
-    """A prefix that suits the largest of ``values``; radians become degrees, kilograms grams where they are few."""
+    """A scale whose prefix suits the largest of ``values``; radians become degrees, small masses grams."""
     largest = max((abs(v) for v in values if v is not None), default=0.0)
     if unit == "rad":
         return Scale(180 / math.pi, "°")
@@ -54,19 +54,19 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def share(part: float) -> str:
-    """A part as a whole percentage, where more digits would mean nothing."""
+    """A fraction as a whole percentage."""
     return with_unit(number(float(round(100 * part))), "%")
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Number and unit with the space that the unit wants."""
+    """Number and unit, with a space between them except before °."""
     if not unit:
         return text
     return f"{text}{unit}" if unit == "°" else f"{text}\u00a0{unit}"
 
 
 def percent(part: float) -> str:
-    """A part as a percentage; never 0 % or 100 % unless it is exactly that."""
+    """A fraction as a percentage; rounded to 0 % or 100 % only where it is exactly that."""
     value = 100 * part
     if 0 < value < 0.1:
         return "< 0.1\u00a0%"
@@ -79,14 +79,14 @@ def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
     """The 90 % interval in words, without its unit."""
     low, high = (None if v is None else number(v * scale.factor, digits) for v in (interval.low, interval.high))
     if low is None and high is None:
-        return "not bounded"
+        return "not bounded by the data"
     if low is None:
         return f"below {high}"
     return f"above {low}" if high is None else f"{low} to {high}"
 
 
 def condition(recording: RecordingMisfit) -> str:
-    """Flap frequency, lag, pressure and airspeed, shortly."""
+    """Flap frequency, lag, pressure and airspeed."""
     parts = [f"{number(recording.flap_frequency_hz)} Hz"]
     if recording.phase_lag_deg:
         parts.append(f"lag {number(recording.phase_lag_deg)}°")
@@ -97,7 +97,7 @@ def condition(recording: RecordingMisfit) -> str:
 
 
 def shortened(text: str, letters: int) -> str:
-    """``text``, its middle left out where it is longer than ``letters``: names differ at both ends."""
+    """``text`` with at most ``letters`` characters; the middle is cut, as names differ at both ends."""
     if len(text) <= letters:
         return text
     tail = letters // 3
@@ -105,43 +105,43 @@ def shortened(text: str, letters: int) -> str:
 
 
 def titles(finding: Finding) -> dict[str, str]:
-    """Title of every effect that a hypothesis consists of alone."""
+    """Titles of the effects, from the hypotheses of one effect."""
     return {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
 
 
 def title_of(name: str, known: dict[str, str]) -> str:
-    """Title of effect ``name``, or its name in words."""
+    """Title of the effect ``name``, or the name as words."""
     return known.get(name) or name.replace("_", " ").capitalize()
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
-    """Items as one would say them, with ``last`` before the last."""
+    """Items separated by commas, with the word ``last`` before the last one."""
     words = list(items)
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
 
 
 def best_of(finding: Finding) -> Hypothesis | None:
-    """The hypothesis that was put in, else the most probable one that is not the nominal model."""
+    """The hypothesis of the "after" model, else the most probable one besides the nominal model."""
     others = [h for h in finding.hypotheses if h.effects]
     put_in = [h for h in others if set(h.effects) == set(finding.put_in)]
     return next(iter([*put_in, *others]), None)
 
 
 def stages(finding: Finding) -> dict[str, str]:
-    """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
+    """Names of the models compared: "before" and, where effects were added, "after"."""
     if not finding.put_in:
         return {"before": "nominal model, refitted"}
-    after = "what was found" if finding.named else "the nearest in the library"  # short: titles of maps
+    after = "the named effects" if finding.named else "the closest of the library"  # short: titles of maps
     return {"before": "before: nominal model, refitted", "after": f"after: with {after}"}
 
 
-def what_was_put_in(finding: Finding) -> str:
-    """Of a finding that has an "after", what that has: in one without a name, what comes nearest."""
-    return "what was found" if finding.named else "the nearest in the library, which it is not"
+def added_effects(finding: Finding) -> str:
+    """What the "after" model adds: the named effects or, without any, the closest ones of the library."""
+    return "the named effects" if finding.named else "the closest effects of the library, which do not explain it"
 
 
 def change(finding: Finding, before: str, after: str) -> str:
-    """Two values as a change, or only the first where nothing was put in."""
+    """Both values, or only the first where no effect was added."""
     return f"{before} before, {after} after" if "after" in stages(finding) else before
 
 

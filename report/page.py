@@ -1,13 +1,14 @@
-"""The page: verdict first, then the proof, the place, the ranking, the numbers."""
+"""The report of a finding: verdict, validation, location, ranking, numbers."""
 
 from __future__ import annotations
 
 from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
 from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
-from wingfit.report.layout import figure, panels, section
+from wingfit.report.layout import document, figure, panels, section
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
     Scale,
+    added_effects,
     best_of,
     channel_scale,
     listed,
@@ -16,64 +17,58 @@ from wingfit.report.number_format import (
     stages,
     title_of,
     titles,
-    what_was_put_in,
 )
-from wingfit.report.style import style_sheet
 from wingfit.report.svg import Axis, bar, drawing, text, x_axis
 
-_PROVED = "Is the fit better on recordings it has not seen?"
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+_VALIDATION = "Is the fit better on held-out recordings?"
 
 
 def html(finding: Finding) -> str:
-    """One HTML file that shows all of ``finding``: no script, nothing loaded, for screen, phone and paper."""
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", f"{headline(finding)} ({finding.dataset})"),
-        tag("style", Markup(style_sheet())),
-    )
-    body = tag("body", _hatch(), tag("main", *_parts(finding)))
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
+    """The report as one HTML file, without scripts or anything to load."""
+    title = f"{headline(finding)} ({finding.dataset})"
+    return document(title, _hatch(), tag("main", *_parts(finding)))
 
 
 def headline(finding: Finding) -> str:
-    """The verdict in a line."""
+    """The verdict in one line."""
     known = titles(finding)
     named = [title_of(name, known) for name in finding.named]
     if finding.verdict == "adequate":
-        return "Nothing is missing that these recordings could show"
+        return "The model is adequate: these recordings show no missing physics"
     if finding.verdict == "named":
-        return f"Left out: {' + '.join(named)}" if named else "A named effect was left out"
+        return f"Missing physics: {' + '.join(named)}" if named else "Missing physics: a known effect"
     if finding.verdict == "ambiguous":
         return (
-            f"Left out: {listed(named, 'or')}; these recordings cannot say which"
+            f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
             if named
-            else "Several explanations fit"
+            else "Several hypotheses fit equally well"
         )
     if finding.verdict == "unnamed":
-        return "Something was left out that nothing in the library explains"
-    return f"The measurement is at fault: {' + '.join(named)}" if named else "The measurement is at fault"
+        return "Missing physics that no effect of the library explains"
+    return f"Measurement fault: {' + '.join(named)}" if named else "Measurement fault"
 
 
 def _parts(finding: Finding) -> list[object]:
     return [
         *_verdict(finding),
         _section(
-            _PROVED if finding.put_in else "How well the model fits",
+            _VALIDATION if finding.put_in else "How well the model fits",
             misfits.proof(finding),
             misfits.recordings(finding),
         ),
-        _section("Where and when", location.place(finding), wing_map.wing_map(finding), beat_maps.misfit_maps(finding)),
-        _section(f"The {beat_maps.lacking(finding)} that is missing", beat_maps.missing_loads(finding)),
-        _section("What was considered", ranking.ranking(finding)),
+        _section(
+            "Location on the wing and in the beat",
+            location.place(finding),
+            wing_map.wing_map(finding),
+            beat_maps.misfit_maps(finding),
+        ),
+        _section(f"The missing {beat_maps.missing_kind(finding)}", beat_maps.missing_loads(finding)),
+        _section("Hypotheses considered", ranking.ranking(finding)),
         tables.law(finding.law),
         _section("Recorded and simulated", misfits.overlays(finding)),
         tables.genes(finding),
         tables.advice(finding),
-        _section("How small the misfit can be", _floors(finding)),
+        _section("Lower limit of the misfit", _floors(finding)),
         tables.sources(finding),
         tables.remarks(finding),
         _made(finding),
@@ -91,11 +86,7 @@ def _verdict(finding: Finding) -> list[object]:
         part = finding.probabilities.get(name, 0.0)
         chosen = " chosen" if name == finding.verdict else ""
         shown = bar(part, "strong" if chosen else "pale")
-        rows += [
-            tag("span", name, class_=f"name{chosen}"),
-            shown,
-            tag("span", percent(part), class_=f"said{chosen}"),
-        ]
+        rows += [tag("span", name, class_=f"name{chosen}"), shown, tag("span", percent(part), class_=f"value{chosen}")]
     return [
         tag("p", f"Diagnosis of {finding.dataset} · verdict: {finding.verdict}", class_="over"),
         tag("h1", headline(finding)),
@@ -108,16 +99,16 @@ def _verdict(finding: Finding) -> list[object]:
 def _tiles(finding: Finding) -> Markup:
     scale = channel_scale(finding)
     tiles = [
-        ("Strength d", number(finding.strength), "misfit after the best nominal refit, over the noise"),
-        ("Noise", scale.text(finding.floors.noise), f"memory {number(finding.floors.memory, 2)} from sample to sample"),
-        ("Floor", scale.text(finding.floors.total), "what a right model would leave"),
+        ("Strength d", number(finding.strength), "residual of the refitted nominal model / noise"),
+        ("Noise", scale.text(finding.floors.noise), f"lag-1 autocorrelation {number(finding.floors.memory, 2)}"),
+        ("Floor", scale.text(finding.floors.total), "expected misfit of a correct model"),
     ]
     if finding.proof is not None and "after" in stages(finding):
         change = f"{number(finding.proof.before.value)} → {number(finding.proof.after.value)}"
-        tiles.append(("Held-out misfit, over the floor", change, f"nominal model → with {what_was_put_in(finding)}"))
+        tiles.append(("Held-out misfit / floor", change, f"nominal model → with {added_effects(finding)}"))
     best = best_of(finding)
     if best is not None and finding.verdict != "adequate":
-        by = best.title if finding.put_in else f"{best.title}, the nearest"
+        by = best.title if finding.put_in else f"{best.title}, the closest"
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {by}"))
     shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
     return tag("dl", *shown, class_="tiles")
@@ -128,12 +119,12 @@ def _floors(finding: Finding) -> Markup:
     floors = finding.floors
     rows = [
         ("noise, from the scatter between beats", floors.noise, "pale"),
-        ("than which none is asked to be better", floors.simulation, "pale"),
-        ("floor: these together", floors.total, "strong"),
+        ("tolerance of the simulation", floors.simulation, "pale"),
+        ("floor: root sum of squares of these", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
     if floors.division is not None:
-        rows.insert(1, ("division, against a finer one", floors.division, "pale"))
+        rows.insert(1, ("discretisation error, from a finer model", floors.division, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
     along = Axis(0, 1.1 * most, 12, 348)
     bottom = 8 + 34.0 * len(rows)
@@ -141,17 +132,19 @@ def _floors(finding: Finding) -> Markup:
     for k, (name, value, class_) in enumerate(rows):
         y = 34.0 * k + 8
         wide = along.at(value * scale.factor) - along.at(0)
-        parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="said"))
+        parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="value"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
-    note = f"The division was compared with: {floors.finer}." if floors.division is not None else None
-    return figure(_floors_told(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note)
+    note = f"The finer model: {floors.finer}." if floors.division is not None else None
+    return figure(
+        _floors_caption(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note
+    )
 
 
-def _floors_told(finding: Finding, floors: Floors, scale: Scale) -> str:
-    left = finding.strength * floors.noise
+def _floors_caption(finding: Finding, floors: Floors, scale: Scale) -> str:
+    residual = scale.text(finding.strength * floors.noise)
     return (
-        f"A right model would leave {scale.text(floors.total)}; the nominal model, refitted, leaves {scale.text(left)} "
-        f"(strength d = {number(finding.strength)})"
+        f"The expected misfit of a correct model is {scale.text(floors.total)}; the residual of the nominal model, "
+        f"refitted, is {residual} (strength d = {number(finding.strength)})"
     )
 
 
@@ -163,12 +156,12 @@ def _made(finding: Finding) -> Markup:
         else f"{number(finding.seconds, 2)} seconds"
     )
     spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
-    lines = [f"Model: {finding.model}", f"Took {spent}" if finding.seconds else None, versions or None]
+    lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else None, versions or None]
     return tag("footer", *(tag("p", words, class_="quiet") for words in lines if words))
 
 
 def _hatch() -> Markup:
-    """Patterns: cells that are not significant (a veil with lines over their colour), bars that are estimates."""
+    """Hatch patterns: of map cells that are not significant, and of bars that are linear estimates."""
     pattern = tag(
         "pattern",
         tag("rect", width=6, height=6, class_="veil"),

@@ -1,4 +1,4 @@
-"""What was considered: every hypothesis with what it explains, what it predicts, its evidence and its probability."""
+"""Ranking of the hypotheses: explained and predicted misfit, evidence, probability."""
 
 from __future__ import annotations
 
@@ -10,41 +10,33 @@ from wingfit.report.svg import bar
 
 MOST_SHOWN = 8
 _NOTE = (
-    "Explained and predicted are parts of the nominal model's misfit beyond the noise (mean square): explained in a "
-    "fit to all fitted recordings, predicted for recordings left out of the fit one by one. Evidence is the natural "
-    "logarithm of its ratio to the nominal model's: 5 is strong, and every further 2.3 is a factor of ten."
+    "Explained: fraction of the nominal model's mean-square misfit beyond the noise removed by a refit. Predicted: the "
+    "same for recordings left out of the refit one by one. Evidence: natural logarithm of the Bayes factor over the "
+    "nominal model; 5 is strong, and each further 2.3 is a factor of ten."
 )
 
 
 def ranking(finding: Finding) -> Markup | None:
-    """The strongest hypotheses as bars, the others as a table."""
+    """The strongest hypotheses as bars, all others as a table."""
     if not finding.hypotheses:
         return None
-    # the nominal model is always among those shown: it is what all others are compared with
+    # the nominal model is always shown: all others are compared with it
     shown = [h for k, h in enumerate(finding.hypotheses) if k < MOST_SHOWN or not h.effects]
     others = [h for h in finding.hypotheses if h not in shown]
     top = max((h.evidence for h in finding.hypotheses), default=0.0)
     rows = [_row(h, finding, top) for h in shown]
-    rest = folded(f"{len(others)} weaker ones", _table(others, finding)) if others else None
-    return joined(
-        figure(
-            told(finding),
-            tag("ol", *rows, class_="ranking"),
-            note=_NOTE,
-        ),
-        rest,
-        _alike(finding),
-    )
+    rest = folded(f"{len(others)} weaker hypotheses", _table(others, finding)) if others else None
+    return joined(figure(caption(finding), tag("ol", *rows, class_="ranking"), note=_NOTE), rest, _alike(finding))
 
 
-def told(finding: Finding) -> str:
-    """What the ranking shows, in a sentence."""
+def caption(finding: Finding) -> str:
+    """The main result of the ranking in one sentence."""
     best = best_of(finding)
     if best is None:
         return "Only the nominal model was considered"
     parts = [f"{best.title} explains {percent(best.explained)} of the misfit beyond the noise"]
     if best.predicted is not None:
-        parts.append(f"and predicts {percent(best.predicted)} of it in recordings left out")
+        parts.append(f"and predicts {percent(best.predicted)} of it in recordings left out of the fit")
     overlapping = set(best.effects)
     rivals = [h for h in finding.hypotheses if h.effects and not overlapping & set(h.effects)]
     rival = max(rivals, key=lambda h: h.explained, default=None)
@@ -54,8 +46,8 @@ def told(finding: Finding) -> str:
 
 
 def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
-    told = finding.alike if finding.verdict == "ambiguous" else [finding.named]
-    named = bool(hypothesis.effects) and any(set(hypothesis.effects) == set(names) for names in told)
+    selected = finding.alike if finding.verdict == "ambiguous" else [finding.named]
+    named = bool(hypothesis.effects) and any(set(hypothesis.effects) == set(names) for names in selected)
     scale = channel_scale(finding)
     evidence = hypothesis.evidence / top if top > 0 else 0.0
     sure = hypothesis.refitted or not hypothesis.effects
@@ -71,7 +63,7 @@ def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
         tag("p", hypothesis.signature) if hypothesis.signature else None,
         tag(
             "p",
-            f"Leaves {scale.text(hypothesis.misfit)}{'' if sure else ' (linear estimate, not refitted)'}.",
+            f"Residual {scale.text(hypothesis.misfit)}{'' if sure else ' (linear estimate, not refitted)'}.",
             class_="quiet",
         ),
         tag("p", hypothesis.source, class_="quiet") if hypothesis.source else None,
@@ -87,11 +79,11 @@ def _family(hypothesis: Hypothesis) -> Markup | None:
     return tag("span", words, class_=f"badge {kind}")
 
 
-def _bar(name: str, part: float, said: str, class_: str) -> Markup:
+def _bar(name: str, part: float, value: str, class_: str) -> Markup:
     return joined(
         tag("span", name, class_="name"),
         bar(part, class_),
-        tag("span", said, class_="said negative" if part < 0 else "said"),
+        tag("span", value, class_="value negative" if part < 0 else "value"),
     )
 
 
@@ -110,7 +102,7 @@ def _table(hypotheses: list[Hypothesis], finding: Finding) -> Markup:
         )
         for h in hypotheses
     ]
-    head = ("hypothesis", "family", "probability", "score (genes)", "explained", "predicted", "evidence", "leaves")
+    head = ("hypothesis", "family", "probability", "score (genes)", "explained", "predicted", "evidence", "residual")
     return table(head, rows, numbers=6)
 
 
@@ -119,7 +111,7 @@ def _alike(finding: Finding) -> Markup | None:
         return None
     known = titles(finding)
     sets = [tag("li", listed((title_of(name, known) for name in names), "and")) for names in finding.alike]
-    return joined(tag("h3", "These recordings cannot tell apart"), tag("ul", *sets, class_="plain"))
+    return joined(tag("h3", "Not distinguishable by these recordings"), tag("ul", *sets, class_="plain"))
 
 
 def _signed(value: float) -> str:

@@ -12,7 +12,7 @@ from wingfit.report.finding_file import ADAPTER, FORMAT_VERSION
 def finding_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of what :func:`finding_json` makes."""
     schema = _untitled(ADAPTER.json_schema(mode="serialization"))
-    required = [*schema["required"], "format_version"]  # what has a default here has none for a reader
+    required = [*schema["required"], "format_version"]  # fields with a default are always written
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:wingfit:schema:finding:{FORMAT_VERSION}",
@@ -29,7 +29,7 @@ def schema_text() -> str:
 
 
 def _untitled(schema: Any) -> Any:
-    """Drop the titles that pydantic derives from the names of fields; they say nothing."""
+    """Drop the titles that pydantic derives from field names; they repeat the names."""
     if isinstance(schema, list):
         return [_untitled(item) for item in schema]
     if not isinstance(schema, dict):

@@ -1,8 +1,10 @@
 """The style sheet: colours for light and dark, one column on a phone, ink on paper.
 
-Maps go from the ground's own colour to the strongest contrast, so that nothing looks like nothing in light and in dark:
-yellow-green-blue for sizes, blue-orange for signs (after the palettes of Brewer, 2003, which colour-blind readers tell
-apart); before and after are vermilion and blue of Okabe and Ito (2008), and differ in shape as well.
+``:host`` rules apply where the web page embeds the report in a shadow tree, in which there is no ``:root`` and no body.
+
+Zero has the colour of the background, large values the strongest contrast: yellow-green-blue for sizes, blue-orange for
+signed values (after the palettes of Brewer, 2003, which colour-blind readers can distinguish). Before and after are
+vermilion and blue of Okabe and Ito (2008), and differ in shape as well.
 """
 
 from __future__ import annotations
@@ -16,6 +18,9 @@ _LEVELS_DARK = ("#22302f", "#1f4a7a", "#1d79ab", "#33a9bd", "#7fcdbb", "#cdebb0"
 _SIDES_LIGHT = ("#08519c", "#6baed6", "#f2f2ef", "#fdae6b", "#a63603")
 _SIDES_DARK = ("#a9d3f7", "#3f86c4", "#262f2e", "#c4713a", "#ffc996")
 
+# Series of line charts, distinguishable in grey and by colour-blind readers (Okabe and Ito, 2008).
+_SERIES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+
 _LIGHT = """--ground:#fbfbf9;--surface:#fff;--line:#dfe1de;--ink:#1d2422;--quiet:#55605d;--faint:#8d9794;
 --trough:#e9ebe7;--before:#d55e00;--after:#0072b2;--floor:#1d2422;--strong:#1f7a80;--pale:#8fb9b8;--warn:#a8341f;--soft:#faeae6;
 --veil:rgba(255,255,255,.72);--hatch:#9aa5a2;--wing:#f4f5f1"""
@@ -26,8 +31,8 @@ _DARK = """--ground:#121716;--surface:#1a2120;--line:#2e3836;--ink:#e6ebe9;--qui
 _RULES = """
 *{box-sizing:border-box}
 html{-webkit-text-size-adjust:100%}
-body{margin:0;background:var(--ground);color:var(--ink);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,
-"Noto Sans",sans-serif;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
+body,:host{color:var(--ink);font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
+body{margin:0;background:var(--ground);font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Noto Sans",sans-serif}
 main{max-width:72rem;margin:0 auto;padding:1.2rem 1rem 4rem}
 h1{font-size:1.75rem;line-height:1.2;margin:.3rem 0 .6rem;letter-spacing:-.01em;text-wrap:balance}
 h2{font-size:1.15rem;margin:2.6rem 0 .8rem;padding-top:.8rem;border-top:2px solid var(--line)}
@@ -44,11 +49,14 @@ figure{margin:1.2rem 0 1.8rem;break-inside:avoid}
 figcaption{font-weight:650;font-size:1.02rem;line-height:1.35;margin-bottom:.5rem;max-width:48rem}
 .panels{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,21rem),1fr));gap:.8rem;align-items:start}
 .panels.small{grid-template-columns:repeat(auto-fill,minmax(min(100%,17rem),1fr))}
-.panels svg{display:block;width:100%;max-width:32rem;height:auto;background:var(--surface);border:1px solid var(--line);
-border-radius:8px}
+.panels.wide{grid-template-columns:repeat(auto-fill,minmax(min(100%,28rem),1fr))}
+.panels.wide figure>svg{max-width:40rem}
+.panels figure{margin:.4rem 0;min-width:0}
+.panels>svg,.panels figure>svg{display:block;width:100%;max-width:32rem;height:auto;
+background:var(--surface);border:1px solid var(--line);border-radius:8px}
 svg text{fill:var(--ink);font-size:12px}
 svg .title{font-weight:650;font-size:12.5px}
-svg .said{paint-order:stroke;stroke:var(--surface);stroke-width:4px;stroke-linejoin:round}
+svg .value{paint-order:stroke;stroke:var(--surface);stroke-width:4px;stroke-linejoin:round}
 svg .label{fill:var(--quiet);font-size:11.5px}
 svg .tick{fill:var(--quiet);font-size:11px}
 .grid{stroke:var(--line);stroke-width:1}
@@ -65,6 +73,7 @@ svg .tick{fill:var(--quiet);font-size:11px}
 .curve{fill:none;stroke-width:2;stroke-linejoin:round}
 .curve.before{stroke:var(--before);stroke-dasharray:5 3}
 .curve.after{stroke:var(--after)}
+.points{fill:none;stroke:var(--faint);stroke-width:2.5;stroke-linecap:round}
 .samples{fill:none;stroke:var(--ink);opacity:.5;stroke-width:4.5;stroke-linecap:round}
 .noise{stroke:var(--ink);stroke-width:1.3;stroke-dasharray:2 3}
 .band{fill:var(--after);opacity:.22}
@@ -90,7 +99,7 @@ svg .tick{fill:var(--quiet);font-size:11px}
 .bars{display:grid;grid-template-columns:7.6rem minmax(3rem,1fr) 4.4rem;gap:.3rem .7rem;
 align-items:center;font-size:.86rem;align-content:start}
 .bars .name{color:var(--quiet)}
-.bars .said{text-align:right}
+.bars .value{text-align:right}
 .bars .negative{color:var(--warn)}
 .verdicts{grid-template-columns:8.6rem minmax(3rem,1fr) 4.4rem;max-width:34rem;margin:1rem 0}
 .verdicts .chosen{font-weight:700;color:var(--ink)}
@@ -116,6 +125,8 @@ summary{cursor:pointer;color:var(--quiet);font-size:.9rem}
 ul.plain{margin:.3rem 0;padding-left:1.2rem}
 footer{margin-top:3rem;border-top:2px solid var(--line);padding-top:.8rem}
 .defs{position:absolute;width:0;height:0}
+:host{display:block;margin-top:1.5rem}
+:host h1{font-size:1.35rem}
 @media(max-width:40rem){.ranking li{grid-template-columns:minmax(0,1fr)}h1{font-size:1.45rem}}
 @media print{body{font-size:10.5pt}main{max-width:none;padding:0}h2{break-after:avoid}.scroll{overflow:visible}
 .panels{grid-template-columns:repeat(2,1fr)}:root{--ground:#fff}details::details-content{content-visibility:visible;display:block}
@@ -125,9 +136,12 @@ svg,.warning{print-color-adjust:exact;-webkit-print-color-adjust:exact}}
 
 def style_sheet() -> str:
     """All rules; no part of them loads anything."""
-    light = f":root{{color-scheme:light dark;{_LIGHT}}}{_palette(_LEVELS_LIGHT, _SIDES_LIGHT)}"
-    dark = f"@media screen and (prefers-color-scheme:dark){{:root{{{_DARK}}}{_palette(_LEVELS_DARK, _SIDES_DARK)}}}"
-    return light + _RULES + dark
+    light = f":root,:host{{color-scheme:light dark;{_LIGHT}}}{_palette(_LEVELS_LIGHT, _SIDES_LIGHT)}"
+    dark = (
+        f"@media screen and (prefers-color-scheme:dark){{:root,:host{{{_DARK}}}{_palette(_LEVELS_DARK, _SIDES_DARK)}}}"
+    )
+    series = "".join(f".curve.s{k}{{stroke:{colour}}}" for k, colour in enumerate(_SERIES))
+    return light + _RULES + series + dark
 
 
 def _palette(levels: Sequence[str], sides: Sequence[str]) -> str:

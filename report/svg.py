@@ -1,7 +1,7 @@
-"""A small kit for figures: axes with round numbers, marks, colour levels.
+"""SVG charts: axes with round numbers, marks, colour levels, legends.
 
-Panels are drawn about 360 units wide, so that on a phone, where each fills the width, letters keep their size. Colours
-are classes, given in :mod:`wingfit.report.style` for light and for dark.
+Drawings are about 360 units wide, so that text keeps its size on a phone, where each fills the width. Colours are CSS
+classes, defined in :mod:`wingfit.report.style` for light and dark.
 """
 
 from __future__ import annotations
@@ -9,18 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
 
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
 
-LEVELS = 12  # colours of a map from nothing to most, classes l0 to l11
-SIDES = 6  # colours of a map on either side of nothing, classes d0 to d12
+LEVELS = 12  # colours of a map from zero to the maximum, classes l0 to l11
+SERIES = 6  # colours of curves, classes s0 to s5
+SIDES = 6  # colours of a map on either side of zero, classes d0 to d12
 Points = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Values from ``low`` to ``high`` at places from ``start`` to ``end`` in the drawing."""
+    """Maps values from ``low`` to ``high`` to coordinates from ``start`` to ``end``."""
 
     low: float
     high: float
@@ -29,7 +32,7 @@ class Axis:
     logarithmic: bool = False
 
     def at(self, value: float) -> float:
-        """Place of ``value``; values beyond the ends are put on them."""
+        """Coordinate of ``value``; values beyond the ends are moved to them."""
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             part = math.log(value / self.low) / math.log(self.high / self.low)
@@ -49,17 +52,17 @@ class Axis:
         return [round(k * step, 12) for k in range(first, last + 1)]
 
 
-def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False) -> Axis:
-    """A linear axis that holds all ``values``, and zero where wanted, with a little room."""
+def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False, room: float = 0.05) -> Axis:
+    """A linear axis that holds all ``values``, and zero if required; ``room``: free part of the range at its ends."""
     held = [*values, 0.0] if zero or not values else list(values)
     low, high = min(held), max(held)
-    room = 0.05 * (high - low) or abs(high) * 0.1 or 1.0
-    bottom = 0.0 if zero and low == 0 else low - room
-    return Axis(bottom, high + room, start, end)
+    free = room * (high - low) if high > low else abs(high) * 0.1 or 1.0
+    bottom = 0.0 if zero and low == 0 else low - free
+    return Axis(bottom, high + free, start, end)
 
 
 def drawing(width: float, height: float, label: str, *parts: object, wide: bool = False) -> Markup:
-    """An SVG that scales to the width it is given; ``label`` is read out to those who cannot see it."""
+    """An SVG that fills the width of its parent; ``label`` is its text alternative."""
     return tag(
         "svg",
         *parts,
@@ -71,7 +74,7 @@ def drawing(width: float, height: float, label: str, *parts: object, wide: bool 
 
 
 def text(x: float, y: float, words: object, *, anchor: str = "start", class_: str | None = None) -> Markup:
-    """Words whose base line is at ``y``."""
+    """Text with its baseline at ``y``."""
     return tag("text", words, x=x, y=y, text_anchor=None if anchor == "start" else anchor, class_=class_)
 
 
@@ -95,7 +98,7 @@ def area(points: Points, class_: str) -> Markup | None:
 
 
 def dots(points: Points, class_: str) -> Markup | None:
-    """Points as one path; the class says how large (its line has round ends)."""
+    """Points as one path with round line ends; the class sets their size."""
     return tag("path", d="".join(f"M{x:.1f} {y:.1f}h0" for x, y in points), class_=class_) if points else None
 
 
@@ -113,7 +116,7 @@ def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
 
 
 def whisker(along: Axis, y: float, ends: tuple[float | None, float | None], value: float, class_: str) -> Markup:
-    """A dot with its interval; an end that nothing bounds runs to the end of the axis and has an arrow there."""
+    """A dot with its interval; an end without a bound is an arrow to the end of the axis."""
     parts: list[Markup] = []
     for bound, edge in zip(ends, (along.start, along.end), strict=True):
         if bound is None:
@@ -137,16 +140,17 @@ def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[f
 
 
 def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -> Markup:
-    """Grid lines, their numbers to the left, and the label turned beside these (about 46 units in all)."""
+    """Grid lines, their numbers to the left, and beside these the rotated label (about 46 units in all)."""
     parts: list[Markup] = []
+    room = 36.0  # between the axis and the middle of the label
     for value in up.ticks(count):
-        at = up.at(value)
+        at, room = up.at(value), max(room, 12 + 6.2 * len(number(value)))
         parts += [line(left, at, right, at), text(left - 4, at + 3.5, number(value), anchor="end", class_="tick")]
     middle = (up.start + up.end) / 2
     turned = tag(
         "text",
         label,
-        transform=f"translate({left - 36:g},{middle:g}) rotate(-90)",
+        transform=f"translate({left - room:g},{middle:g}) rotate(-90)",
         text_anchor="middle",
         class_="label",
     )
@@ -159,29 +163,30 @@ def level(value: float, most: float) -> int:
 
 
 def side(value: float, most: float) -> int:
-    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; SIDES is nothing."""
+    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; zero is SIDES."""
     return SIDES + max(-SIDES, min(SIDES, round(SIDES * value / most))) if most > 0 else SIDES
 
 
 def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> Markup:
-    """A grid of cells, rows downwards, one path for each class; None leaves a cell out."""
+    """A grid of cells, rows downwards; None: no cell. Equal neighbours of a row become one rectangle."""
     rows, columns = len(classes), len(classes[0])
     width, height = (across.end - across.start) / columns, (down.end - down.start) / rows
     paths: dict[str, list[str]] = {}
     for i, row in enumerate(classes):
-        for j, name in enumerate(row):
+        j, y = 0, down.start + i * height
+        for name, run in groupby(row):
+            count = len(list(run))
+            x, wide = across.start + j * width, count * width + 0.2  # slightly wider, so that no gap shows
+            j += count
             if name is not None:
-                x, y = across.start + j * width, down.start + i * height
-                # a hair wider than the cell, so that no seam shows
-                piece = f"M{x:.2f} {y:.2f}h{width + 0.2:.2f}v{height + 0.2:.2f}h-{width + 0.2:.2f}z"
-                paths.setdefault(name, []).append(piece)
+                paths.setdefault(name, []).append(f"M{x:.2f} {y:.2f}h{wide:.2f}v{height + 0.2:.2f}h-{wide:.2f}z")
     return joined(*(tag("path", d="".join(pieces), class_=name) for name, pieces in sorted(paths.items())))
 
 
 def colour_bar(
     across: Axis, y: float, classes: Sequence[str], label: str, mark: tuple[float, str] | None = None
 ) -> Markup:
-    """A bar of ``classes`` over the values of ``across``, 44 units high with its numbers; ``mark`` is a named value."""
+    """A colour bar of ``classes`` over ``across``, 44 units high with its numbers; ``mark``: a value and its name."""
     width = (across.end - across.start) / len(classes)
     parts = [
         tag("rect", x=across.start + k * width, y=y, width=width + 0.3, height=9.0, class_=name)
@@ -199,7 +204,7 @@ def colour_bar(
 
 
 def bar(part: float, class_: str) -> Markup:
-    """A bar that fills ``part`` of the width it is given."""
+    """A bar that fills the fraction ``part`` of the width of its parent."""
     shown = min(1.0, max(0.0, part))
     return tag(
         "svg",
@@ -213,7 +218,7 @@ def bar(part: float, class_: str) -> Markup:
 
 
 def legend(*entries: tuple[str, str]) -> Markup:
-    """Names beside what they stand for: (kind, name), kind being one of the swatches below."""
+    """A legend of (kind, name); ``kind`` is one of the swatches below."""
     swatches: dict[str, Callable[[], object]] = {
         "before": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot before"),
         "after": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot after"),
@@ -223,9 +228,11 @@ def legend(*entries: tuple[str, str]) -> Markup:
         "noise-line": lambda: line(1, 6, 17, 6, "noise"),
         "recorded": lambda: dots([(3, 6), (9, 6), (15, 6)], "samples"),
         "hatched": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="faint"),
+        "points": lambda: dots([(3, 6), (9, 6), (15, 6)], "points"),
         "band": lambda: tag("rect", x=2, y=2, width=14, height=8, class_="band"),
         "place": lambda: tag("rect", x=2, y=1, width=14, height=10, class_="place"),
     }
+    swatches |= {f"s{k}": partial(line, 1, 6, 17, 6, f"curve s{k}") for k in range(SERIES)}
     items = [
         tag("li", tag("svg", swatches[kind](), viewBox="0 0 18 12", aria_hidden="true"), name) for kind, name in entries
     ]

@@ -1,4 +1,4 @@
-"""Genes, a free-form law, advice, sources: what is read rather than looked at."""
+"""Tables of the report: genes, free-form law, next recordings, sources."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from wingfit.diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Inter
 from wingfit.report.layout import folded, section, table
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
+    added_effects,
     bounds,
     capital,
     number,
@@ -13,25 +14,24 @@ from wingfit.report.number_format import (
     scale_for,
     title_of,
     titles,
-    what_was_put_in,
     with_unit,
 )
 
 MOST_GENES = 12
 _ADVICE = (
-    "",
+    "rank",
     "flapping, Hz",
     "lag, °",
     "pressure, mbar",
     "airspeed, m/s",
     "angle of attack, °",
-    "apart, standard deviations",
-    "chance to settle it",
+    "separation, sigma",
+    "probability of a decision",
 )
 
 
 def genes(finding: Finding) -> Markup | None:
-    """Genes of the effects first; nominal ones after them, folded where there are many."""
+    """Genes of the effects, then those of the nominal model, folded where there are many."""
     if not finding.genes:
         return None
     effects = [g for g in finding.genes if g.off is not None or "." in g.name]
@@ -40,14 +40,14 @@ def genes(finding: Finding) -> Markup | None:
     many = folded(f"{len(nominal)} genes of the nominal model", _genes(nominal)) if not shown and nominal else None
     return section(
         "Values of the genes, with 90 % intervals",
-        joined(tag("h3", capital(what_was_put_in(finding))), _genes(effects)) if effects else None,
-        joined(tag("h3", "The nominal model's own"), _genes(shown)) if shown else None,
+        joined(tag("h3", capital(added_effects(finding))), _genes(effects)) if effects else None,
+        joined(tag("h3", "Nominal model"), _genes(shown)) if shown else None,
         many,
     )
 
 
 def law(given: FreeLaw | None) -> Markup | None:
-    """The free-form law for what nothing in the library explains."""
+    """The free-form law of a residual that no effect of the library explains."""
     if given is None:
         return None
     rows = [
@@ -55,15 +55,15 @@ def law(given: FreeLaw | None) -> Markup | None:
         for term in given.terms
     ]
     return section(
-        "What is left, as a law without a name",
+        "Free-form law of the residual",
         tag("p", given.words),
         table(("term", "coefficient", "90 % interval", "unit"), rows, numbers=0) if rows else None,
-        tag("p", f"It explains {percent(given.explained)} of the misfit beyond the noise, in recordings left out."),
+        tag("p", f"It explains {percent(given.explained)} of the misfit beyond the noise (cross-validated)."),
     )
 
 
 def advice(finding: Finding) -> Markup | None:
-    """What to record next."""
+    """Recordings that would distinguish the hypotheses."""
     if not finding.advice:
         return None
     known = titles(finding)
@@ -71,15 +71,15 @@ def advice(finding: Finding) -> Markup | None:
     between = ", ".join(title_of(name, known) for name in best.between)
     rows = [_advice(k, a) for k, a in enumerate(finding.advice, 1)]
     return section(
-        "What to record next",
+        "Next recording",
         tag("p", tag("strong", best.words)),
-        tag("p", f"It is to tell apart: {between}.", class_="quiet") if between else None,
+        tag("p", f"It distinguishes: {between}.", class_="quiet") if between else None,
         table(_ADVICE, rows, numbers=7),
     )
 
 
 def sources(finding: Finding) -> Markup | None:
-    """Where the laws of the effects named are from."""
+    """Sources of the laws of the named effects."""
     known = titles(finding)
     found = {
         h.effects[0]: h.source
@@ -92,18 +92,18 @@ def sources(finding: Finding) -> Markup | None:
     if not found:
         return None
     items = [tag("li", tag("strong", title_of(name, known)), ": ", source) for name, source in found.items()]
-    return section("Sources of the effects named", tag("ul", *items, class_="plain"))
+    return section("Sources of the named effects", tag("ul", *items, class_="plain"))
 
 
 def remarks(finding: Finding) -> Markup | None:
-    """What a reader must know besides."""
+    """Remarks on the data and on the diagnosis."""
     if not finding.remarks:
         return None
     return section("Remarks", tag("ul", *(tag("li", words) for words in finding.remarks), class_="plain"))
 
 
 def _genes(given: list[GeneValue]) -> Markup:
-    rows = [("gene", "value", "90 % interval", "off at", "what it is"), *(_gene(g) for g in given)]
+    rows = [("gene", "value", "90 % interval", "no effect at", "description"), *(_gene(g) for g in given)]
     if all(g.off is None for g in given):
         rows = [(*row[:3], row[4]) for row in rows]
     return table([str(name) for name in rows[0]], rows[1:])
@@ -118,7 +118,7 @@ def _gene(gene: GeneValue) -> tuple[object, ...]:
         tag("code", gene.name),
         tag("strong", with_unit(number(value.value * scale.factor), scale.unit)),
         with_unit(bounds(value, scale), scale.unit if value.low is not None or value.high is not None else ""),
-        f"{off} (inside)" if inside else off,
+        f"{off} (in the interval)" if inside else off,
         gene.description,
     )
 

@@ -1,4 +1,4 @@
-"""The misfit on the wing: every marker at its place, before and after, and which way it is off."""
+"""Misfit of each marker on the wing, before and after, and its direction."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from wingfit.report.svg import (
 )
 
 WIDTH, LEFT, RIGHT, TOP = 360.0, 16.0, 344.0, 34.0
-SLANT = 0.45  # the wing seen from above and behind: a length along x is drawn this long, and this far sideways
+SLANT = 0.45  # oblique view from above and behind: drawn length, and sideways shift, of a unit length along x
 ARROW = 46.0  # length of the longest arrow
 MOST_ROWS = 24
 
 
 def wing_map(finding: Finding) -> Markup | None:
-    """Markers on the planform; channels without a place as a list."""
+    """Markers on the planform; force axes, which have no position, as a list."""
     placed = [m for m in finding.markers if m.x is not None and m.y is not None]
     scale = channel_scale(finding)
     if placed:
@@ -39,15 +39,15 @@ def wing_map(finding: Finding) -> Markup | None:
     return _axes(finding, scale) if finding.markers else None
 
 
-def told(finding: Finding, scale: Scale) -> str:
-    """What the map shows, in a sentence."""
+def caption(finding: Finding, scale: Scale) -> str:
+    """The largest misfit in one sentence."""
     worst = max(finding.markers, key=lambda m: m.before)
     what = "marker" if finding.kind == "tracks" else "force axis"
     if worst.before <= 0:
-        return f"No {what} differs from the simulation by more than the noise"
+        return f"The misfit of every {what} is within the noise"
     place = "" if worst.span is None else f" at {share(worst.span)} of the span"
     return (
-        f"Beyond the noise, {what} {shortened(worst.name, 40)}{place} is worst: "
+        f"Largest misfit beyond the noise, {what} {shortened(worst.name, 40)}{place}: "
         f"{change(finding, scale.text(worst.before), scale.text(worst.after))}"
     )
 
@@ -59,18 +59,18 @@ def _planforms(finding: Finding, placed: Sequence[MarkerMisfit], scale: Scale) -
         plan.drawn(capital(name), [getattr(m, stage) for m in placed], most, scale)
         for stage, name in stages(finding).items()
     ]
-    place = [("place", "where the diagnosis places it")] if plan.place(finding) else []
+    place = [("place", "estimated location")] if plan.place(finding) else []
     return figure(
-        told(finding, scale),
+        caption(finding, scale),
         panels(*maps, _directions(placed, plan, scale)),
         legend(*place) if place else None,
-        note="Seen from above, root left, leading edge on top. A circle is a marker; its colour is the root mean "
-        "square of its misfit beyond the noise over all recordings.",
+        note="Seen from above, root left, leading edge on top. Circles: markers, coloured by the root mean square "
+        "misfit beyond the noise over all recordings.",
     )
 
 
 class _Plan:
-    """Where places on the wing lie in the drawing: span to the right, chord downwards, one scale for both."""
+    """Coordinates of the drawing: span to the right, chord downwards, to one scale."""
 
     def __init__(self, finding: Finding, placed: Sequence[MarkerMisfit]) -> None:
         self.finding, self.placed = finding, placed
@@ -101,7 +101,7 @@ class _Plan:
         worst = self.placed[k]
         at = self.at(worst.x or 0.0, worst.y or 0.0)
         anchor = "end" if at[0] > WIDTH / 2 else "start"
-        words = f"worst: {shortened(worst.name, 22)}, {scale.text(values[k])}"
+        words = f"largest: {shortened(worst.name, 22)}, {scale.text(values[k])}"
         bar = colour_bar(
             Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
             self.bottom + 24,
@@ -117,13 +117,13 @@ class _Plan:
             self.place(self.finding),
             *marks,
             tag("circle", cx=at[0], cy=at[1], r=self.radius + 2.5, class_="ring") if values[k] > 0 else None,
-            text(at[0], self.bottom + 12, words, anchor=anchor, class_="said") if values[k] > 0 else None,
+            text(at[0], self.bottom + 12, words, anchor=anchor, class_="value") if values[k] > 0 else None,
             line(at[0], at[1] + self.radius + 2.5, at[0], self.bottom + 2, "leader") if values[k] > 0 else None,
             bar,
         )
 
     def place(self, finding: Finding) -> Markup | None:
-        """The place that the diagnosis names, as a box; all of the chord where it names none."""
+        """The estimated location as a box, over the full chord where no part of it is estimated."""
         where = finding.where
         if where is None or where.span is None or not self.outline:
             return None
@@ -136,15 +136,12 @@ class _Plan:
 
 
 def _directions(placed: Sequence[MarkerMisfit], plan: _Plan, scale: Scale) -> Markup:
-    """The wing seen at a slant, with arrows along the mean direction of the misfit when it is largest."""
+    """Oblique view of the wing, with arrows along the mean direction of the misfit at its largest."""
     reach = (plan.x1 - plan.x0) * SLANT
     size = (RIGHT - LEFT - 30) / (plan.y1 - plan.y0 + reach or 1.0)
 
     def at(x: float, y: float) -> tuple[float, float]:
-        return (
-            LEFT + 15 + (y - plan.y0 + (plan.x1 - x) * SLANT) * size,
-            TOP + ARROW + (x - plan.x0) * SLANT * size,
-        )
+        return (LEFT + 15 + (y - plan.y0 + (plan.x1 - x) * SLANT) * size, TOP + ARROW + (x - plan.x0) * SLANT * size)
 
     most = max(m.before for m in placed)
     arrows: list[Markup] = []
@@ -157,13 +154,13 @@ def _directions(placed: Sequence[MarkerMisfit], plan: _Plan, scale: Scale) -> Ma
             arrows.append(arrow(*start, length * (dy - SLANT * dx), length * (SLANT * dx - dz), "arrow"))
     bottom = TOP + ARROW + (plan.x1 - plan.x0) * SLANT * size
     base = bottom + 46
-    title = "Which way, when it is largest"
+    title = "Direction of the largest misfit"
     return drawing(
         WIDTH,
         bottom + 82,
         f"{title}: {_way(placed)}",
         text(LEFT, 14, title, class_="title"),
-        text(LEFT, 29, _way(placed), class_="said"),
+        text(LEFT, 29, _way(placed), class_="value"),
         area([at(*p) for p in plan.outline], "outline"),
         *arrows,
         _triad(LEFT + 26, base + 8),
@@ -184,10 +181,10 @@ def _triad(x: float, y: float) -> Markup:
 
 
 def _way(placed: Sequence[MarkerMisfit]) -> str:
-    """Axis and phase that most of the misfit has, with the weight of its mean square."""
+    """Axis and phase of the largest part of the mean-square misfit, in words."""
     weights = [m.before**2 for m in placed]
     if not sum(weights):
-        return "no direction: nothing beyond the noise"
+        return "no direction: no misfit beyond the noise"
     parts = [sum(w * m.direction[k] ** 2 for w, m in zip(weights, placed, strict=True)) for k in range(3)]
     most = max(range(3), key=parts.__getitem__)
     turn = [
@@ -197,14 +194,14 @@ def _way(placed: Sequence[MarkerMisfit]) -> str:
     when = (
         f"at phase {number((math.atan2(turn[1], turn[0]) / (2 * math.pi)) % 1, 2)}"
         if together > 0.5
-        else "at differing phases"
+        else "at different phases"
     )
     part = parts[most] / (sum(parts) or 1.0)
     return f"{share(part)} along {'xyz'[most]}, {when} of the beat"
 
 
 def _radius(points: Sequence[tuple[float, float]]) -> float:
-    """Circles of close markers shrink until they hardly overlap."""
+    """Radius of the circles: small enough that close markers hardly overlap."""
     nearest = sorted(
         min((math.dist(a, b) for j, b in enumerate(points) if j != i), default=16.0) for i, a in enumerate(points)
     )
@@ -219,7 +216,7 @@ def _ends(place: Interval | None) -> tuple[float, float]:
 
 
 def _axes(finding: Finding, scale: Scale) -> Markup:
-    """Before and after of every channel that has no place, largest first."""
+    """Misfit of every channel without a position, largest first."""
     shown = sorted(finding.markers, key=lambda m: -m.before)[:MOST_ROWS]
     most = max(max(m.before, m.after) for m in shown) * scale.factor or 1.0
     along = Axis(0, 1.05 * most, 12, 348)
@@ -228,7 +225,7 @@ def _axes(finding: Finding, scale: Scale) -> Markup:
     for k, m in enumerate(shown):
         y = 34.0 + 30 * k
         name = f"{shortened(m.name, 36)}, largest at phase {number(m.worst, 2)}"
-        parts.append(text(12, y - 9, name, class_="said"))
+        parts.append(text(12, y - 9, name, class_="value"))
         if "after" in stages(finding):
             parts.append(line(along.at(m.before * scale.factor), y, along.at(m.after * scale.factor), y, "leader"))
         for stage in stages(finding):
@@ -236,8 +233,8 @@ def _axes(finding: Finding, scale: Scale) -> Markup:
             parts.append(whisker(along, y, (value, value), value, stage))
     left = len(finding.markers) - len(shown)
     return figure(
-        told(finding, scale),
-        panels(drawing(WIDTH, bottom + 32, told(finding, scale), *parts)),
+        caption(finding, scale),
+        panels(drawing(WIDTH, bottom + 32, caption(finding, scale), *parts)),
         legend(*stages(finding).items()),
         note=f"{left} more in the JSON." if left else None,
     )

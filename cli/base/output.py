@@ -1,4 +1,4 @@
-"""What the commands share: options, tables, JSON, numbers as people read them, and progress."""
+"""How the commands print: tables, JSON, numbers with units, and progress."""
 
 from __future__ import annotations
 
@@ -6,20 +6,14 @@ import json
 import sys
 import time
 import unicodedata
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
-
-Url = Annotated[
-    str, typer.Option("--url", envvar="WINGFIT_URL", help="Address of the server.", rich_help_panel="Server")
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the server's answer as JSON.")]
 
 # A pipe has no width: wide enough that no id is cut off in a table that a script reads.
 PIPE_WIDTH = 160
@@ -31,35 +25,32 @@ Report = Callable[..., None]
 
 
 def out() -> Console:
-    """Console of what was asked for."""
+    """Console for results, on standard output."""
     return Console(width=None if sys.stdout.isatty() else PIPE_WIDTH, highlight=False, soft_wrap=False)
 
 
 def err() -> Console:
-    """Console of progress and errors, so that a pipe gets only results."""
+    """Console for progress and messages, on standard error: a pipe receives results only."""
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def _shown(text: str, *, lines: bool = True) -> str:
-    """``text`` without characters that steer a terminal, reverse the text or cannot be printed.
-
-    A name may be somebody else's.
-    """
-    kept = "\n\t" if lines else ""
-    return "".join(one if one in kept or not _steers(one) else "\ufffd" for one in text)
+    """``text`` without control characters, which another user's name could use to manipulate the terminal."""
+    allowed = "\n\t" if lines else ""
+    return "".join(one if one in allowed or not _is_control(one) else "\ufffd" for one in text)
 
 
-def _steers(character: str) -> bool:
+def _is_control(character: str) -> bool:
     return unicodedata.category(character) in ("Cc", "Cs") or unicodedata.bidirectional(character) in REVERSING
 
 
 def say(text: str) -> None:
-    """Print one result line as it is."""
+    """Print one line of the result to standard output."""
     out().print(Text(_shown(text)), soft_wrap=True)
 
 
 def note(text: str) -> None:
-    """Print one line that is no result to standard error."""
+    """Print one line that does not belong to the result to standard error."""
     err().print(Text(_shown(text)))
 
 
@@ -68,8 +59,22 @@ def print_json(value: Any) -> None:
     sys.stdout.write(json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]], empty: str = "none") -> None:
-    """Print rows under headings; a column whose heading starts with ``>`` is right-aligned."""
+def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool) -> None:
+    """Print an answer of the server: as JSON, or by ``show``."""
+    print_json(answer) if as_json else show(answer)
+
+
+def remarks(lines: Iterable[str], label: str = "note") -> None:
+    """Print each remark once, to standard error."""
+    for line in dict.fromkeys(lines):
+        note(f"{label}: {line}")
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str = "none") -> None:
+    """Print ``rows`` of cells under ``columns``; ``empty`` is printed where there are no rows.
+
+    A column whose heading starts with ``>`` is right-aligned. Cells: None is shown as a dash, a float with four digits.
+    """
     if not rows:
         say(empty)
         return
@@ -77,12 +82,36 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[str]], empty: str = "n
     for index, name in enumerate(columns):
         grid.add_column(name.removeprefix(">"), justify="right" if name.startswith(">") else "left", no_wrap=index == 0)
     for row in rows:
-        grid.add_row(*(Text(_shown(cell, lines=False)) for cell in row))
+        grid.add_row(*(Text(_shown(_cell(value), lines=False)) for value in row))
     out().print(grid)
 
 
+def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return number(value) if value is None or isinstance(value, float) else str(value)
+
+
+def interval(low: float | None, high: float | None, digits: int = 3) -> str:
+    """``[low, high]``, in words where an end is missing."""
+    if low is None or high is None:
+        ends = [f"{word} {number(end, digits)}" for word, end in (("above", low), ("below", high)) if end is not None]
+        return ends[0] if ends else "not bounded by the data"
+    return f"[{number(low, digits)}, {number(high, digits)}]"
+
+
+def percent(part: float | None) -> str:
+    """A fraction as a whole percentage, a dash where there is none."""
+    return "–" if part is None else f"{100 * part:.0f} %"
+
+
+def size(count: int) -> str:
+    """A number of bytes as kB or MB."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
+
+
 def number(value: float | None, digits: int = 4, unit: str = "") -> str:
-    """``value`` with significant digits, whole from 100 to a million, a dash where there is none."""
+    """``value`` with ``digits`` significant digits, as an integer from 100 to a million, a dash for None."""
     if value is None:
         return "–"
     text = f"{value + 0.0:.{digits}g}"  # 0.0 takes the sign from -0
@@ -92,12 +121,12 @@ def number(value: float | None, digits: int = 4, unit: str = "") -> str:
 
 
 def mm(value: float | None) -> str:
-    """Format a distance in mm with two decimals, a dash where there is none."""
+    """A distance in mm with two decimals, a dash for None."""
     return "–" if value is None else f"{value:.2f}"
 
 
 def moment(text: str | None) -> str:
-    """Format a time of the API to the second, in UTC as it came."""
+    """A time of the API to the second, in UTC."""
     return "–" if text is None else text[:19].replace("T", " ") + " UTC"
 
 
@@ -114,8 +143,8 @@ def duration(seconds: float | None) -> str:
 def progress(title: str) -> Iterator[Report]:
     """Show a bar with the time left on a terminal, a line every few seconds elsewhere.
 
-    Yields ``report(fraction, eta_s=None, note="")``; without ``eta_s`` the time left follows from the time
-    spent, and ``fraction=None`` says that work goes on without a known end.
+    Yields ``report(fraction, eta_s=None, note="")``. Without ``eta_s`` the time left is extrapolated;
+    ``fraction=None`` means that the end is not known.
     """
     console = err()
     started = time.monotonic()
@@ -147,7 +176,7 @@ def progress(title: str) -> Iterator[Report]:
 
 
 def _plain(title: str, console: Console, left: Callable[[float | None, float | None], str]) -> Report:
-    """Report as lines: the first one, then one whenever the last is old enough, and the end."""
+    """Print the first report, then at most one every PLAIN_EVERY_S seconds, and the last."""
     last = -PLAIN_EVERY_S
     done = False
 

@@ -1,4 +1,4 @@
-"""Forces, per cent and correlations as people read them; the page rounds alike (service/web/base/format.js)."""
+"""Forces, percentages and correlations rounded as on the web page (service/web/base/format.js)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
 ROUNDING = 1e-9  # of the correlation of a thing with itself
 
 
-def kept(value: float | None, digits: int = 3) -> str:
-    """``value`` with significant digits, noughts among them: 0.0500, 12.0, 385; a dash where there is none."""
+def rounded(value: float | None, digits: int = 3) -> str:
+    """``value`` with significant digits, trailing zeros kept: 0.0500, 12.0, 385; a dash for None."""
     if value is None:
         return "–"
     if value == 0:
@@ -24,7 +24,7 @@ def kept(value: float | None, digits: int = 3) -> str:
 
 
 def correlation(value: float | None) -> str:
-    """A correlation with four decimals; one that is not 1 is not shown as 1."""
+    """A correlation with four decimals; only an exact 1 is shown as 1."""
     if value is None:
         return "–"
     if NEAREST_ONE <= value < 1 - ROUNDING:
@@ -33,22 +33,22 @@ def correlation(value: float | None) -> str:
 
 
 @dataclass(frozen=True)
-class ForceUnit:
-    """A unit for the forces of one table."""
+class Unit:
+    """A unit in which the values of one table are shown."""
 
     name: str
-    per_newton: float
+    per_si_unit: float
 
-    def show(self, newtons: float | None, digits: int = 3) -> str:
-        """A force (N) in this unit, without its name; a dash where there is none."""
-        return kept(None if newtons is None else self.per_newton * newtons, digits)
-
-
-UNITS = ((10.0, ForceUnit("N", 1.0)), (1e-3, ForceUnit("mN", 1e3)), (0.0, ForceUnit("µN", 1e6)))
+    def show(self, value: float | None, digits: int = 3) -> str:
+        """``value`` (SI) in this unit, without its name; a dash for None."""
+        return rounded(None if value is None else self.per_si_unit * value, digits)
 
 
-def force_unit(newtons: Iterable[float | None]) -> ForceUnit:
-    """The unit in which the largest of ``newtons`` reads well: mN for 1 mN to 10 N; mN when there is none."""
+UNITS = ((10.0, Unit("N", 1.0)), (1e-3, Unit("mN", 1e3)), (0.0, Unit("µN", 1e6)))
+
+
+def force_unit(newtons: Iterable[float | None]) -> Unit:
+    """The unit in which the largest of ``newtons`` reads well: mN from 1 mN to 10 N, and where there is no value."""
     largest = max((abs(value) for value in newtons if value), default=1.0)
     if not math.isfinite(largest):
         largest = 1.0
@@ -56,6 +56,6 @@ def force_unit(newtons: Iterable[float | None]) -> ForceUnit:
 
 
 def with_unit(newtons: float, digits: int = 3) -> str:
-    """One force (N) with the unit that fits."""
+    """One force (N) with a fitting unit."""
     unit = force_unit([newtons])
     return f"{unit.show(newtons, digits)} {unit.name}"

@@ -1,106 +1,56 @@
-"""What ``wingfit kinematics`` computes, prints, writes and draws."""
+"""Computation and output of ``wingfit kinematics``."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import typer
 
-from wingfit.cli.base.files import write_text
+from wingfit.cli.base.files import read_bytes, write_text
 from wingfit.cli.base.output import note, number, say, table
-from wingfit.cli.loads import COLOURS
-from wingfit.client.client import WingfitError
-from wingfit.records import DatasetError
 from wingfit.records.description.convert import to_data
 from wingfit.records.description.vehicle_file import MotionFile
 from wingfit.records.description.yaml_text import write_yaml
+from wingfit.report.charts import Chart, Curve, chart_page
 from wingfit.tracking.smoothing import PeriodicFit
 from wingfit.tracking.tables import Table, header_of, read_table, require
 from wingfit.tracking.wing_kinematics import Angles, WingKinematics, WingPlace, beats_of, from_markers, wing_motion
 
-SMALLEST_RANGE_DEG = 2.0  # of a flap angle that needs no remark: 2 rad would be 115 deg
+SMALLEST_RANGE_DEG = 2.0  # of a plausible flap angle in degrees: a range below is probably in radians
 ORDERS = ("", "/s", "/s²", "/s³")
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """The options of ``wingfit kinematics``."""
-
-    file: Path
-    output: Path | None
-    plot: Path | None
-    leading_edge: str
-    chord: str
-    wing: str
-    dihedral_deg: float | None
-    hinge_m: str
-    flap_hz: float | None
-    harmonics: int | None
-    pitch: Literal["fourier", "passive"]
-    pitch_station: float
-    root_pitch_deg: float
-    peel_end_beats: float
-    start_s: float | None
+__all__ = ["wing_motion"]
 
 
-def estimate(wanted: Wanted) -> None:
-    """Estimate the motion, print how well it is known, and write what is wanted; WingfitError where it fails."""
-    try:
-        raw = _bytes(wanted.file)
-        _check_columns(
-            header_of(raw, wanted.file.name),
-            wanted.file.name,
-            f"{wanted.leading_edge},{wanted.chord}" if wanted.leading_edge else "",
-        )
-        data = read_table(raw, wanted.file.name)
-        angles, start = _angles(
-            data, wanted.leading_edge, wanted.chord, wanted.wing, wanted.dihedral_deg, wanted.hinge_m, wanted.flap_hz
-        )
-        found = wing_motion(
-            angles,
-            wanted.flap_hz,
-            wanted.harmonics,
-            wanted.pitch,
-            wanted.pitch_station,
-            np.radians(wanted.root_pitch_deg),
-            wanted.peel_end_beats,
-            wanted.start_s if wanted.start_s is not None else start,
-            None if wanted.leading_edge and wanted.dihedral_deg is None else 0.0,
-        )
-    except (DatasetError, ValueError) as error:
-        raise WingfitError("no motion found", str(error)) from error
-    if wanted.output:
-        write_text(wanted.output, write_yaml({"motion": to_data(found.motion, MotionFile)}))
-        note(f"motion written to {wanted.output}; it goes under vehicle: or under a recording of dataset.yaml")
-    if wanted.plot:
-        write_text(wanted.plot, _page(found, f"Motion of the wing, {wanted.file.name}"))
-        note(f"plots written to {wanted.plot}; open it in a browser")
-    _report(found)
+def read_data(file: Path, leading_edge: str, chord: str) -> Table:
+    """The table in ``file``, after a check that it has all columns."""
+    raw = read_bytes(file)
+    _check_columns(header_of(raw, file.name), file.name, f"{leading_edge},{chord}" if leading_edge else "")
+    return read_table(raw, file.name)
 
 
-def _bytes(file: Path) -> bytes:
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise WingfitError(f"cannot read {file}", error.strerror or str(error)) from error
+def write_motion(motion: WingKinematics, path: Path) -> None:
+    """Write the ``motion:`` entry of dataset.yaml."""
+    write_text(path, write_yaml({"motion": to_data(motion.motion, MotionFile)}), "motion")
+    note("put it under vehicle:, or under a recording, of dataset.yaml")
 
 
 def _check_columns(header: list[str], file: str, markers: str) -> None:
     """Name all columns that are missing before any number is read."""
     if len(header) < 2:
-        return  # read_table tells the separator or an empty file
+        return  # read_table reports the wrong separator or the empty file
     if not markers and "flap_angle_deg" not in header and any(name.endswith("_x_m") for name in header):
-        raise ValueError("the file holds markers; say which: --leading-edge A,B and --chord C,D")
+        raise ValueError("the file holds markers; name those to use: --leading-edge A,B and --chord C,D")
     times = "t_star" if "t_star" in header and "time_s" not in header else "time_s"
     names = [name.strip() for name in markers.split(",") if name.strip()]
     angles = [f"{name}_{axis}_m" for name in names for axis in "xyz"] or ["flap_angle_deg", "wing_pitch_deg"]
     require(header, [times, *angles], file)
 
 
-def _angles(
+def read_angles(
     data: Table,
     leading_edge: str,
     chord: str,
@@ -109,7 +59,7 @@ def _angles(
     hinge_m: str,
     flap_hz: float | None,
 ) -> tuple[Angles, float | None]:
-    """The angles that the file holds, and the start of a beat where its times say so."""
+    """Wing angles from a table of angles or markers, and the start of a beat if the times are t_star, else None."""
     times, start = _times(data, flap_hz)
     if not leading_edge:
         flap, pitch = data.column("flap_angle_deg"), data.column("wing_pitch_deg")
@@ -123,7 +73,7 @@ def _angles(
 
 
 def _small(flap: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[str, ...]:
-    """A remark where the flap angle, deg, hardly moves: it may be in radians."""
+    """A remark where the flap angle, deg, has a small range: it may be in radians."""
     seen = flap[np.isfinite(flap)]
     size = float(np.ptp(seen)) if len(seen) else np.inf
     if size >= SMALLEST_RANGE_DEG:
@@ -153,30 +103,31 @@ def _pair(text: str) -> tuple[float, float]:
     return y, z
 
 
-def _report(found: WingKinematics) -> None:
-    rows = [row for name, fit in _fits(found) for row in _quality(name, fit)]
-    table(["over the beat", ">RMS deg", ">noise", ">cut off, up to", ">of the RMS"], rows)
-    error = found.frequency.error
+def report(motion: WingKinematics) -> None:
+    """Print the accuracy of the angles and of their derivatives, the flap frequency, and the start of a beat."""
+    rows = [row for name, fit in _fits(motion) for row in _quality(name, fit)]
+    table(["over the beat", ">RMS deg", ">noise", ">truncation, at most", ">error / RMS"], rows)
+    error = motion.frequency.error
     known = f" +/- {number(error, 2)}" if error is not None else ""
-    say(f"flap frequency {number(found.frequency.hertz, 6)}{known} Hz")
-    say(f"a beat starts at time_s {found.start:.5f} +/- {number(found.start_error, 2)} s (wings closest, opening)")
-    for name, fit in _fits(found):
+    say(f"flap frequency {number(motion.frequency.hertz, 6)}{known} Hz")
+    say(f"a beat starts at time_s {motion.start:.5f} +/- {number(motion.start_error, 2)} s (wings closest, opening)")
+    for name, fit in _fits(motion):
         chosen = "chosen by cross-validation" if fit.scores else "as given"
         cutoff = number(fit.harmonics * fit.frequency, 3)
         size = number(float(np.degrees(fit.noise.deviation)), 2)
-        say(f"{name}: {fit.harmonics} harmonics ({chosen}), up to {cutoff} Hz; a sample's noise is {size} deg")
-    if found.law:
-        law, names = found.law, ("constant_rad", "flap", "flap_rate_s", "flap_rate_squared_s2")
+        say(f"{name}: {fit.harmonics} harmonics ({chosen}), up to {cutoff} Hz; noise of one sample: {size} deg")
+    if motion.law:
+        law, names = motion.law, ("constant_rad", "flap", "flap_rate_s", "flap_rate_squared_s2")
         values = (law.pitch.constant, law.pitch.flap, law.pitch.flap_rate, law.pitch.flap_rate_squared)
         for name, value, deviation in zip(names, values, law.errors, strict=True):
             say(f"Eq. 17, {name}: {number(value)} +/- {number(float(deviation), 2)}")
-        say(f"Eq. 17 differs from the pitch by {number(float(np.degrees(law.misfit)), 3)} deg RMS")
-    for remark in found.remarks:
+        say(f"RMS difference of Eq. 17 from the pitch: {number(float(np.degrees(law.misfit)), 3)} deg")
+    for remark in motion.remarks:
         say(f"note: {remark}")
 
 
-def _fits(found: WingKinematics) -> list[tuple[str, PeriodicFit]]:
-    return [("flap angle", found.flap), ("wing pitch", found.pitch)]
+def _fits(motion: WingKinematics) -> list[tuple[str, PeriodicFit]]:
+    return [("flap angle", motion.flap), ("wing pitch", motion.pitch)]
 
 
 def _quality(name: str, fit: PeriodicFit) -> list[list[str]]:
@@ -190,40 +141,18 @@ def _quality(name: str, fit: PeriodicFit) -> list[list[str]]:
     return rows
 
 
-def _page(found: WingKinematics, title: str) -> str:
-    """A page that needs nothing else: angles with their samples, rates and accelerations with their errors."""
-    from plotly import graph_objects
-    from plotly.subplots import make_subplots
-
-    fits, phase = _fits(found), np.arange(361) / 360
-    measured = (found.angles.flap, found.angles.pitch)
-    heads = [f"{name}, deg{ORDERS[d]}" for d in range(3) for name, _ in fits]
-    figure = make_subplots(rows=3, cols=len(fits), shared_xaxes=True, subplot_titles=heads, vertical_spacing=0.06)
-    for column, (_, fit) in enumerate(fits, 1):
-        samples = measured[column - 1]
-        folded = ((found.angles.times - fit.start) * fit.frequency) % 1.0
-        figure.add_trace(
-            graph_objects.Scattergl(
-                x=folded,
-                y=None if samples is None else np.degrees(samples),
-                mode="markers",
-                name="measured",
-                marker={"size": 3, "color": "#999999"},
-            ),
-            row=1,
-            col=column,
-        )
-        for d in range(3):
-            middle, error = fit.at(phase, d), 2 * fit.error_at(phase, d)
-            band = np.degrees(np.concatenate([middle + error, (middle - error)[::-1]]))
-            around = graph_objects.Scatter(
-                x=np.concatenate([phase, phase[::-1]]), y=band, fill="toself", mode="none", name="2 standard errors"
-            )
-            figure.add_trace(around, row=d + 1, col=column)
-            line = {"width": 2, "color": COLOURS[column - 1]}
-            figure.add_trace(
-                graph_objects.Scatter(x=phase, y=np.degrees(middle), name="series", line=line), row=d + 1, col=column
-            )
-        figure.update_xaxes(title_text="t*", row=3, col=column)
-    figure.update_layout(title=title, height=900, template="plotly_white", showlegend=False)
-    return str(figure.to_html(include_plotlyjs=True))
+def write_plot(motion: WingKinematics, path: Path, title: str) -> None:
+    """Write one HTML file: angles with their samples, rates and accelerations, with two standard errors."""
+    phase, charts = np.arange(361) / 360, []
+    for d in range(3):
+        for (name, fit), samples in zip(_fits(motion), (motion.angles.flap, motion.angles.pitch), strict=True):
+            middle, error = (np.degrees(values) for values in (fit.at(phase, d), 2 * fit.error_at(phase, d)))
+            curves = [
+                Curve("2 standard errors", phase, middle, band=(middle - error, middle + error)),
+                Curve("Fourier series", phase, middle),
+            ]
+            if d == 0 and samples is not None:
+                folded = ((motion.angles.times - fit.start) * fit.frequency) % 1.0
+                curves.insert(0, Curve("measured", folded, np.degrees(samples), dots=True))
+            charts.append(Chart(f"{name}, deg{ORDERS[d]}", "t*", f"deg{ORDERS[d]}", curves))
+    write_text(path, chart_page(title, charts), "plots")

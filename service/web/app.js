@@ -1,4 +1,4 @@
-// The page: lists at the side, the state of the server, and what the address after # names.
+// Entry point: sidebar, state of the server, and the page that the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
 import { get } from "./base/api.js";
@@ -6,7 +6,6 @@ import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.
 import { redrawDataset, selectDataset, setUpDataset } from "./pages/dataset.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
-import { redrawFinding } from "./parts/finding.js";
 import { $, plural, toast } from "./base/format.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
@@ -18,13 +17,13 @@ const SHOWN = 50;
 const AGAIN_MS = 3000;
 const LISTINGS = ["runs", "diagnoses", "datasets"];
 const PAGES = ["run", "diagnosis", "dataset", "compare", "effects", ...LISTINGS];
-const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets" }; // where a page stands in the menu
+const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets" }; // menu entry of each page
 
 let lists = { runs: [], diagnoses: [], datasets: [] };
 let polling = null;
 
-const asked = () => new URLSearchParams(location.hash.slice(1));
-const current = (page) => asked().get(page);
+const parameters = () => new URLSearchParams(location.hash.slice(1));
+const current = (page) => parameters().get(page);
 
 function drawLists() {
   drawRuns(lists.runs, current("run"));
@@ -38,7 +37,7 @@ function drawLists() {
 
 function setAway(away) {
   $("away").hidden = !away;
-  $("away").textContent = away ? "The server is away. What you see may be old; the page goes on by itself when it is back." : "";
+  $("away").textContent = away ? "The server does not answer. The page may be out of date; it continues when the server is back." : "";
 }
 
 function showHealth(health) {
@@ -70,13 +69,13 @@ async function poll() {
 
 async function route() {
   drawLists();
-  const params = asked();
-  // A page of one thing needs to know of which.
+  const params = parameters();
+  // Pages of one job or dataset need its id.
   const page = PAGES.find((name) => params.get(name) || (params.has(name) && (name === "effects" || LISTINGS.includes(name)))) ?? null;
   const value = (name) => (page === name ? params.get(name) : null);
   $("empty").hidden = page !== null;
   document.body.classList.toggle("home", page === null);
-  document.body.classList.toggle("broad", page === "compare" || LISTINGS.includes(page)); // the lists at the side would say it twice
+  document.body.classList.toggle("broad", page === "compare" || LISTINGS.includes(page)); // these pages have the lists of the sidebar themselves
   if (!page) nothing("Nothing selected");
   for (const link of document.querySelectorAll(".menu a")) {
     if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
@@ -93,14 +92,14 @@ function nothing(why) {
   $("empty-title").textContent = why;
 }
 
-// What is shown may have been deleted elsewhere; of what the lists hold they tell.
+// The job or dataset shown may have been deleted by another user; the lists do not cover older ones.
 async function missed() {
   const page = Object.keys(SECTIONS).find((name) => name !== "compare" && current(name));
   if (!page || lists[SECTIONS[page]].some((one) => one.id === current(page))) return;
   await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
 }
 
-// The server may be back in a moment; what is unknown stays unknown.
+// Try again while the server does not answer; an unknown id is final.
 function onMissing(error, again) {
   $("empty").hidden = false;
   nothing(error.message);
@@ -124,7 +123,7 @@ function onDeleted() {
   poll();
 }
 
-// What a page of a job has learnt, for the lists.
+// A page passes a changed job to the lists.
 const onChange = (kind) => (job) => {
   lists = { ...lists, [kind]: lists[kind].map((other) => (other.id === job.id ? job : other)) };
   drawLists();
@@ -132,7 +131,6 @@ const onChange = (kind) => (job) => {
 
 function redrawAll() {
   redraw();
-  redrawFinding();
   redrawDataset();
   redrawComparison();
 }
@@ -157,7 +155,7 @@ setUpSubmit({
   },
 });
 $("skip").addEventListener("click", (event) => {
-  event.preventDefault(); // the address says which page this is
+  event.preventDefault(); // the address must keep naming the page
   $("detail").focus();
 });
 $("new-run").addEventListener("click", () => openSubmit(lists.datasets));

@@ -72,7 +72,7 @@ def test_intervals_without_an_end() -> None:
     assert bounds(Interval(2, 1, 3), scale) == "1 to 3"
     assert bounds(Interval(2, None, 3), scale) == "below 3"
     assert bounds(Interval(2, 1, None), scale) == "above 1"
-    assert bounds(Interval(2, None, None), scale) == "not bounded"
+    assert bounds(Interval(2, None, None), scale) == "not bounded by the data"
 
 
 def test_lists_and_long_names() -> None:

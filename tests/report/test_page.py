@@ -100,11 +100,14 @@ def test_no_text_becomes_markup(finding: Finding) -> None:
 @pytest.mark.parametrize(
     ("verdict", "headline"),
     [
-        ("adequate", "Nothing is missing that these recordings could show"),
-        ("named", "Left out: Displaced hinge + Harmonics of the drive"),
-        ("ambiguous", "Left out: Displaced hinge or Harmonics of the drive; these recordings cannot say which"),
-        ("unnamed", "Something was left out that nothing in the library explains"),
-        ("measurement fault", "The measurement is at fault: Rotated camera frame"),
+        ("adequate", "The model is adequate: these recordings show no missing physics"),
+        ("named", "Missing physics: Displaced hinge + Harmonics of the drive"),
+        (
+            "ambiguous",
+            "Missing physics: Displaced hinge or Harmonics of the drive; these recordings cannot distinguish them",
+        ),
+        ("unnamed", "Missing physics that no effect of the library explains"),
+        ("measurement fault", "Measurement fault: Rotated camera frame"),
     ],
 )
 def test_the_verdict_comes_first(verdict: Verdict, headline: str) -> None:
@@ -125,8 +128,8 @@ def test_the_numbers_shown_are_those_given() -> None:
         "4.43 → 1.04",
         "before: 4.43 (90 %: 4.11 to 4.75)",
         "nominal model, refitted: 4.1",
-        "division, against a finer one: 0.21",
-        "The division was compared with: 48 bodies (12 x 4)",
+        "discretisation error, from a finer model: 0.21",
+        "The finer model: 48 bodies (12 x 4)",
         "5 (4.6 to 5.4)",  # before, mm, of tunnel-3hz-5
         "span: 85 %, 90 % within 70 to 100 %",
         "phase of the beat: 0.02, 90 % within 0.93 to 1.11",
@@ -135,11 +138,11 @@ def test_the_numbers_shown_are_those_given() -> None:
         "12.3 mm",
         "11.7 to 12.9 mm",
         "−1.7 to 0.1 mm",
-        "0 mm (inside)",
+        "0 mm (in the interval)",
         "3.55°",
         "above 3.32°",
         "5.04 MPa",
-        "not bounded",
+        "not bounded by the data",
         "97.3 %",
         "96.1 %",
         "−11 %",
@@ -156,8 +159,8 @@ def test_the_numbers_shown_are_those_given() -> None:
 
 def test_forces_are_in_millinewtons_and_need_no_wing() -> None:
     shown = page(force_finding())
-    assert "force axis X is worst: 31 mN before, 1.1 mN after" in shown.text
-    assert "The missing load is clearest at phase 0.12: 174 ± 89 mN (test-4)" in shown.text
+    assert "force axis X: 31 mN before, 1.1 mN after" in shown.text
+    assert "The missing load is most significant at phase 0.12: 174 ± 89 mN (test-4)" in shown.text
     assert "mm" not in re.findall(r"\b[a-z]+\b", shown.text)
     assert shown.count("path", "outline") == 0
 
@@ -187,9 +190,9 @@ def test_recordings_held_out_are_apart_and_the_dots_lie_where_they_should() -> N
 def test_without_held_out_recordings_the_page_says_that_nothing_is_proved() -> None:
     finding = wing_finding()
     fitted = tuple(r for r in finding.recordings if not r.held_out)
-    said = "so nothing here proves that the fit is better"
+    said = "so the improvement is not validated"
     assert f"No recording was held out, {said}" in page(replace(finding, proof=None, recordings=fitted)).text
-    assert f"They were not judged together, {said}" in page(replace(finding, proof=None)).text
+    assert f"The held-out recordings were not evaluated together, {said}" in page(replace(finding, proof=None)).text
     assert said not in page(finding).text
 
 
@@ -210,8 +213,10 @@ def test_cells_that_are_not_significant_are_hatched() -> None:
     assert page(replace(finding, missing=(sure,))).count("path", "faint") == 0
     shown = page(replace(finding, missing=(unsure,)))
     hatched = [a["d"] or "" for tag, a in shown.tags if tag == "path" and a.get("class") == "faint"]
-    assert [d.count("M") for d in hatched] == [12 * 30]
-    assert "No missing load stands out from its error" in shown.text
+    (runs,) = [re.findall(r"h([\d.]+)v", d) for d in hatched]
+    assert len(runs) == 12, "a rectangle for each station"
+    assert [float(width) for width in runs] == pytest.approx([348 - 52 + 0.2] * 12), "over the whole beat"
+    assert "No missing load is significant" in shown.text
 
 
 def test_the_drawing_of_the_wing_keeps_its_proportions() -> None:
@@ -230,4 +235,8 @@ def test_what_is_left_out_of_the_page_is_counted() -> None:
     finding = wing_finding()
     shown = page(replace(finding, overlays=finding.overlays * 3, missing=finding.missing * 4)).text
     assert "6 more in the JSON." in shown
-    assert "2 more, where it is smaller, are in the JSON." in shown
+    assert "2 more, with smaller loads" in shown
+    assert (
+        f"{len(finding.missing) * 20 - 30} more, with smaller loads, are in the JSON."
+        in page(replace(finding, missing=finding.missing * 20)).text
+    )

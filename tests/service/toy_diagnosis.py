@@ -6,15 +6,14 @@ It evaluates nothing; its finding is drawn from the seed and says where it start
 # ruff: noqa: ARG002  it takes what the real one takes and needs little of it
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from tests.service.toy import UNLUCKY
+from wingfit import report
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.finding import (
     Advice,
@@ -72,12 +71,10 @@ class ToyDiagnoser:
         yield Progress(1.0, "done", 10 * total, finding(spec, dataset))
 
     def stored(self, finding: Finding) -> dict[str, Any]:
-        return dict(json.loads(json.dumps(asdict(finding))))
+        return report.finding_json(finding)
 
     def html(self, stored: dict[str, Any]) -> str:
-        return (
-            f"<!doctype html><title>{stored['dataset']}</title><style>p {{ color: teal }}</style><p>{stored['summary']}"
-        )
+        return report.html(report.finding_from_json(stored))
 
 
 def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:

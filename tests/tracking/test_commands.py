@@ -102,7 +102,9 @@ def test_a_table_becomes_the_motion_of_a_dataset(wingfit: Wingfit, table: Path, 
     assert motion.root_pitch == pytest.approx(np.pi / 2)
     assert motion.flap.mean == pytest.approx(0.34, abs=0.01)
     assert motion.flap.cosine[0] == pytest.approx(-0.34, abs=0.01)
-    assert "wing pitch, deg" in page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert "wing pitch, deg: measured, 2 standard errors, Fourier series" in text
+    assert text.count("<figure>") == 6
 
 
 def test_tracks_give_the_same_motion_as_a_table(wingfit: Wingfit, tmp_path: Path) -> None:
@@ -146,7 +148,7 @@ def test_tracks_become_forces_that_a_dataset_reads(wingfit: Wingfit, flight: tup
     assert len(rows) == 300
     assert float(rows[150]["force_x_sd_n"]) > 0
     assert "moment_x_n_m" not in rows[0]
-    assert page.exists()
+    assert "Force z: 2 standard deviations, force" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-// Calls of the REST API. Every failure is an ApiError with the server's own words.
+// Calls of the REST API. Every failure is an ApiError with the message of the server.
 
 const FINAL = new Set(["SUCCEEDED", "FAILED", "CANCELLED"]);
 
@@ -9,7 +9,12 @@ export class ApiError extends Error {
     this.errors = errors;
   }
 
-  // The server cannot be reached, as opposed to having refused something.
+  // The message, followed by those about single fields.
+  get text() {
+    return [this.message, ...this.errors.map((item) => item.message)].join(". ");
+  }
+
+  // Whether the server could not be reached, as opposed to a refused request.
   get away() {
     return this.status === null || this.status === 502 || this.status === 503 || this.status === 504;
   }
@@ -17,23 +22,25 @@ export class ApiError extends Error {
 
 export const isFinal = (job) => FINAL.has(job.state);
 
-export async function call(method, path, { body, headers = {} } = {}) {
+export async function call(method, path, { body, headers = {}, as = "json" } = {}) {
   let response;
   try {
     response = await fetch(`v1/${path}`, { method, body, headers });
   } catch {
     throw new ApiError("The server does not answer. Start it with 'wingfit serve'.");
   }
-  if (response.ok) return response.status === 204 ? null : response.json();
+  if (response.ok) return response.status === 204 ? null : response[as]();
   let problem = {};
   try {
     problem = await response.json();
-  } catch { /* not a problem document: the status says enough */ }
+  } catch { /* no problem document: the status line is shown */ }
   const message = problem.detail || problem.title || `${response.status} ${response.statusText}`;
   throw new ApiError(message, { status: response.status, errors: problem.errors || [] });
 }
 
 export const get = (path) => call("GET", path);
+
+export const getText = (path) => call("GET", path, { as: "text" });
 
 export const postJson = (path, value, headers = {}) =>
   call("POST", path, { body: JSON.stringify(value), headers: { "Content-Type": "application/json", ...headers } });
@@ -50,7 +57,7 @@ export async function history(id) {
   }
 }
 
-// Follow the events of the job at `path`, whose steps are called `step`. The browser reconnects by itself and says where it was; where it gives up we start again.
+// Follow the events of the job at `path`; `step` is the name of its progress events. The browser reconnects with the last event id; if it gives up, we reconnect.
 export function follow(path, step, { onStep, onState, onAway }) {
   let source = null;
   let timer = null;

@@ -1,18 +1,18 @@
-// A request as something to paste: a line of curl, a few lines of Python.
+// A request as text to paste: a curl command, or a Python program.
 
 import { $, toast } from "./format.js";
 
 const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
 let keyInCurl = "";
-export const askKeyInCurl = (asked) => { keyInCurl = asked ? ' -H "Authorization: Bearer $WINGFIT_API_KEY"' : ""; };
+export const useKeyInCurl = (required) => { keyInCurl = required ? ' -H "Authorization: Bearer $WINGFIT_API_KEY"' : ""; };
 
 export function curl(path, body) {
   const url = new URL(`v1/${path}`, document.baseURI).href;
   return `curl -X POST ${quote(url)}${keyInCurl} -H 'Content-Type: application/json' -d ${quote(JSON.stringify(body))}`;
 }
 
-// What a value of JSON is called in Python.
+// A JSON value as a Python literal.
 function literal(value) {
   if (value === null) return "None";
   if (typeof value === "boolean") return value ? "True" : "False";

@@ -1,8 +1,8 @@
-// The server's words: about an input, at the fields that they are about; and remarks on an outcome.
+// Errors of a form, shown at the fields that they name; and remarks on a result.
 
 import { el } from "./format.js";
 
-// "body.axes.0" is about the field axes.
+// "body.axes.0" names the field axes.
 const fieldOf = (where) => where.split(".").filter((name) => !/^\d+$/.test(name)).at(-1);
 
 export function showErrors(form, box, error) {
@@ -12,7 +12,7 @@ export function showErrors(form, box, error) {
   const items = (error.errors ?? []).map((item) => {
     const field = fieldOf(item.where);
     form.elements.namedItem(field)?.setAttribute?.("aria-invalid", "true");
-    const about = field === "body" ? "" : `${field}: `; // what is wrong with the whole needs no name
+    const about = field === "body" ? "" : `${field}: `; // errors of the whole request name no field
     return el("li", {}, `${about}${item.message}${item.value === null ? "" : ` (it is ${JSON.stringify(item.value)})`}`);
   });
   box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));

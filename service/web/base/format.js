@@ -1,4 +1,4 @@
-// Numbers and elements as people read them.
+// Formatting of numbers, and creation of elements.
 
 export const DASH = "–";
 
@@ -9,25 +9,25 @@ export const fixed = (value, decimals) => {
   return Number(text) === 0 ? text.replace("-", "") : text;
 };
 
-// Significant digits, noughts among them: 0.0500, 12.0, 385. Rounds as the command line does (cli/base/rounding.py).
-export function kept(value, digits = 3) {
+// Significant digits with trailing zeros: 0.0500, 12.0, 385. The command line rounds equally (cli/base/rounding.py).
+export function rounded(value, digits = 3) {
   if (value === null || value === undefined) return DASH;
   if (value === 0) return "0";
   const power = Number(value.toExponential(digits - 1).split("e")[1]);
   return power < -4 || power > 5 ? significant(value, digits) : value.toFixed(Math.max(digits - 1 - power, 0));
 }
 
-// Four decimals; a correlation that is not 1 is not shown as 1.
+// Four decimals; only an exact 1 is shown as 1.
 export const correlation = (value) => (value !== null && value >= 0.99995 && value < 1 - 1e-9 ? ">0.9999" : fixed(value, 4));
 
 const UNITS = [["N", 1, 10], ["mN", 1e3, 1e-3], ["µN", 1e6, 0]];
 
-// One unit for the forces (N) of a table, in which the largest reads well, and how to show them in it.
+// A unit that suits the largest of the forces (N) of a table, and a function that shows forces in it.
 export function forceUnit(newtons) {
   const sizes = newtons.filter(Boolean).map(Math.abs);
   const largest = sizes.length ? Math.max(...sizes) : 1;
   const [unit, factor] = UNITS.find(([, , least]) => largest >= least) ?? UNITS[1];
-  return { unit, show: (value, digits = 3) => kept(value === null || value === undefined ? null : factor * value, digits) };
+  return { unit, show: (value, digits = 3) => rounded(value === null || value === undefined ? null : factor * value, digits) };
 }
 
 export const withForceUnit = (newtons) => {
@@ -63,7 +63,7 @@ export const when = (text) =>
 
 export const size = (bytes) => (bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` : `${(bytes / 1e3).toFixed(0)} kB`);
 
-// As text of a figure: Plotly takes what looks like markup for markup.
+// Escaped text for charts: Plotly interprets markup.
 export const plain = (text) => String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
 export const plural = (n, word) => `${n} ${word}${n === 1 ? "" : "s"}`;
@@ -78,6 +78,10 @@ export function el(tag, properties = {}, ...children) {
   node.append(...children.filter((child) => child !== null && child !== undefined));
   return node;
 }
+
+// A key number with its label and unit, for a list of class "numbers"; a ``main`` one is emphasised.
+export const keyNumber = (label, value, unit = "", main = false) =>
+  el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
 
 export const $ = (id) => document.getElementById(id);
 

@@ -1,4 +1,4 @@
-// What differs between runs on tracked markers and runs on forces, and the words for what a run can be set to.
+// Labels of settings, and differences between runs on tracked markers and on forces.
 
 import { forceUnit, mm, significant } from "./format.js";
 
@@ -11,7 +11,7 @@ export const MODES = {
 export const PRESETS = { proposed: "Proposed, with clap-and-peel", berman_wang: "Berman and Wang", dickinson: "Dickinson" };
 const SHORT = { proposed: "proposed model", berman_wang: "Berman-Wang model", dickinson: "Dickinson model" };
 
-// In the order in which they stand in tables; "left out" is the global model fitted without the recording.
+// In the order of the tables; "left out": the global model fitted without the recording.
 export const SOURCES = {
   local: "Local", joint: "Joint", global: "Global", left_out: "Left out", average: "Average", nominal: "Nominal",
 };
@@ -25,11 +25,15 @@ export const spoken = (name) => name.replaceAll("_", " ");
 
 export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+// Options of a choice of recordings.
+export const recordingOptions = ({ recordings }) =>
+  recordings.map(({ name, held_out: heldOut }) => new Option(`${name}${heldOut ? " (held out)" : ""}`, name));
+
 export const modelOf = (run) => (isForces(run)
   ? SHORT[run.spec.preset] ?? spoken(run.spec.preset)
   : `${run.spec.division} bodies`);
 
-// The misfit of a run as the lists and the head of the page show it: a number and its unit.
+// The misfit of a run: a number and its unit.
 export function misfit(run) {
   if (!isForces(run)) return { value: mm(run.best_mm), unit: "mm" };
   const best = newtons(run.best_mn);
@@ -39,7 +43,7 @@ export function misfit(run) {
 
 export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e3);
 
-// What a run was set to, as a request: without what its kind of dataset or its method has no use for.
+// The settings of a run as a request, without those that its kind of dataset or its method does not use.
 export function request(run) {
   const idle = [...(isForces(run) ? WING_ONLY : VEHICLE_ONLY), ...(run.spec.method === "gauss_newton" ? SEARCH_ONLY : [])];
   return Object.fromEntries(Object.entries(run.spec).filter(([name]) => !idle.includes(name)));
@@ -54,7 +58,7 @@ export function setup(run) {
     isForces(run) ? null : `solved to ${spec.accuracy_mm} mm`].filter(Boolean);
 }
 
-// Runs stored before there were effects name none.
+// Runs of earlier versions have no effects.
 export const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
 
 export function forceSetup(spec) {

@@ -1,8 +1,8 @@
-// Plotly, loaded when the first figure is drawn, and the look that all figures share.
+// The charts of all pages: Plotly, loaded when the first one is drawn, and the look that they share.
 
 let loading = null;
 
-export function plotly() {
+function plotly() {
   loading ??= new Promise((resolve, reject) => {
     const script = document.createElement("script");
     script.src = "assets/plotly.min.js";
@@ -17,9 +17,12 @@ export function plotly() {
   return loading;
 }
 
-export const CONFIG = { responsive: true, displayModeBar: false, displaylogo: false, scrollZoom: false };
+const CONFIG = { responsive: true, displayModeBar: false, displaylogo: false, scrollZoom: false };
 
-export function theme() {
+export const PHASE = { range: [0, 1], dtick: 0.25 };
+
+// Colours and font of the page, in its light or dark theme.
+function theme() {
   const style = getComputedStyle(document.documentElement);
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return {
@@ -29,39 +32,35 @@ export function theme() {
   };
 }
 
-export function layout(look, extra) {
-  return {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: look.font, showlegend: false,
-    hoverlabel: { bgcolor: look.surface, bordercolor: look.line, font: { color: look.ink, size: 12 } },
-    ...extra,
-  };
-}
-
-export const axis = (look, extra) => ({
-  gridcolor: look.line, linecolor: look.line, zeroline: false, ticks: "", automargin: true, ...extra,
+export const axis = (look, title, extra = {}) => ({
+  gridcolor: look.line, linecolor: look.line, zeroline: false, ticks: "", automargin: true, title: { text: title, standoff: 6 }, ...extra,
 });
 
-export const legend = (look) => ({
-  showlegend: true, legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
-});
+// An axis on which zero is marked.
+export const zeroAxis = (look, title) =>
+  axis(look, title, { zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 });
 
-export const PHASE = { range: [0, 1], dtick: 0.25 };
-
-// Curves [name, y] over the phase of the beat, or with ``dots`` over something else; ``first`` is how the first is drawn.
-export async function lines(node, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false, first = null }) {
+// Draw a chart into ``node``. ``build`` takes the theme; it returns the traces and what differs from the common layout.
+export async function draw(node, build) {
   const Plotly = await plotly();
   const look = theme();
-  const traces = series.map(([name, y], k) => {
+  const { traces, ...own } = build(look);
+  return Plotly.react(node, traces, {
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: look.font, margin: { l: 10, r: 8, t: 30, b: 10 },
+    showlegend: false, legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
+    hoverlabel: { bgcolor: look.surface, bordercolor: look.line, font: { color: look.ink, size: 12 } },
+    ...own,
+  }, CONFIG);
+}
+
+// Draw curves [name, y] over the phase of the beat, or over something else with ``dots``.
+export const lines = (node, x, series, { unit, x: xTitle = "phase of the beat", dots = false, shades = false }) => draw(node, (look) => ({
+  traces: series.map(([name, y], k) => {
     const colour = shades ? look.accent : look.series[k];
     return {
-      x, y, name, type: "scatter", mode: (k === 0 && first) || (dots ? "lines+markers" : "lines"), opacity: shades ? 1 - (0.75 * k) / series.length : 1,
+      x, y, name, type: "scatter", mode: dots ? "lines+markers" : "lines", opacity: shades ? 1 - (0.75 * k) / series.length : 1,
       line: { color: colour, width: 2, simplify: false }, marker: { color: colour, size: 6 }, hovertemplate: `%{y:.3g} ${unit}<extra>${name}</extra>`,
     };
-  });
-  const figure = layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", ...legend(look),
-    xaxis: axis(look, { title: { text: xTitle, standoff: 6 }, showgrid: false, ...(dots ? {} : PHASE) }),
-    yaxis: axis(look, { title: { text: unit, standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
-  });
-  return Plotly.react(node, traces, figure, CONFIG);
-}
+  }),
+  showlegend: true, hovermode: "x unified", xaxis: axis(look, xTitle, { showgrid: false, ...(dots ? {} : PHASE) }), yaxis: zeroAxis(look, unit),
+}));

@@ -1,31 +1,31 @@
-// Runs beside each other (#compare=ID,ID): how they were set, how they went, what they found.
+// Comparison of runs (#compare=ID,ID): settings, convergence, results.
 
 import { get, history, part } from "../base/api.js";
-import { $, DASH, duration, el, kept, plain, significant, toast } from "../base/format.js";
+import { $, DASH, duration, el, rounded, plain, significant, toast } from "../base/format.js";
 import { badge, runName } from "../parts/sidebar.js";
 import { MOST_COMPARED } from "./table_page.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { isForces, request, spoken } from "../base/labels.js";
 
 let shown = [];
-let asked = "";
+let requested = "";
 
 export function setUpCompare() {
   $("compare-all").addEventListener("change", drawSetup);
 }
 
 export async function showComparison(ids, { onMissing }) {
-  asked = ids ?? "";
+  requested = ids ?? "";
   $("comparison").hidden = true;
   if (!ids) return;
   document.title = "Comparison · wingfit";
   const wanted = [...new Set(ids.split(",").filter(Boolean))].slice(0, MOST_COMPARED);
   try {
     const found = await Promise.all(wanted.map(loaded));
-    if (asked !== ids) return;
+    if (requested !== ids) return;
     shown = found;
   } catch (error) {
-    if (asked === ids) onMissing(error, () => asked === ids && showComparison(ids, { onMissing }));
+    if (requested === ids) onMissing(error, () => requested === ids && showComparison(ids, { onMissing }));
     return;
   }
   $("comparison").hidden = false;
@@ -55,14 +55,14 @@ const number = (text) => el("td", { className: "n" }, text);
 const head = (id, ...cells) => $(id).tHead.replaceChildren(el("tr", {}, ...cells));
 const body = (id, rows) => $(id).tBodies[0].replaceChildren(...rows);
 
-// A misfit with its unit: runs on markers and on forces may stand beside each other.
+// A misfit with its unit: runs on markers and on forces can be compared.
 function misfit(forces, value) {
   if (value === null || value === undefined) return DASH;
-  return `${kept(value, 3)} ${forces ? "mN" : "mm"}`;
+  return `${rounded(value, 3)} ${forces ? "mN" : "mm"}`;
 }
 
 function drawOutcome() {
-  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", "Noise floor", "Evaluations", "Computed for"];
+  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", "Noise floor", "Evaluations", "Computing time"];
   head("compare-outcome", ...heads.map((text, i) => el("th", { scope: "col", className: i > 2 ? "n" : "" }, text)));
   body("compare-outcome", shown.map(({ run, dataset, result, past }, k) => {
     const forces = isForces(run);
@@ -75,8 +75,8 @@ function drawOutcome() {
   const datasets = new Set(shown.map(({ dataset }) => dataset.id));
   const kinds = new Set(shown.map(({ run }) => run.kind));
   $("compare-note").textContent = [
-    datasets.size > 1 ? "These runs are fitted to different datasets: their misfits say nothing about each other." : null,
-    kinds.size > 1 ? "Convergence is drawn of those on forces alone." : null,
+    datasets.size > 1 ? "These runs are fitted to different datasets: their misfits are not comparable." : null,
+    kinds.size > 1 ? "The convergence chart shows only the runs on forces." : null,
   ].filter(Boolean).join(" ");
 }
 
@@ -88,11 +88,11 @@ function drawSetup() {
     return Array.isArray(value) ? value.map((one) => spoken(String(one))).join(", ") || "none" : String(value);
   };
   const rows = names.map((name) => ({ name, values: specs.map((spec) => text(spec[name])) }));
-  const told = rows.filter(({ values }) => $("compare-all").checked || new Set(values).size > 1);
+  const visible = rows.filter(({ values }) => $("compare-all").checked || new Set(values).size > 1);
   head("compare-setup", el("th", { scope: "col" }, "Setting"), ...shown.map(heading));
-  body("compare-setup", told.map(({ name, values }) => el("tr", {}, el("th", { scope: "row" }, spoken(name)), ...values.map(number))));
-  $("compare-setup").hidden = !told.length;
-  $("compare-same").hidden = told.length > 0;
+  body("compare-setup", visible.map(({ name, values }) => el("tr", {}, el("th", { scope: "row" }, spoken(name)), ...values.map(number))));
+  $("compare-setup").hidden = !visible.length;
+  $("compare-same").hidden = visible.length > 0;
 }
 
 function drawRecordings() {
@@ -119,28 +119,23 @@ function drawGenes() {
 function geneCell(gene) {
   if (!gene) return number(DASH);
   const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
-  const about = !gene.searched ? " fixed" : gene.identifiable === false ? " not told" : error;
+  const about = !gene.searched ? " fixed" : gene.identifiable === false ? " not identifiable" : error;
   return el("td", { className: "n" }, significant(gene.best), el("small", {}, about));
 }
 
-// Best misfit so far over what it cost. Where the stages of a run sum over different recordings its line may rise.
+// Best misfit so far against the number of simulated individuals.
 export async function redrawComparison() {
   if ($("comparison").hidden) return;
-  try {
-    const Plotly = await plotly();
-    const look = theme();
-    const forces = shown.some(({ run }) => isForces(run));
-    const value = (item) => (forces ? item.best_mn : item.best_mm);
-    const traces = shown.map(({ run, past }, k) => ({ run, past, k })).filter(({ run }) => isForces(run) === forces).map(({ run, past, k }) => ({
-      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations), y: past.map(value),
-      text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 }, hovertemplate: `%{y:.4g} ${forces ? "mN" : "mm"}, %{text}<extra>%{fullData.name}</extra>`,
-    }));
-    await Plotly.react($("compare-plot"), traces, layout(look, {
-      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
-      xaxis: axis(look, { title: { text: "simulated individuals", standoff: 6 }, showgrid: false }),
-      yaxis: axis(look, { type: "log", title: { text: forces ? "RMS difference, mN" : "mean distance per marker, mm", standoff: 6 }, nticks: 6 }),
-    }), CONFIG);
-  } catch (error) {
-    toast(error.message);
-  }
+  const forces = shown.some(({ run }) => isForces(run));
+  const unit = forces ? "mN" : "mm";
+  const curves = shown.map((one, k) => ({ ...one, k })).filter(({ run }) => isForces(run) === forces);
+  await draw($("compare-plot"), (look) => ({
+    traces: curves.map(({ run, past, k }) => ({
+      type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations),
+      y: past.map((item) => (forces ? item.best_mn : item.best_mm)), text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 },
+      hovertemplate: `%{y:.4g} ${unit}, %{text}<extra>%{fullData.name}</extra>`,
+    })),
+    showlegend: true, xaxis: axis(look, "simulated individuals", { showgrid: false }),
+    yaxis: axis(look, forces ? "RMS difference, mN" : "mean distance per marker, mm", { type: "log", nticks: 6 }),
+  })).catch((error) => toast(error.message));
 }

@@ -1,9 +1,9 @@
-// The selected dataset: what was recorded, under which conditions, and what was made of it.
+// The selected dataset: recordings, conditions, and its runs and diagnoses.
 
 import { get, part } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
 import { badge, runName } from "../parts/sidebar.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { remove } from "./submit.js";
 import { isForces, misfit } from "../base/labels.js";
 
@@ -68,31 +68,24 @@ function drawRecordings() {
     number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
 }
 
-// What the recordings cover: flap frequency against the one other condition that varies most.
+// Chart of the conditions: flap frequency against the other quantity with the most values.
 export async function redrawDataset() {
   const shown = dataset;
   if (!shown) return;
   const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(shown.recordings.map((one) => one[name])).size }));
   const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
-  try {
-    const Plotly = await plotly();
-    if (shown !== dataset) return;
-    const look = theme();
-    const dots = (held, label, symbol) => {
-      const those = shown.recordings.filter((one) => one.held_out === held);
-      return {
-        type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
-        text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
-        hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
-      };
+  const dots = (look, held, label, symbol) => {
+    const those = shown.recordings.filter((one) => one.held_out === held);
+    return {
+      type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
+      text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
+      hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
     };
-    await Plotly.react($("conditions"), [dots(false, "to fit", "circle"), dots(true, "held out", "circle-open")], layout(look, {
-      margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
-      xaxis: axis(look, { title: { text: "flap frequency, Hz", standoff: 6 } }), yaxis: axis(look, { title: { text: title, standoff: 6 } }),
-    }), CONFIG);
-  } catch (error) {
-    toast(error.message);
-  }
+  };
+  await draw($("conditions"), (look) => ({
+    traces: [dots(look, false, "to fit", "circle"), dots(look, true, "held out", "circle-open")],
+    showlegend: true, xaxis: axis(look, "flap frequency, Hz"), yaxis: axis(look, title),
+  })).catch((error) => toast(error.message));
 }
 
 async function listWork(id) {
@@ -102,7 +95,7 @@ async function listWork(id) {
     const found = await get(`${kind}?dataset_id=${part(id)}&limit=${LISTED}`);
     if (hooks.currentId() !== id) return;
     const items = found.items.map((job) => el("li", {}, el("a", { href: `#${page}=${part(job.id)}` }, ...text(job))));
-    if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "all of them")));
+    if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "Show all")));
     list.replaceChildren(...(items.length ? items : [el("li", { className: "quiet" }, "None yet.")]));
   };
   await Promise.all([

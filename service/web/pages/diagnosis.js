@@ -1,8 +1,7 @@
-// The selected diagnosis: progress, verdict, and what was found.
+// The selected diagnosis: its progress, then its report as the server draws it.
 
-import { call, follow, get, isFinal, part, postJson } from "../base/api.js";
+import { call, follow, get, getText, isFinal, part, postJson } from "../base/api.js";
 import { $, plural, toast, when } from "../base/format.js";
-import { setUpFinding, showFinding } from "../parts/finding.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
 import { randomKey, remove } from "./submit.js";
 import { forceSetup, isForces, modelOf, withEffects } from "../base/labels.js";
@@ -14,19 +13,18 @@ let hooks = {};
 
 export function setUpDiagnosis(given) {
   hooks = given;
-  setUpFinding();
   $("diagnosis-actions").addEventListener("click", (event) => {
     const action = event.target.dataset?.action;
     if (action) act(action);
   });
 }
 
-// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, and said, where it is refused.
+// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, after an error message, if it is refused.
 export async function diagnose(body) {
   try {
     return await postJson("diagnoses", body, { "Idempotency-Key": randomKey() });
   } catch (error) {
-    toast([error.message, ...error.errors.map((item) => item.message)].join(". "));
+    toast(error.text);
     return null;
   }
 }
@@ -36,7 +34,7 @@ export async function selectDiagnosis(id) {
   stopFollowing = () => {};
   [diagnosis, fetched] = [null, false];
   $("diagnosis").hidden = true;
-  showFinding(null);
+  showReport(null);
   if (!id) return;
   try {
     const found = await get(`diagnoses/${part(id)}`);
@@ -83,29 +81,35 @@ function update() {
   $("diagnosis-progress").textContent = [done ? null : `${Math.round(100 * diagnosis.progress)} %`, timeLeft(diagnosis),
     diagnosis.state === "RUNNING" ? diagnosis.stage : null,
     plural(diagnosis.evaluations, "evaluation")].filter(Boolean).join(" · ");
-  $("verdict-part").hidden = !done;
-  $("verdict").textContent = diagnosis.verdict ?? "";
-  $("diagnosis-summary").textContent = diagnosis.summary ?? "";
   for (const id of ["report-link", "finding-exports"]) $(id).hidden = !done;
   $("report-link").href = `${path}/report`;
   for (const format of ["csv", "netcdf", "json"]) $(`finding-${format}`).href = `${path}/export?format=${format}`;
-  if (done && !fetched) fetchFinding();
+  if (done && !fetched) fetchReport();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
     button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");
     button.disabled = Boolean(diagnosis.wish);
   }
 }
 
-async function fetchFinding() {
+async function fetchReport() {
   const { id } = diagnosis;
   fetched = true;
   try {
-    const finding = await get(`diagnoses/${part(id)}/finding`);
-    if (diagnosis?.id === id) showFinding(finding);
+    const text = await getText(`diagnoses/${part(id)}/report`);
+    if (diagnosis?.id === id) showReport(new DOMParser().parseFromString(text, "text/html"));
   } catch (error) {
     if (diagnosis?.id === id) fetched = false;
     toast(error.message);
   }
+}
+
+// The report keeps its own style sheet: a shadow tree separates it from the page's. Its headings continue those of the page.
+function showReport(report) {
+  const root = $("report").shadowRoot ?? $("report").attachShadow({ mode: "open" });
+  root.replaceChildren();
+  if (!report) return;
+  for (const heading of report.querySelectorAll("h1, h2, h3")) heading.ariaLevel = Number(heading.tagName[1]) + 2;
+  root.append(...report.querySelectorAll("style, body > svg"), ...report.querySelector("main").childNodes);
 }
 
 async function act(action) {

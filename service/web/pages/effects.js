@@ -1,4 +1,4 @@
-// What a model can contain beyond its nominal physics (#effects, #effects=NAME): laws, genes, sources.
+// The library of effects (#effects, #effects=NAME): signatures, genes, sources.
 
 import { get } from "../base/api.js";
 import { $, el, significant, toast } from "../base/format.js";
@@ -21,11 +21,11 @@ export async function showEffects(name) {
     toast(error.message);
     return;
   }
-  const asked = name && document.getElementById(`effect-${name}`);
-  if (name && !asked) toast(`There is no effect ${name}`);
-  if (!asked) return;
-  asked.open = true;
-  asked.scrollIntoView({ block: "start" });
+  const wanted = name && document.getElementById(`effect-${name}`);
+  if (name && !wanted) toast(`There is no effect ${name}`);
+  if (!wanted) return;
+  wanted.open = true;
+  wanted.scrollIntoView({ block: "start" });
 }
 
 function draw() {
@@ -40,9 +40,9 @@ function card(effect, titles) {
   const links = effect.confused_with.flatMap((name, i) => [i ? ", " : "", el("a", { href: `#effects=${name}` }, titles.get(name) ?? spoken(name))]);
   const node = el("details", { className: "effect" },
     el("summary", {}, el("strong", {}, effect.title), " ", el("span", { className: "quiet" }, effect.applies_to.map((rig) => `${rig}s`).join(" and "))),
-    el("dl", { className: "facts" }, ...fact("What one sees", capital(effect.signature)), ...fact("Source", effect.source),
-      ...fact("Acts on", `${effect.port}; ${{ any: "its power may have either sign", conservative: "conserves energy", dissipative: "takes energy away" }[effect.power]}`),
-      ...(effect.memory ? fact("Memory", effect.memory) : []), ...(links.length ? fact("Easily taken for", ...links) : []), ...fact("In a request", el("code", {}, effect.name))),
+    el("dl", { className: "facts" }, ...fact("Signature", capital(effect.signature)), ...fact("Source", effect.source),
+      ...fact("Acts on", `${effect.port}; ${{ any: "its power may have either sign", conservative: "conserves energy", dissipative: "dissipates energy" }[effect.power]}`),
+      ...(effect.memory ? fact("Memory", effect.memory) : []), ...(links.length ? fact("Confused with", ...links) : []), ...fact("Name in requests", el("code", {}, effect.name))),
     el("div", { className: "scroll", tabIndex: 0, role: "group", ariaLabel: `Genes of ${effect.title}` }, genes(effect)));
   node.id = `effect-${effect.name}`;
   return node;

@@ -7,15 +7,15 @@ import { drawCorrelation, drawEstimates, fillEstimates } from "../parts/estimate
 import { $, el } from "../base/format.js";
 import { clearPrediction, redrawPrediction, setUpPrediction, showPrediction } from "../parts/predict.js";
 import { showRemarks } from "../base/form_errors.js";
-import { SOURCES } from "../base/labels.js";
+import { recordingOptions, SOURCES } from "../base/labels.js";
 
 let run = null;
 let dataset = null;
 let result = null;
 let forces = null;
-let asked = "";
+let requested = "";
 let request = 0;
-let preferred = null; // the model that somebody chose, kept from recording to recording
+let preferred = null; // the model chosen by the user, used for other recordings too
 
 const checked = (name) => document.querySelector(`input[name=${name}]:checked`)?.value;
 const key = () => [run.id, $("force-recording").value, checked("source")].join("/");
@@ -37,18 +37,17 @@ export function showForces(next, its, outcome) {
   if (changed) {
     forces = null;
     $("beats").hidden = true;
-    $("force-recording").replaceChildren(...dataset.recordings.map((recording) =>
-      new Option(`${recording.name}${recording.held_out ? " (held out)" : ""}`, recording.name)));
+    $("force-recording").replaceChildren(...recordingOptions(dataset));
   }
   if (!changed && !judged) return;
   showResult();
   fillSources();
-  if (key() !== asked) load();
+  if (key() !== requested) load();
 }
 
 export function hideForces() {
   request += 1;
-  [run, dataset, result, forces, asked] = [null, null, null, null, ""];
+  [run, dataset, result, forces, requested] = [null, null, null, null, ""];
 }
 
 export function redrawForces() {
@@ -74,7 +73,7 @@ function showResult() {
   showPrediction(run, result, dataset);
 }
 
-// Models that there are for the recording chosen; before the end of a run only its start is known.
+// Models available for the chosen recording; until a run has ended only the nominal one.
 function fillSources() {
   const recording = $("force-recording").value;
   const known = new Set((result?.agreements ?? []).filter((a) => a.recording === recording).map((a) => a.source)).add("nominal");
@@ -87,7 +86,7 @@ function fillSources() {
 
 async function load() {
   const mine = ++request;
-  asked = key();
+  requested = key();
   const source = checked("source");
   const query = new URLSearchParams({ recording: $("force-recording").value, source });
   $("beats-note").textContent = "Computing…";

@@ -40,7 +40,7 @@ export function setUpRun(given) {
   $("copy-python").addEventListener("click", () => copy(python(again())));
 }
 
-// The request that submits this run once more.
+// The request that submits this run again.
 const again = () => ({ dataset_id: run.dataset_id, ...request(run), ...(run.name ? { name: run.name } : {}) });
 
 export async function selectRun(id) {
@@ -63,7 +63,7 @@ export async function selectRun(id) {
     return;
   }
   $("run").hidden = false;
-  suit();
+  showSections();
   update();
   if (!isFinal(run)) listen();
 }
@@ -79,8 +79,8 @@ export function redraw() {
   redrawLoads();
 }
 
-// The parts that belong to what the run is fitted to: tracked markers or forces.
-function suit() {
+// Show the sections of a run on tracked markers, or of one on forces.
+function showSections() {
   const forces = isForces(run);
   (forces ? hideWing : hideForces)();
   $("tracks-part").hidden = forces;
@@ -111,7 +111,7 @@ function listen() {
   });
 }
 
-// Generations may come faster than a screen can show them.
+// Generations may arrive faster than the charts can be drawn.
 function schedule() {
   if (drawing) return;
   drawing = true;
@@ -170,7 +170,7 @@ function drawFitness() {
   $("history-note").hidden = sorted.length > 0;
   $("history-note").textContent = {
     QUEUED: "The run waits for its turn.", RUNNING: "The first generation is being computed.",
-  }[run.state] ?? "No generation was finished.";
+  }[run.state] ?? "The run ended before its first generation.";
   if (sorted.length) drawHistory($("history"), sorted, isForces(run)).catch((error) => toast(error.message));
 }
 
@@ -180,7 +180,7 @@ async function act(action) {
     return;
   }
   try {
-    // The new state arrives as an event; this answer may be older than an event that overtook it.
+    // The new state arrives as an event; this answer may be older than the last event.
     await call("POST", `runs/${part(run.id)}/${action}`);
   } catch (error) {
     toast(error.message);

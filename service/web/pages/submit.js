@@ -1,4 +1,4 @@
-// Starting a run and uploading a dataset; the server checks, and its words are shown where they belong.
+// Forms that start a run and upload a dataset; the server checks them, and its errors are shown at the fields.
 
 import { ApiError, call, get, part, postJson } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
@@ -7,7 +7,7 @@ import { showErrors } from "../base/form_errors.js";
 import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
 
 const TYPED_MS = 350;
-// A field that holds no number says that it is empty, which would mean the default.
+// Sent for a field with invalid text, whose value the browser reports as empty: empty would mean the default.
 export const NO_NUMBER = "not a number";
 
 let datasets = [];
@@ -15,7 +15,7 @@ let models = null;
 let effects = null;
 let typing = null;
 let checked = 0;
-let asking = Promise.resolve();
+let checking = Promise.resolve();
 
 export function setUpSubmit({ onSubmitted, onUploaded }) {
   const form = $("submit-form");
@@ -25,12 +25,12 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
     const button = form.querySelector("[type=submit]");
     if (button.disabled) return;
     const body = values(form);
-    // The same input sent twice is one run: a new key only when something was changed.
+    // The same input sent twice is one run: the key changes only with the input.
     const text = JSON.stringify(body);
     if (sent?.text !== text) sent = { text, key: randomKey() };
     showErrors(form, $("submit-errors"), null);
     clearTimeout(typing);
-    checked += 1; // an answer that is still on its way is about something else
+    checked += 1; // a pending check belongs to earlier input
     button.disabled = true;
     try {
       const run = await postJson("runs", body, { "Idempotency-Key": sent.key });
@@ -43,10 +43,10 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
       button.disabled = false;
     }
   });
-  form.dataset_id.addEventListener("change", () => suit(form).then(() => check(form)));
-  form.method.addEventListener("change", () => suitMethod(form));
-  form.preset.addEventListener("change", () => suitPreset(form));
-  $("effect-choices").addEventListener("change", sayEffects);
+  form.dataset_id.addEventListener("change", () => showFieldsFor(form).then(() => check(form)));
+  form.method.addEventListener("change", () => showMethodFields(form));
+  form.preset.addEventListener("change", () => showPreset(form));
+  $("effect-choices").addEventListener("change", summarizeEffects);
   $("submit-close").addEventListener("click", () => $("submit-dialog").close());
   form.addEventListener("input", () => {
     clearTimeout(typing);
@@ -58,7 +58,7 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-// With ``dataset`` chosen, which may be older than those that are listed.
+// ``dataset`` is preselected; it may be older than those of the lists.
 export function openSubmit(known, dataset = known[0]) {
   datasets = known.some((one) => one.id === dataset?.id) || !dataset ? known : [dataset, ...known];
   if (!datasets.length) {
@@ -70,30 +70,30 @@ export function openSubmit(known, dataset = known[0]) {
   form.dataset_id.value = dataset.id;
   form.elements.namedItem("name").value = "";
   showErrors(form, $("submit-errors"), null);
-  suit(form).then(() => check(form));
+  showFieldsFor(form).then(() => check(form));
   $("submit-dialog").showModal();
 }
 
-// What the server would say to the form as it stands; nothing is submitted. One question at a time: the last is asked when
-// the one before is answered.
+// Let the server check the form without submitting it. One request at a time: the latest input is checked when the
+// previous check has been answered.
 async function check(form) {
   const mine = ++checked;
-  await asking.catch(() => {});
+  await checking.catch(() => {});
   if (mine !== checked) return;
   try {
-    asking = postJson("runs?validate_only=true", values(form));
-    const { name, spec } = await asking;
+    checking = postJson("runs?validate_only=true", values(form));
+    const { name, spec } = await checking;
     if (mine !== checked) return;
     showErrors(form, $("submit-errors"), null);
-    $("submit-said").textContent = `Would run as “${name}”: ${setup({ kind: chosenDataset(form).kind, spec }).join(" · ")}`;
+    $("submit-preview").textContent = `Preview: “${name}”: ${setup({ kind: chosenDataset(form).kind, spec }).join(" · ")}`;
   } catch (error) {
     if (mine !== checked) return;
-    $("submit-said").textContent = "";
+    $("submit-preview").textContent = "";
     showErrors(form, $("submit-errors"), error);
   }
 }
 
-// crypto.randomUUID exists only in secure contexts, and a page on a private network is none.
+// crypto.randomUUID exists only in secure contexts, which a page without TLS on a private network is not.
 export const randomKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 function values(form) {
@@ -103,7 +103,7 @@ function values(form) {
   else body.division = form.division.value;
   if (ticked("effect-choices").length) body.effects = ticked("effect-choices");
   if (searches(form)) body.finish = form.finish.checked;
-  // What is not a number goes to the server as it was typed: it knows what to say about it.
+  // Invalid numbers are sent as text, so that the server explains the error.
   for (const name of numbers(form, forces)) {
     if (form[name].validity.badInput) body[name] = NO_NUMBER;
     else if (form[name].value !== "") body[name] = Number(form[name].value);
@@ -122,15 +122,15 @@ const ticked = (id) => boxes(id).filter((box) => box.checked).map((box) => box.v
 const unticked = (id) => boxes(id).filter((box) => !box.checked).map((box) => box.value);
 const chosenDataset = (form) => datasets.find((dataset) => dataset.id === form.dataset_id.value);
 
-// Show what belongs to the kind of the chosen dataset.
-async function suit(form) {
+// Show the fields that apply to the kind of the chosen dataset.
+async function showFieldsFor(form) {
   const dataset = chosenDataset(form);
   const forces = isForces(dataset);
   for (const node of form.querySelectorAll("[data-kind]")) node.hidden = node.dataset.kind !== (forces ? "forces" : "tracks");
   options(form.method, METHODS, forces ? ["gauss_newton", "genetic", "cma_es"] : ["genetic", "cma_es", "gauss_newton"]);
   options(form.mode, MODES, forces ? ["local", "joint"] : ["staged", "joint", "local"]);
-  suitMethod(form);
-  await suitEffects(form, forces ? "vehicle" : "wing");
+  showMethodFields(form);
+  await showEffectChoices(form, forces ? "vehicle" : "wing");
   if (!forces) return;
   const recorded = new Set(dataset.recordings.flatMap((recording) => recording.channels.map((name) => name.replace("force_", ""))));
   $("axes").replaceChildren(...[...recorded].map((axis) => tick(axis, axis, axis === "x" || recorded.size === 1)));
@@ -141,15 +141,15 @@ async function suit(form) {
     return;
   }
   options(form.preset, PRESETS, models.presets.map((preset) => preset.name));
-  suitPreset(form);
+  showPreset(form);
 }
 
-function suitMethod(form) {
+function showMethodFields(form) {
   for (const node of form.querySelectorAll("[data-search]")) node.hidden = !searches(form);
 }
 
-// Effects that apply to what the dataset describes, family by family; none is ticked.
-async function suitEffects(form, rig) {
+// Effects that apply to the rig of the dataset, by family; none is selected.
+async function showEffectChoices(form, rig) {
   try {
     effects ??= (await get("effects")).effects;
   } catch (error) {
@@ -162,15 +162,15 @@ async function suitEffects(form, rig) {
     el("p", { className: "quiet" }, family),
     ...fitting.filter((effect) => effect.family === family).map((effect) => tick(effect.name, effect.title, false, effect.signature)))));
   $("effects-part").hidden = !fitting.length;
-  sayEffects();
+  summarizeEffects();
 }
 
-function sayEffects() {
+function summarizeEffects() {
   const count = ticked("effect-choices").length;
   $("effects-summary").textContent = count ? `Effects: ${ticked("effect-choices").map(spoken).join(", ")}` : "Effects: none included";
 }
 
-function suitPreset(form) {
+function showPreset(form) {
   const preset = models.presets.find((one) => one.name === form.preset.value);
   $("preset-about").textContent = `${preset.description}. ${preset.source}.`;
   const terms = preset.terms.map((name) => models.terms.find((term) => term.name === name));
@@ -207,7 +207,7 @@ async function upload(file, onUploaded) {
   }
 }
 
-// XMLHttpRequest, because fetch does not say how much has been sent.
+// XMLHttpRequest, because fetch does not report the progress of an upload.
 function send(file, onFraction) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();

@@ -1,4 +1,4 @@
-// Pages of everything that there is: #runs, #diagnoses, #datasets; newest first, as many as one asks for.
+// Tables of all runs, diagnoses and datasets (#runs, #diagnoses, #datasets), newest first.
 
 import { get, part } from "../base/api.js";
 import { $, DASH, el, plural, size, toast, when } from "../base/format.js";
@@ -32,7 +32,7 @@ let names = new Map();
 let chosen = new Set();
 let request = 0;
 
-// With a key, by which a focus survives that the rows are drawn anew.
+// A link with a key, by which the focus is restored after the rows are redrawn.
 function open(page, id, text, row = id) {
   const link = el("a", { href: `#${page}=${part(id)}` }, text);
   link.dataset.key = `${page}-${row}`;
@@ -46,15 +46,15 @@ export function setUpListing() {
   $("compare").addEventListener("click", () => { location.hash = `compare=${[...chosen].map(part).join(",")}`; });
 }
 
-// Show the page of ``next`` ("runs", "diagnoses", "datasets"), or none; ``asked`` are the parameters of the address.
-export async function showListing(next, asked) {
+// Show the table of ``next`` ("runs", "diagnoses", "datasets"), or hide it; ``parameters`` are those of the address.
+export async function showListing(next, parameters) {
   const mine = ++request;
   kind = next;
   $("listing").hidden = !kind;
   if (!kind) return;
   const { title, heads, states } = KINDS[kind];
   document.title = `${title} · wingfit`;
-  filters = Object.fromEntries(["state", "dataset_id"].filter((name) => states && asked.get(name) && (name !== "state" || states.includes(asked.get(name)))).map((name) => [name, asked.get(name)]));
+  filters = Object.fromEntries(["state", "dataset_id"].filter((name) => states && parameters.get(name) && (name !== "state" || states.includes(parameters.get(name)))).map((name) => [name, parameters.get(name)]));
   [items, cursor, chosen] = [[], null, new Set()];
   $("listing-title").textContent = title;
   $("listing-filters").hidden = !states;
@@ -66,7 +66,7 @@ export async function showListing(next, asked) {
   if (mine === request) await load(true);
 }
 
-// What the lists at the side have just learnt.
+// Take over changes from the lists of the sidebar.
 export function refreshListing(fresh) {
   if (!kind) return;
   const known = new Map(fresh[kind].map((item) => [item.id, item]));
@@ -79,7 +79,7 @@ async function fillFilters(states, mine) {
   try {
     const page = await get("datasets?limit=200");
     names = new Map(page.items.map((dataset) => [dataset.id, dataset.name]));
-  } catch { /* the filter offers what is known; the list itself will say what is wrong */ }
+  } catch { /* the filter then lists ids; loading the table reports the error */ }
   if (mine !== request) return;
   $("listing-state").replaceChildren(new Option("all", ""), ...states.map((state) => new Option(stateWord(state), state)));
   $("listing-state").value = filters.state ?? "";
@@ -106,7 +106,7 @@ async function load(first = false) {
     cursor = page.next_cursor;
   } catch (error) {
     if (mine !== request) return;
-    toast([error.message, ...error.errors.map((one) => one.message)].join(". "));
+    toast(error.text);
   }
   $("listing-more").disabled = false;
   draw(true);
@@ -120,13 +120,13 @@ function draw(loaded = false) {
   $("listing-table").hidden = !items.length;
   $("listing-more").hidden = !cursor;
   if (loaded) {
-    const none = Object.keys(filters).length ? `No ${title.toLowerCase()} like that.` : `No ${title.toLowerCase()} yet.`;
+    const none = Object.keys(filters).length ? `No ${title.toLowerCase()} match the filter.` : `No ${title.toLowerCase()} yet.`;
     $("listing-note").textContent = items.length ? `${items.length}${cursor ? " newest" : ""}, newest first` : none;
   }
-  sayChosen();
+  updateCompareButton();
 }
 
-function sayChosen() {
+function updateCompareButton() {
   $("compare").disabled = chosen.size < 2;
   $("compare").textContent = chosen.size ? `Compare ${plural(chosen.size, "run")}` : "Compare";
 }
@@ -137,11 +137,11 @@ function choice(run) {
   box.addEventListener("change", () => {
     if (box.checked && chosen.size >= MOST_COMPARED) {
       box.checked = false;
-      toast(`At most ${MOST_COMPARED} runs beside each other`);
+      toast(`At most ${MOST_COMPARED} runs can be compared`);
       return;
     }
     chosen[box.checked ? "add" : "delete"](run.id);
-    sayChosen();
+    updateCompareButton();
   });
   return box;
 }

@@ -1,7 +1,7 @@
-// Who is calling: where the server asks for a key, it is given here once and kept in a cookie that no script can read.
+// Sign-in: the key is entered once and stored in a cookie that scripts cannot read.
 
 import { call, get, postJson } from "../base/api.js";
-import { askKeyInCurl } from "../base/copying.js";
+import { useKeyInCurl } from "../base/copying.js";
 import { $ } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
 
@@ -11,10 +11,10 @@ export function askForKey() {
   if (!$("key-dialog").open) $("key-dialog").showModal();
 }
 
-// Whether anything can be asked of the server; where not, a key is asked for, with which the page begins again.
+// Return whether the server accepts requests; if it requires a key, show the sign-in form, which reloads the page.
 export async function setUpAccess() {
   const form = $("key-form");
-  $("key-dialog").addEventListener("cancel", (event) => event.preventDefault()); // without a key there is nothing behind it
+  $("key-dialog").addEventListener("cancel", (event) => event.preventDefault()); // the page shows nothing without a key
   $("sign-out").addEventListener("click", async () => {
     await call("DELETE", "session");
     location.reload();
@@ -31,7 +31,7 @@ export async function setUpAccess() {
   });
   try {
     const session = await get("session");
-    askKeyInCurl(session.keys_required);
+    useKeyInCurl(session.keys_required);
     $("sign-out").hidden = session.owner === null;
     $("owner").textContent = session.owner ?? "";
     if (!session.keys_required || session.owner !== null) return true;
@@ -39,6 +39,6 @@ export async function setUpAccess() {
     return false;
   } catch (error) {
     if (!error.away) throw error;
-    return true; // the page says elsewhere that the server is away
+    return true; // polling reports that the server does not answer
   }
 }

@@ -1,10 +1,10 @@
-// How well each model agrees with each recording: differences, correlation, averages over the beat.
+// Agreement of each model with each recording: RMS difference, correlation, averages over the beat.
 
-import { $, correlation, el, forceUnit, kept } from "../base/format.js";
+import { $, correlation, el, forceUnit, rounded } from "../base/format.js";
 import { QUANTITIES, SOURCES } from "../base/labels.js";
 
 const columns = ({ unit, show }) => [
-  [unit, (a) => show(a.rmse_n)], ["%", (a) => kept(a.rmse_percent)], ["r", (a) => correlation(a.correlation)],
+  [unit, (a) => show(a.rmse_n)], ["%", (a) => rounded(a.rmse_percent)], ["r", (a) => correlation(a.correlation)],
 ];
 
 const number = (text, first = false) => el("td", { className: first ? "n first" : "n" }, text);
@@ -15,7 +15,7 @@ export function fillQuantities(result) {
     ...Object.keys(QUANTITIES).filter((name) => there.has(name)).map((name) => new Option(QUANTITIES[name], name)));
 }
 
-// Agreements of a quantity as recording -> model -> agreement; the global model without the recording is one more.
+// Agreements of a quantity as recording -> model -> agreement; the global model fitted without the recording is a model too.
 function byRecording(result, quantity) {
   const all = [...result.agreements, ...result.left_out.map((agreement) => ({ ...agreement, source: "left_out" }))];
   const found = new Map();
@@ -36,7 +36,7 @@ export function drawAgreement(result, dataset, quantity) {
   drawAverages(rows, models);
   $("agreement-note").textContent = "RMS difference over all samples of the whole beats, in the unit of force and in per cent of the range of the recorded mean beat; "
     + "r: correlation."
-    + (models.includes("left_out") ? " Left out: the global model fitted without the recording that it predicts." : "");
+    + (models.includes("left_out") ? " Left out: the global model fitted without the recording." : "");
 }
 
 function use(recording, fitted) {

@@ -1,24 +1,26 @@
 // Forces over the beat, recorded and modelled, and their power spectra.
 
 import { $, forceUnit, significant } from "../base/format.js";
-import { axis, CONFIG, layout, legend, PHASE, plotly, theme } from "../base/plots.js";
+import { axis, draw, PHASE, zeroAxis } from "../base/plots.js";
 import { QUANTITIES, SOURCES } from "../base/labels.js";
 
 const HARMONICS = 8;
 const DECADES = 6;
 
-// Draw the quantities ``names`` (at most two); the answer is a note on what is seen.
+// Draw the quantities ``names`` (at most two); returns a note on the charts.
 export async function drawBeats(forces, names, about) {
-  const Plotly = await plotly();
-  const look = theme();
+  const drawn = [];
   for (const k of [0, 1]) {
     for (const figure of ["beat", "spectrum"]) $(`${figure}-${k}`).parentElement.hidden = !names[k];
     if (!names[k]) continue;
     $(`beat-${k}-title`).textContent = `${QUANTITIES[names[k]]}: mean beat`;
     $(`spectrum-${k}-title`).textContent = `${QUANTITIES[names[k]]}: power spectrum`;
-    drawBeat(Plotly, $(`beat-${k}`), look, forces, names[k]);
-    drawSpectrum(Plotly, $(`spectrum-${k}`), look, forces, names[k], about.flap_frequency_hz);
+    drawn.push(draw($(`beat-${k}`), (look) => beat(look, forces, names[k])));
+    const spectra = Boolean(forces.recorded_spectrum_n2_hz[names[k]]);
+    $(`spectrum-${k}`).parentElement.hidden = !spectra;
+    if (spectra) drawn.push(draw($(`spectrum-${k}`), (look) => spectrum(look, forces, names[k], about.flap_frequency_hz)));
   }
+  await Promise.all(drawn);
   const differences = names.map((name) => meanBeatDifference(forces, name));
   const { unit, show } = forceUnit(differences);
   const off = names.map((name, k) => `${name} ${show(differences[k])} ${unit}`).join(", ");
@@ -35,10 +37,10 @@ function meanBeatDifference(forces, name) {
   return Math.sqrt(recorded.reduce((sum, value, i) => sum + (value - modelled[i]) ** 2, 0) / recorded.length);
 }
 
-// A beat has no last instant: its end is the start of the next.
+// Close the curve: the end of a beat is the start of the next.
 const closed = (values) => [...values, values[0]];
 
-function drawBeat(Plotly, node, look, forces, name) {
+function beat(look, forces, name) {
   const x = [...forces.phase, forces.phase[0] + 1];
   const recorded = closed(forces.recorded_n[name]);
   const spread = forces.spread_n[name] && closed(forces.spread_n[name]);
@@ -54,18 +56,14 @@ function drawBeat(Plotly, node, look, forces, name) {
     curve(SOURCES[forces.source].toLowerCase(), closed(forces.modelled_n[name]), { color: look.accent, width: 3.5 }),
     curve("recorded", recorded, { color: look.ink, width: 1.25 }),
   ];
-  return Plotly.react(node, traces, layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, hovermode: "x unified", ...legend(look),
-    xaxis: axis(look, { title: { text: "t*, beats; 0: wings closest", standoff: 6 }, showgrid: false, ...PHASE }),
-    yaxis: axis(look, { title: { text: "N", standoff: 6 }, zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 }),
-  }), CONFIG);
+  return {
+    traces, hovermode: "x unified", showlegend: true, xaxis: axis(look, "t*, beats; 0: wings closest", { showgrid: false, ...PHASE }), yaxis: zeroAxis(look, "N"),
+  };
 }
 
-// The model repeats beat by beat, so all its power is at harmonics: dots there, not a line through nothing.
-function drawSpectrum(Plotly, node, look, forces, name, frequency) {
+// The model is periodic: all its power is at harmonics of the flap frequency, drawn as dots.
+function spectrum(look, forces, name, frequency) {
   const recorded = forces.recorded_spectrum_n2_hz[name];
-  node.parentElement.hidden = !recorded;
-  if (!recorded) return null;
   const modelled = forces.modelled_spectrum_n2_hz[name];
   const seen = forces.frequency_hz.map((hz, i) => i).filter((i) => forces.frequency_hz[i] > 0 && forces.frequency_hz[i] <= (HARMONICS + 0.5) * frequency);
   const highest = Math.max(...seen.map((i) => Math.max(recorded[i], modelled[i])));
@@ -84,11 +82,8 @@ function drawSpectrum(Plotly, node, look, forces, name, frequency) {
       marker: { color: look.accent, size: 8 }, hovertemplate: text(label) },
   ];
   const top = Math.log10(highest);
-  return Plotly.react(node, traces, layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look),
-    xaxis: axis(look, { title: { text: "Hz", standoff: 6 }, showgrid: false, range: [0, (HARMONICS + 0.5) * frequency] }),
-    yaxis: axis(look, {
-      title: { text: "N²/Hz", standoff: 6 }, type: "log", range: [top - DECADES, top + 0.3], dtick: 2, exponentformat: "power",
-    }),
-  }), CONFIG);
+  return {
+    traces, showlegend: true, xaxis: axis(look, "Hz", { showgrid: false, range: [0, (HARMONICS + 0.5) * frequency] }),
+    yaxis: axis(look, "N²/Hz", { type: "log", range: [top - DECADES, top + 0.3], dtick: 2, exponentformat: "power" }),
+  };
 }

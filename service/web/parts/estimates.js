@@ -1,13 +1,13 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
-import { $, correlation, el, fixed, kept, plain, plural, significant } from "../base/format.js";
-import { axis, CONFIG, layout, legend, plotly, theme } from "../base/plots.js";
+import { $, correlation, el, fixed, rounded, plain, plural, significant } from "../base/format.js";
+import { axis, draw } from "../base/plots.js";
 
 const STRONG = 0.9;
 
 const names = (result) => result.estimates[0].coefficients.map((coefficient) => coefficient.name);
 
-// Estimates of one recording each, with its condition; an estimate of several has none.
+// Estimates with the recording they rest on; null for an estimate on several recordings.
 function conditions(result, dataset) {
   const found = new Map(dataset.recordings.map((recording) => [recording.name, recording]));
   return result.estimates.map((estimate) => ({
@@ -28,7 +28,7 @@ export function drawEstimates(result, dataset) {
   const axes = { "by-frequency": ["flap_frequency_hz", "angle_of_attack_deg", "flap frequency, Hz"],
     "by-pitch": ["angle_of_attack_deg", "flap_frequency_hz", "body pitch, deg"] };
   for (const [id, [over, other, title]] of Object.entries(axes)) {
-    drawOver($(id), result, alone, { over, other, title }).catch((error) => { $("estimates-note").textContent = error.message; });
+    draw($(id), (look) => chart(look, result, alone, { over, other, title })).catch((error) => { $("estimates-note").textContent = error.message; });
   }
 }
 
@@ -45,27 +45,25 @@ function drawTable(result, rows) {
 
 function valueCell(coefficient) {
   const low = coefficient.low_90;
-  const interval = low === null ? "not told" : `${fixed(low, 3)} to ${fixed(coefficient.high_90, 3)}`;
+  const interval = low === null ? "not identifiable" : `${fixed(low, 3)} to ${fixed(coefficient.high_90, 3)}`;
   return el("td", { className: "n" }, fixed(coefficient.value, 3), el("small", {}, ` ${interval}`));
 }
 
 function drawLaw(law) {
   $("law-part").hidden = !law;
   if (!law) return;
-  const error = (value) => (value === null ? "–" : `${kept(value, 2)} %`);
+  const error = (value) => (value === null ? "–" : `${rounded(value, 2)} %`);
   $("law").tBodies[0].replaceChildren(...law.genes.map((gene) => el("tr", {}, el("td", {}, gene.name),
     ...[gene.constant, gene.per_hz, gene.per_deg].map((value) => el("td", { className: "n" }, value === 0 ? "–" : significant(value, 3))),
     el("td", { className: "n" }, error(gene.largest_error_percent)), el("td", { className: "n" }, error(gene.left_out_error_percent)))));
   const range = ([low, high], unit) => `${significant(low)} to ${significant(high)} ${unit}`;
   $("law-note").textContent = `Fitted to ${plural(law.recordings.length, "recording")}, ${range(law.frequency_range_hz, "Hz")} and `
-    + `${range(law.pitch_range_deg, "deg")}. Largest error: from a local estimate. Left out: of one that the fit had not seen.`;
+    + `${range(law.pitch_range_deg, "deg")}. Largest error: largest difference from a local estimate. Error when left out: the same for estimates left out of the fit.`;
 }
 
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
 
-async function drawOver(node, result, rows, { over, other, title }) {
-  const Plotly = await plotly();
-  const look = theme();
+function chart(look, result, rows, { over, other, title }) {
   const genes = names(result);
   const x = rows.map((row) => row.recording[over]);
   const ends = [Math.min(...x), Math.max(...x)];
@@ -95,19 +93,17 @@ async function drawOver(node, result, rows, { over, other, title }) {
         arrayminus: found.map((one) => (one.low_90 === null ? 0 : one.value - one.low_90)) },
       text: rows.map((row) => plain(row.estimate.name)), hovertemplate: `%{text}: ${gene} %{y:.3f}<extra>estimate</extra>` });
     const height = 1 / genes.length;
-    axes[`yaxis${suffix}`] = axis(look, { domain: [1 - (k + 1) * height + 0.03, 1 - k * height - 0.02], title: { text: gene, standoff: 4 }, nticks: 4 });
+    axes[`yaxis${suffix}`] = axis(look, gene, { domain: [1 - (k + 1) * height + 0.03, 1 - k * height - 0.02], nticks: 4 });
   });
-  return Plotly.react(node, traces, layout(look, {
-    margin: { l: 10, r: 8, t: 30, b: 10 }, ...legend(look), ...axes,
-    xaxis: axis(look, { title: { text: title, standoff: 6 }, showgrid: false, anchor: `y${genes.length > 1 ? genes.length : ""}` }),
-  }), CONFIG);
+  const xaxis = axis(look, title, { showgrid: false, anchor: `y${genes.length > 1 ? genes.length : ""}` });
+  return { traces, showlegend: true, ...axes, xaxis };
 }
 
 export function fillEstimates(result) {
   $("estimate").replaceChildren(...result.estimates.map((estimate) => new Option(estimate.name, estimate.name)));
 }
 
-// A table, so that the values can be read, and by a screen reader too; the shade says the strength.
+// A table, so that the values can be read, also by a screen reader; the shade shows the strength.
 export function drawCorrelation(result, name) {
   const estimate = result.estimates.find((one) => one.name === name);
   const genes = estimate.coefficients.map((coefficient) => coefficient.name);
@@ -119,7 +115,7 @@ export function drawCorrelation(result, name) {
   const noise = estimate.noise_mn2.map((matrix) => significant(Math.sqrt(matrix[0][0]), 3));
   const ofEach = noise.length > 1 ? noise.map((value, i) => `${estimate.recordings[i]} ${value}`).join(", ") : noise[0];
   $("correlation-note").textContent = [
-    strong.length ? `Hard to tell apart: ${strong.join("; ")}.` : `No two coefficients are correlated beyond ${STRONG}.`,
+    strong.length ? `Strongly correlated: ${strong.join("; ")}.` : `No two coefficients are correlated beyond ${STRONG}.`,
     `Standard deviation of the residuals of the first fitted force: ${ofEach} mN.`,
     ...estimate.remarks.map((remark) => `Note: ${remark}.`),
   ].join(" ");

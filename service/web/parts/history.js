@@ -1,18 +1,18 @@
-// Fitness by generation: best and mean on a log axis, with the boundaries of the stages.
+// Chart of the fitness by generation: best and mean on a log axis, with the boundaries of the stages.
 
 import { mm, plain, significant, withForceUnit } from "../base/format.js";
-import { axis, CONFIG, layout, plotly, theme } from "../base/plots.js";
+import { axis, draw } from "../base/plots.js";
 import { newtons } from "../base/labels.js";
 
 const GAP = { sequence: null, best: null, mean: null };
-const SIDE_BY_SIDE = 3; // stages whose names fit over the figure; of more, they stand upright
+const SIDE_BY_SIDE = 3; // stages whose names fit above the chart; more are written vertically
 const UNDER_NAMES = 0.78;
 const LONGEST_UPRIGHT = 9;
-const FEW = 12; // points of a stage, each worth a dot
+const FEW = 12; // points of a stage up to which each has a dot
 const MOST_TICKS = 10;
 const FEWEST_TICKS = 3;
 const EVEN_TICKS = 8; // at most; of steps of 1, 2 and 5 at least three fall into the range
-const NARROWEST = 0.02; // decades left free at either end: a flat line stands in the middle
+const NARROWEST = 0.02; // decades left free at either end, at least
 
 // "test-1, Gauss-Newton" is named by its recording, unless it finishes a search on the same one.
 function stageLabel(name, stages, upright) {
@@ -28,17 +28,17 @@ const MARKERS = {
 };
 const FORCES = {
   unit: "N²", hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${plain(item.stage)}: genes moved by ${significant(item.diversity, 2)} of their range`,
-  about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weighs recordings and axes by their noise, so that the sum need not fall every time.",
+  about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weights recordings and axes by their noise, so this sum can rise.",
 };
 
 export const aboutHistory = (forces) => (forces ? FORCES : MARKERS).about;
 
-export async function drawHistory(node, items, forces = false) {
+export const drawHistory = (node, items, forces = false) => draw(node, (look) => chart(look, items, forces));
+
+function chart(look, items, forces) {
   const shown = forces ? FORCES : MARKERS;
-  const Plotly = await plotly();
-  const look = theme();
   const x = items.map((item) => item.sequence);
-  // The stages sum over different recordings: a line across their boundary would compare what cannot be compared.
+  // Stages sum over different recordings, so their values are not comparable: no line joins them.
   const points = items.flatMap((item, i) => (i && items[i - 1].stage !== item.stage ? [GAP, item] : [item]));
   const boundaries = items.filter((item, i) => i === 0 || items[i - 1].stage !== item.stage);
   const stages = new Set(boundaries.map((item) => item.stage));
@@ -50,16 +50,14 @@ export async function drawHistory(node, items, forces = false) {
     hovertemplate: `%{y:.4g} ${shown.unit}${labels ? "%{text}" : ""}<extra>${name}</extra>`,
   });
   const traces = [
-    // A Gauss-Newton iteration has one individual, so no mean beside it.
+    // A Gauss-Newton iteration has one individual and no mean.
     line("mean", (item) => (item.mean === item.best ? null : item.mean), look.faint, 1.5),
     line("best", (item) => item.best, look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
   ];
-  const figure = layout(look, {
-    margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
-    xaxis: axis(look, { title: { text: "generation", standoff: 8 }, showgrid: false, range: span(x), ...wholeTicks(x) }),
-    yaxis: axis(look, {
-      title: { text: `fitness, ${shown.unit}`, standoff: 8 }, type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)),
-    }),
+  return {
+    traces, margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
+    xaxis: axis(look, "generation", { showgrid: false, range: span(x), ...wholeTicks(x) }),
+    yaxis: axis(look, `fitness, ${shown.unit}`, { type: "log", domain: [0, upright ? UNDER_NAMES : 1], ...logTicks(traces.flatMap((trace) => trace.y)) }),
     shapes: boundaries.slice(1).map((item) => ({
       type: "line", x0: item.sequence - 0.5, x1: item.sequence - 0.5, yref: "paper", y0: 0, y1: 1,
       line: { color: look.quiet, width: 1, dash: "dot" },
@@ -71,8 +69,7 @@ export async function drawHistory(node, items, forces = false) {
       })),
       ...endLabels(traces),
     ],
-  });
-  return Plotly.react(node, traces, figure, CONFIG);
+  };
 }
 
 const span = (x) => (x.length > 1 ? [x[0] - 0.5, x.at(-1) + 0.5] : [0.5, 2.5]);
@@ -87,13 +84,13 @@ const multiples = (step, low, high) => {
   return Array.from({ length: Math.max(Math.floor(high / step + 1e-9) - first + 1, 0) }, (_, i) => (first + i) * step);
 };
 
-// Generations are counted: no tick between two of them.
+// Ticks at whole generations only.
 const wholeTicks = (x) => {
   const step = Math.max(1, niceStep(Math.max(x.at(-1) - x[0], 1) / MOST_TICKS));
   return { tickmode: "array", tickvals: multiples(step, x[0], x.at(-1)), tickformat: "d" };
 };
 
-// Range and ticks of a log axis: at powers of ten; at 1, 2, 5 where there are too few of those; or evenly in a narrow range.
+// Range and ticks of a log axis: at powers of ten; also at 2 and 5 where these are too few; evenly in a narrow range.
 function logTicks(values) {
   const known = values.filter((value) => value > 0);
   if (!known.length) return {};
@@ -110,7 +107,7 @@ function logTicks(values) {
   return { range, tickmode: "array", tickvals: ticks, ticktext: ticks.map((tick) => significant(tick, digits)) };
 }
 
-// The name stands at the end of its line, so that nobody has to look it up in a legend.
+// Names at the ends of the lines instead of a legend.
 function endLabels(traces) {
   const labels = traces.map(endLabel).filter(Boolean);
   const known = traces.flatMap((trace) => trace.y).filter((value) => value > 0).map(Math.log10);

@@ -1,10 +1,10 @@
-// What acts inside the wing and on it, over one beat: torques, powers, forces, bending moments, energies.
+// Loads over one beat: torques, powers, forces, bending moments, energies.
 
 import { get, part } from "../base/api.js";
-import { $, el, kept, significant } from "../base/format.js";
+import { $, keyNumber, rounded, significant } from "../base/format.js";
 import { lines } from "../base/plots.js";
 
-const ASKED = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
+const OUTPUTS = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
 
 const CUTS_SHOWN = 6;
 
@@ -14,7 +14,7 @@ let request = 0;
 let loads = null;
 let visible = false;
 
-// A simulation is paid for only when somebody looks.
+// Loads are simulated only when their section is visible.
 export function setUpLoads() {
   new IntersectionObserver((entries) => {
     visible = entries.at(-1).isIntersecting;
@@ -45,7 +45,7 @@ async function load() {
   const { run, recording, genome, key } = wanted;
   shown = key;
   if (!loads) $("loads-note").textContent = "Simulating…";
-  const query = new URLSearchParams([["recording", recording], ["genome", genome], ...ASKED.map((name) => ["outputs", name])]);
+  const query = new URLSearchParams([["recording", recording], ["genome", genome], ...OUTPUTS.map((name) => ["outputs", name])]);
   try {
     const answer = await get(`runs/${part(run.id)}/loads?${query}`);
     if (mine !== request) return;
@@ -60,21 +60,19 @@ async function load() {
   }
   const off = Math.abs(loads.outputs.averages.closing_error_percent);
   $("loads-note").textContent = `${recording}, ${genome} genome, one periodic beat; phase 0 is where the wing crosses the horizontal `
-    + `upwards. Energy balance closes to ${kept(off, 2)} % of what enters.`;
+    + `upwards. The energy balance closes to ${rounded(off, 2)} % of the supplied energy.`;
   $("loads").hidden = false;
   drawAverages(loads.outputs.averages);
   draw();
 }
 
 function drawAverages(means) {
-  const cell = (label, value, unit) =>
-    el("div", {}, el("dt", {}, label), el("dd", {}, significant(value, 3), el("small", {}, ` ${unit}`)));
+  const cell = (label, value, unit) => keyNumber(label, significant(value, 3), unit);
   const { front, rear } = means.peak_motor_torque_n_m;
-  const peak = el("div", {}, el("dt", {}, "peak torque, front and rear motor, N m"),
-    el("dd", {}, `${significant(front, 2)}, ${significant(rear, 2)}`));
+  const peak = keyNumber("peak torque, front and rear motor, N m", `${significant(front, 2)}, ${significant(rear, 2)}`);
   $("loads-numbers").replaceChildren(
     cell("mean lift", means.lift_n, "N"), cell("mean thrust", means.thrust_n, "N"),
-    cell("supplied by both motors", means.supplied_w, "W"), cell("given to the air", means.to_air_w, "W"),
+    cell("supplied by both motors", means.supplied_w, "W"), cell("transferred to the air", means.to_air_w, "W"),
     cell("lost in the wing's dampers", means.dissipated_w, "W"), peak,
   );
 }
@@ -84,7 +82,7 @@ async function draw() {
   const torque = out.motor_torque_n_m;
   const power = out.power_w;
   const [kinetic, elastic, gravitational] = ["kinetic", "elastic", "gravitational"].map((kind) => out.energy_j[kind]);
-  // As many cuts as can be told apart, the root among them.
+  // A few evenly spaced sections, including the root.
   const stride = Math.ceil(out.sections.length / CUTS_SHOWN);
   const cuts = out.sections.filter((_, s) => s % stride === 0).map((section) => [
     section.name === "root" ? "root" : `${significant(section.span_mm, 3)} mm`, section.moment_n_m.map((moment) => moment[0]),

@@ -1,7 +1,7 @@
-// Forces that the global model of a run predicts for a condition that somebody asks for.
+// Prediction of the global model for a given condition.
 
 import { part, postJson } from "../base/api.js";
-import { $, el, forceUnit, significant } from "../base/format.js";
+import { $, forceUnit, keyNumber, significant } from "../base/format.js";
 import { lines } from "../base/plots.js";
 import { showErrors, showRemarks } from "../base/form_errors.js";
 import { NO_NUMBER } from "../pages/submit.js";
@@ -24,8 +24,8 @@ export function showPrediction(next, result, dataset) {
   const law = result.global_model;
   $("prediction-form").hidden = !law;
   if (!law) {
-    $("prediction-note").textContent = "This run has no global model, from which the coefficients of another condition could follow. "
-      + "It takes local estimates under at least four conditions that differ in flap frequency and body pitch.";
+    $("prediction-note").textContent = "This run has no global model, so it cannot predict other conditions. "
+      + "A global model needs local estimates under at least four conditions with different flap frequency and body pitch.";
     return;
   }
   $("prediction-note").textContent = `Coefficients from the global model, forces of one beat, not low-passed. Fitted between `
@@ -46,7 +46,7 @@ export function redrawPrediction() {
   if (prediction) draw();
 }
 
-// The middle of what was fitted, as a start.
+// Initial values: the mean of the fitted conditions.
 function fill(recordings) {
   const form = $("prediction-form");
   const mean = (key) => recordings.reduce((sum, recording) => sum + recording[key], 0) / recordings.length;
@@ -81,12 +81,11 @@ async function predict() {
 
 function draw() {
   $("prediction").hidden = false;
-  const cell = (label, text, unit = "") => el("div", {}, el("dt", {}, label), el("dd", {}, text, unit && el("small", {}, ` ${unit}`)));
   const means = prediction.averages_n;
   const { unit, show } = forceUnit([means.lift, means.drag]);
   $("prediction-numbers").replaceChildren(
-    cell("mean lift", show(means.lift), unit), cell("mean drag", show(means.drag), unit),
-    ...Object.entries(prediction.coefficients).map(([name, value]) => cell(name, significant(value, 3))));
+    keyNumber("mean lift", show(means.lift), unit), keyNumber("mean drag", show(means.drag), unit),
+    ...Object.entries(prediction.coefficients).map(([name, value]) => keyNumber(name, significant(value, 3))));
   const { phase, lift_n: lift, drag_n: drag, x_n: x, z_n: z } = prediction;
   Promise.all([
     lines($("prediction-lift"), phase, [["lift", lift], ["drag", drag]], { unit: "N", x: "t*, beats; 0: wings closest" }),

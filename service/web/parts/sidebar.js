@@ -1,4 +1,4 @@
-// The lists of runs, diagnoses and datasets at the side.
+// The sidebar: newest runs, diagnoses and datasets.
 
 import { isFinal } from "../base/api.js";
 import { $, DASH, duration, el, plural, size, when } from "../base/format.js";
@@ -19,7 +19,7 @@ export const runName = (run) => run.name || `${modelOf(run)}, ${run.spec.mode}`;
 export function setBar(bar, run) {
   const percent = Math.round(100 * run.progress);
   bar.firstElementChild.style.width = `${percent}%`;
-  if (bar.role) bar.setAttribute("aria-valuenow", percent); // those of the lists only repeat what stands beside them
+  if (bar.role) bar.setAttribute("aria-valuenow", percent); // bars in the lists have no role: their text is beside them
   bar.classList.toggle("ended", isFinal(run) && run.state !== "SUCCEEDED");
 }
 
@@ -29,7 +29,7 @@ export function timeLeft(run) {
   return "";
 }
 
-// Replaced only when something changed, so that a focus or a press in the list survives the polling.
+// Replace the items only if they changed, so that polling does not interrupt a click, and restore the focus.
 function replace(list, items) {
   const fresh = el("ul", {}, ...items);
   if (list.dataset.shown === fresh.innerHTML) return;

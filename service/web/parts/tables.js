@@ -1,50 +1,48 @@
-// Tables of a run: numbers at the top, misfit by recording, genes.
+// Tables of a run: key numbers, misfit by recording, genes.
 
-import { $, el, forceUnit, kept, mm, plural, significant } from "../base/format.js";
+import { $, el, forceUnit, keyNumber, rounded, mm, plural, significant } from "../base/format.js";
 import { isForces, misfit, newtons } from "../base/labels.js";
 
 export function drawNumbers(run, result) {
-  const cell = (label, value, unit = "", main = false) =>
-    el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
   const { value, unit } = misfit(run);
   const what = isForces(run) ? "best so far, RMS difference" : "best so far, mean distance per marker";
-  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result, cell) : [
-    cell(what, value, unit, true),
-    cell("stage", run.stage ?? "–"),
-    cell("generations", String(run.generations)),
-    cell("evaluations", run.evaluations.toLocaleString("en")),
+  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result) : [
+    keyNumber(what, value, unit, true),
+    keyNumber("stage", run.stage ?? "–"),
+    keyNumber("generations", String(run.generations)),
+    keyNumber("evaluations", run.evaluations.toLocaleString("en")),
   ];
   $("numbers").replaceChildren(...cells);
 }
 
-function outcome(result, cell) {
+function outcome(result) {
   const judged = result.held_out_after_mm ?? result.after_mm;
   const cells = [
-    cell("before, fitted recordings", mm(result.before_mm), "mm"),
-    cell("after, fitted recordings", mm(result.after_mm), "mm", true),
+    keyNumber("before, fitted recordings", mm(result.before_mm), "mm"),
+    keyNumber("after, fitted recordings", mm(result.after_mm), "mm", true),
   ];
   if (result.held_out_after_mm !== null) {
-    cells.push(cell("before, held out", mm(result.held_out_before_mm), "mm"));
-    cells.push(cell("after, held out", mm(result.held_out_after_mm), "mm", true));
+    cells.push(keyNumber("before, held out", mm(result.held_out_before_mm), "mm"));
+    cells.push(keyNumber("after, held out", mm(result.held_out_after_mm), "mm", true));
   }
   if (result.noise_mm) {
-    cells.push(cell("floor: tracking noise alone", mm(result.noise_mm), "mm"));
-    cells.push(cell("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
+    cells.push(keyNumber("floor: tracking noise alone", mm(result.noise_mm), "mm"));
+    cells.push(keyNumber("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
   }
   return cells;
 }
 
-function forceOutcome(result, cell) {
+function forceOutcome(result) {
   const [before, after, heldBefore, heldAfter] = ["before_mn", "after_mn", "held_out_before_mn", "held_out_after_mn"]
     .map((key) => newtons(result[key]));
   const { unit, show } = forceUnit([before, after, heldBefore, heldAfter]);
   const cells = [
-    cell("before, RMS of the fitted forces", show(before), unit),
-    cell("after, RMS of the fitted forces", show(after), unit, true),
+    keyNumber("before, RMS of the fitted forces", show(before), unit),
+    keyNumber("after, RMS of the fitted forces", show(after), unit, true),
   ];
   if (heldAfter !== null) {
-    cells.push(cell("before, held out", show(heldBefore), unit));
-    cells.push(cell("after, held out, predicted", show(heldAfter), unit, true));
+    cells.push(keyNumber("before, held out", show(heldBefore), unit));
+    cells.push(keyNumber("after, held out, predicted", show(heldAfter), unit, true));
   }
   return cells;
 }
@@ -77,11 +75,11 @@ export function drawMisfit(result) {
   }
   $("misfit").tBodies[0].replaceChildren(...rows);
   $("misfit-note").textContent = "Grey: nominal genome. Coloured: best genome."
-    + (result.noise_mm ? ` Dotted: what tracking noise alone leaves, ${mm(result.noise_mm)} mm.` : "")
+    + (result.noise_mm ? ` Dotted: expected from tracking noise alone, ${mm(result.noise_mm)} mm.` : "")
     + result.remarks.map((remark) => ` Note: ${remark}.`).join("");
 }
 
-// ``means``: of a run on forces that has ended, whose genes stand as the means of its estimates.
+// ``means``: for a finished run on forces, whose values are the means of its estimates.
 export function drawGenes(genome, means = false) {
   $("genes-section").hidden = !genome;
   if (!genome) return;
@@ -90,10 +88,10 @@ export function drawGenes(genome, means = false) {
   $("genes").tBodies[0].replaceChildren(...genome.genes.map(geneRow));
   const searched = genome.genes.filter((gene) => gene.searched);
   const known = searched.filter((gene) => gene.identifiable);
-  const told = genome.final
-    ? `The data tell ${known.length} of ${plural(searched.length, "searched gene")}; hollow dots are those they cannot tell.`
-    : "Best so far; what the data can tell is judged at the end.";
-  $("genes-note").textContent = `${told} The grey tick is the nominal value.`;
+  const note = genome.final
+    ? `${known.length} of ${plural(searched.length, "estimated gene")} are identifiable; hollow dots: not identifiable.`
+    : "Best so far; identifiability is computed at the end.";
+  $("genes-note").textContent = `${note} The grey tick is the nominal value.`;
 }
 
 function geneRow(gene) {
@@ -102,7 +100,7 @@ function geneRow(gene) {
   return el("tr", { className: gene.searched ? (vague ? "vague" : "") : "off" },
     el("td", {}, name), el("td", { className: "n" }, significant(gene.nominal)),
     el("td", { className: "n" }, significant(gene.best)), el("td", {}, gene.unit === "1" ? "" : gene.unit),
-    el("td", { className: "wide" }, boundsBar(gene)), el("td", {}, told(gene)));
+    el("td", { className: "wide" }, boundsBar(gene)), el("td", {}, identifiable(gene)));
 }
 
 function boundsBar(gene) {
@@ -117,20 +115,20 @@ function boundsBar(gene) {
   return bar;
 }
 
-// Bounds that span decades are searched, and shown, logarithmically.
+// Wide bounds are searched, and drawn, on a logarithmic scale.
 function position({ lower, upper }, value) {
   const f = lower > 0 && upper / lower > 4 ? Math.log : (x) => x;
   return (f(value) - f(lower)) / (f(upper) - f(lower));
 }
 
-const CLEAR = 2; // standard errors from which a value differs from zero; the command line says it alike
+const SIGNIFICANT = 2; // standard errors from which a value differs from zero, as on the command line (cli/results.py)
 
-function told(gene) {
-  if (!gene.searched) return "not searched";
-  if (gene.identifiable === null) return "judged at the end";
+function identifiable(gene) {
+  if (!gene.searched) return "not estimated";
+  if (gene.identifiable === null) return "computed at the end";
   const absolute = gene.nominal === 0 ? gene.standard_error ?? null : null;
-  const percent = gene.standard_error_percent === null ? "" : `, ± ${kept(gene.standard_error_percent, 2)} %`;
+  const percent = gene.standard_error_percent === null ? "" : `, ± ${rounded(gene.standard_error_percent, 2)} %`;
   if (absolute === null) return `${gene.identifiable ? "yes" : "no"}${percent}`;
-  const said = Math.abs(gene.best) < CLEAR * absolute ? "not different from zero" : gene.identifiable ? "yes" : "no";
-  return `${said}, ± ${significant(absolute, 2)} ${gene.unit === "1" ? "" : gene.unit}`.trim();
+  const word = Math.abs(gene.best) < SIGNIFICANT * absolute ? "not different from zero" : gene.identifiable ? "yes" : "no";
+  return `${word}, ± ${significant(absolute, 2)} ${gene.unit === "1" ? "" : gene.unit}`.trim();
 }

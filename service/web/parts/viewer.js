@@ -1,7 +1,8 @@
-// The part of the page that shows the wing: recording, genome, phase, play.
+// The wing: choice of recording, genome and phase, and playback.
 
 import { get, part } from "../base/api.js";
 import { $, mm, significant } from "../base/format.js";
+import { recordingOptions } from "../base/labels.js";
 import { clearLoads, setUpLoads, showLoads } from "./loads.js";
 import { byPhase, drawBeat, drawWing, meanDistance } from "./wing.js";
 
@@ -10,7 +11,7 @@ const REFRESH_MS = 15000;
 
 let run = null;
 let tracks = null;
-let asked = "";
+let requested = "";
 let fetchedAt = 0;
 let timer = null;
 let request = 0;
@@ -35,7 +36,7 @@ export function showWing(next, dataset) {
     stop();
     tracks = null;
     clearLoads();
-    fillRecordings(dataset);
+    $("recording").replaceChildren(...recordingOptions(dataset));
   }
   const hasBest = run.generations > 0;
   document.querySelector("input[name=genome][value=best]").disabled = !hasBest;
@@ -43,7 +44,7 @@ export function showWing(next, dataset) {
   else if (restart) document.querySelector("input[name=genome][value=best]").checked = true;
   restart = !hasBest;
   const stale = run.state === "RUNNING" && genome() === "best" && Date.now() - fetchedAt > REFRESH_MS;
-  if (changed || ended || stale || key() !== asked) load({ quiet: !changed });
+  if (changed || ended || stale || key() !== requested) load({ quiet: !changed });
 }
 
 export function hideWing() {
@@ -57,19 +58,11 @@ export function redrawWing() {
   if (tracks) draw();
 }
 
-function fillRecordings(dataset) {
-  $("recording").replaceChildren(...dataset.recordings.map((recording) => {
-    const use = recording.held_out ? " (held out)" : "";
-    const option = new Option(`${recording.name}${use}`, recording.name);
-    return option;
-  }));
-}
-
 const key = () => `${run.id}/${$("recording").value}/${genome()}`;
 
 async function load({ quiet = false } = {}) {
   const mine = ++request;
-  asked = key();
+  requested = key();
   fetchedAt = Date.now();
   if (!quiet) $("wing-note").textContent = "Simulating…";
   const query = new URLSearchParams({ recording: $("recording").value, genome: genome() });
@@ -87,8 +80,8 @@ async function load({ quiet = false } = {}) {
   slider.max = tracks.phase.length - 1;
   const which = genome() === "best" ? (run.state === "SUCCEEDED" ? "best genome" : "best genome so far") : "nominal genome";
   $("wing-note").textContent = `Mean distance ${mm(meanDistance(tracks))} mm per marker on ${tracks.recording} with the ${which}. `
-    + (tracks.every > 1 ? `Shown is one instant in ${tracks.every}, of which that is the mean. ` : "")
-    + `Solved with ${tracks.numerics.steps_per_beat} steps a beat, estimated error ${significant(tracks.numerics.estimated_error_mm, 2)} mm.`;
+    + (tracks.every > 1 ? `Shown is, and the mean is over, one instant in ${tracks.every}. ` : "")
+    + `Solved with ${tracks.numerics.steps_per_beat} steps per beat, estimated error ${significant(tracks.numerics.estimated_error_mm, 2)} mm.`;
   draw();
   showLoads(run, tracks.recording, genome(), genome() === "best" ? run.generations : 0);
 }
@@ -107,7 +100,7 @@ async function draw() {
 
 function play() {
   if (!tracks) return;
-  // A strobe gives more frames than a screen can draw in a beat.
+  // Stroboscopic recordings have more frames than can be drawn in a beat.
   const stride = Math.ceil(tracks.phase.length / 45);
   const step = () => {
     $("phase").value = (Number($("phase").value) + stride) % tracks.phase.length;

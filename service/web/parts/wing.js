@@ -1,12 +1,12 @@
-// Recorded over simulated markers: in 3-D at one phase, and their height over the beat.
+// Recorded and simulated markers: in 3-D at one phase, and their height over the beat.
 
 import { plain, significant } from "../base/format.js";
-import { axis, CONFIG, layout, plotly, theme } from "../base/plots.js";
+import { axis, draw, PHASE } from "../base/plots.js";
 
 const SHOWN = 4;
 const AXES = ["x aft, mm", "y span, mm", "z up, mm"];
 
-// Frames in order of phase: a strobe takes them from many beats.
+// Frames in order of phase: a stroboscopic recording takes them from many beats.
 export function byPhase(tracks) {
   const order = tracks.phase.map((_, i) => i).sort((a, b) => tracks.phase[a] - tracks.phase[b]);
   const pick = (list) => order.map((i) => list[i]);
@@ -57,9 +57,9 @@ function segments(recorded, simulated) {
   return points;
 }
 
-export async function drawWing(node, tracks, frame) {
-  const Plotly = await plotly();
-  const look = theme();
+export const drawWing = (node, tracks, frame) => draw(node, (look) => wing(look, node, tracks, frame));
+
+function wing(look, node, tracks, frame) {
   const recorded = tracks.recorded_mm[frame];
   const simulated = tracks.simulated_mm[frame];
   const points = (name, list, marker) => ({
@@ -80,21 +80,20 @@ export async function drawWing(node, tracks, frame) {
   });
   const [x, y, z] = tracks.extents ??= extents(tracks);
   const lengths = [x, y, z].map(([low, high]) => high - low);
-  // True to scale, and as large as the figure allows: its height sets the scale, so a narrow one needs a smaller box.
+  // To scale, as large as the chart allows: its height sets the scale, so a narrow chart needs a smaller box.
   const zoom = Math.min(1.6, (1.4 * node.clientWidth) / node.clientHeight) / Math.max(...lengths);
   const [rx, ry, rz] = lengths.map((length) => length * zoom);
-  const figure = layout(look, {
-    margin: { l: 0, r: 0, t: 24, b: 0 }, showlegend: true, uirevision: "camera",
+  return {
+    traces, margin: { l: 0, r: 0, t: 24, b: 0 }, showlegend: true, uirevision: "camera",
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemsizing: "constant", font: { color: look.ink } },
     scene: {
       aspectmode: "manual", aspectratio: { x: rx, y: ry, z: rz }, xaxis: box(0, x), yaxis: box(1, y), zaxis: box(2, z), uirevision: "camera", dragmode: "turntable",
       camera: { eye: { x: 1.5, y: -0.75, z: 0.7 }, projection: { type: "orthographic" } },
     },
-  });
-  return Plotly.react(node, traces, figure, CONFIG);
+  };
 }
 
-// A few markers from the root to the tip, those that were tracked best.
+// A few well-tracked markers from the root to the tip.
 export function chosen(tracks) {
   const count = (m) => tracks.recorded_mm.filter((frame) => isSeen(frame[m])).length;
   const seen = tracks.markers.map((_, m) => m).filter((m) => count(m) >= tracks.phase.length / 2);
@@ -104,9 +103,9 @@ export function chosen(tracks) {
   return Array.from({ length: SHOWN }, (_, i) => sorted[Math.round((i * (sorted.length - 1)) / (SHOWN - 1))]);
 }
 
-export async function drawBeat(node, tracks, frame) {
-  const Plotly = await plotly();
-  const look = theme();
+export const drawBeat = (node, tracks, frame) => draw(node, (look) => beat(look, tracks, frame));
+
+function beat(look, tracks, frame) {
   const markers = chosen(tracks).reverse();
   const traces = [];
   const axes = {};
@@ -124,7 +123,7 @@ export async function drawBeat(node, tracks, frame) {
       { ...common, y: height(tracks.simulated_mm), mode: "lines", name: "simulated",
         line: { color: look.accent, width: 2 }, hovertemplate: "%{y:.1f} mm<extra>simulated</extra>" },
     );
-    axes[`yaxis${suffix}`] = axis(look, { domain, title: { text: "z, mm", standoff: 4 }, nticks: 4 });
+    axes[`yaxis${suffix}`] = axis(look, "z, mm", { domain, nticks: 4 });
     annotations.push({
       text: `marker ${plain(tracks.markers[m])}, ${significant(tracks.simulated_mm[0][m][1], 3)} mm along the span`,
       xref: "paper", yref: "paper", x: 0, y: top - 0.045, xanchor: "left", yanchor: "bottom", showarrow: false,
@@ -132,13 +131,9 @@ export async function drawBeat(node, tracks, frame) {
     });
   });
   const now = tracks.phase[frame];
-  const figure = layout(look, {
-    margin: { l: 10, r: 8, t: 4, b: 10 }, annotations, ...axes,
-    xaxis: axis(look, {
-      title: { text: "phase of the beat", standoff: 6 }, range: [0, 1], dtick: 0.25, showgrid: false,
-      anchor: `y${markers.length > 1 ? markers.length : ""}`,
-    }),
+  return {
+    traces, margin: { l: 10, r: 8, t: 4, b: 10 }, annotations, ...axes,
+    xaxis: axis(look, "phase of the beat", { ...PHASE, showgrid: false, anchor: `y${markers.length > 1 ? markers.length : ""}` }),
     shapes: [{ type: "line", x0: now, x1: now, yref: "paper", y0: 0, y1: 1, line: { color: look.faint, width: 1 } }],
-  });
-  return Plotly.react(node, traces, figure, CONFIG);
+  };
 }

@@ -21,7 +21,7 @@ import typer
 from tests.service import toy
 from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
 from wingfit.cli import main as cli
-from wingfit.cli import runs
+from wingfit.cli import results
 from wingfit.cli.base import output
 from wingfit.cli.base.output import duration, mm, number
 from wingfit.cli.simulate import marker_distances
@@ -128,7 +128,7 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
     for empty in ("camera_shift,", ""):
         code, _, err = wingfit(*words[:-1], empty)
         assert (code, "leave the option out" in " ".join(err.replace("│", " ").split())) == (2, True)
-    assert "in parts of the mean chord; in genomes and results the gene is in m" in shown
+    assert "multiples of the mean chord; in genomes and results the gene is in m" in shown
     code, _, err = wingfit("simulate", "--dataset", dataset_id, "--with", "balance_offset")
     assert (code, "does not apply to a wing" in err) == (1, True)
 
@@ -136,14 +136,14 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
 def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     one: Any = {"name": "drive_harmonics.cos2", "nominal": 0.0, "best": 3.4e-5, "unit": "rad", "lower": -0.1}
     one |= {"upper": 0.1, "searched": True, "standard_error_percent": 0.64, "identifiable": True}
-    runs.genes([one | {"standard_error": 3.2e-5}])
+    results.genes([one | {"standard_error": 3.2e-5}])
     shown = capsys.readouterr().out
     assert "± 3.2e-05 rad" in shown
     assert "not different from zero" in shown
     assert "%" not in shown
-    assert runs.told(one | {"standard_error": 1.6e-5}) == "yes"
-    assert runs.told(one | {"standard_error": 3.2e-5, "nominal": 1e-3}) == "yes"
-    assert runs.told(one) == "yes", "an answer of before"
+    assert results.identifiable(one | {"standard_error": 1.6e-5}) == "yes"
+    assert results.identifiable(one | {"standard_error": 3.2e-5, "nominal": 1e-3}) == "yes"
+    assert results.identifiable(one) == "yes", "answers of earlier versions have no standard_error"
 
 
 def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: 
     code, out, _ = wingfit(*words, "-o", str(tracks))
     assert code == 0
     assert "recording slow: mean distance" in out
-    assert "solved with 144 steps a beat, estimated error 0.02 mm" in out
+    assert "solved with 144 steps per beat, estimated error 0.02 mm" in out
     assert "estimated error 0.1 mm" in wingfit(*words, "--accuracy-mm", "0.5")[1]
     rows = list(csv.DictReader(tracks.open()))
     assert len(rows) == 4 * 2
@@ -305,7 +305,7 @@ def test_ctrl_c_while_watching_leaves_the_run_going(server: ServerProcess, wingf
     _, err = watching.communicate(timeout=10)
     assert "calibrating" in first
     assert watching.returncode == 130
-    assert "goes on without you" in err
+    assert "continues on the server" in err
     assert "Traceback" not in err
     before = server.api.run(run_id)["generations"]
     server.api.until(run_id, lambda run: run["generations"] > before)

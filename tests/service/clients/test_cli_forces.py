@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from plotly.graph_objects import Figure
 
 from tests.service.clients.test_cli import wingfit
 from tests.service.processes import ServerProcess
 from tests.service.runs import force_data
-from wingfit.cli.base.rounding import correlation, force_unit, kept, with_unit
-from wingfit.cli.forces.plot import write_plot
+from wingfit.cli.base.rounding import correlation, force_unit, rounded, with_unit
+from wingfit.cli.forces.results import charts, write_forces
 from wingfit.client.client import Client, WingfitError
 from wingfit.records import load_dataset
 from wingfit.sim.virtual_rigs.balance import TRIALS, read_truth
@@ -127,7 +127,7 @@ def test_forces_as_table_csv_and_page(wingfit: Wingfit, client: Client, run_id: 
     assert {"recorded_x_n", "spread_z_n"} <= set(rows[0])
     text = page.read_text()
     assert "lift, spectrum" in text
-    assert "<script src=" not in text
+    assert "<script" not in text
     assert "between beats" in text
     assert json.loads(wingfit("runs", "forces", run_id, "--json")[1]) == client.forces(run_id)
     assert wingfit("runs", "forces", run_id, "--source", "best")[0] == 2
@@ -201,7 +201,7 @@ def test_a_balance_campaign_is_written_with_its_truth(wingfit: Wingfit, tmp_path
 
 
 def test_forces_of_any_size_keep_three_digits() -> None:
-    assert [kept(v) for v in (None, 0.0, -0.0, 0.05, 12.0, 9.996, 385051.8)] == [
+    assert [rounded(v) for v in (None, 0.0, -0.0, 0.05, 12.0, 9.996, 385051.8)] == [
         "–", "0", "0", "0.0500", "12.0", "10.0", "385052",
     ]  # fmt: skip
     assert [with_unit(v) for v in (5e-5, 0.0312, -0.9, 385051.8, 0.0)] == [
@@ -214,25 +214,16 @@ def test_forces_of_any_size_keep_three_digits() -> None:
     ]  # fmt: skip
 
 
-def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    drawn: list[Figure] = []
-
-    def caught(figure: Figure, **_: object) -> str:
-        drawn.append(figure)
-        return ""
-
-    monkeypatch.setattr(Figure, "to_html", caught)
+def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(tmp_path: Path) -> None:
     phase, recorded, spread = [0.0, 0.5], {"x": [1.0, 3.0]}, {"x": [0.1, 0.2]}
     spectra = {"frequency_hz": [0.0, 1.0, 2.0], "recorded_spectrum_n2_hz": {"x": [9.0, 1e-2, 1e-5]}}
     answer: Any = {"recording": "r", "source": "local", "phase": phase, "recorded_n": recorded, "spread_n": spread}
     answer |= {"modelled_n": {"x": [1.0, 2.0]}, "modelled_spectrum_n2_hz": {"x": [9.0, 1e-3, 1e-36]}, **spectra}
-    write_plot(answer, tmp_path / "plot.html")
-    (figure,) = drawn
-    assert list(figure.data[0].y) == pytest.approx([1.1, 3.2, 2.8, 0.9])
-    assert list(figure.data[0].x) == [0.0, 0.5, 0.5, 0.0]
-    assert list(figure.layout.yaxis2.range) == pytest.approx([-10, -1.7])
-    assert figure.layout.yaxis2.exponentformat == "power"
-    write_plot(answer | {"spread_n": {}}, tmp_path / "plot.html")
-    assert [trace.name for trace in drawn[1].data] == ["recorded", "modelled", "recorded", "modelled"]
+    beat, spectrum = charts(answer)
+    assert [list(edge) for edge in beat.curves[0].band] == [pytest.approx([0.9, 2.8]), pytest.approx([1.1, 3.2])]
+    assert [one.name for one in charts(answer | {"spread_n": {}})[0].curves] == ["recorded", "modelled"]
+    assert [list(one.y) for one in spectrum.curves] == [[1e-2, 1e-5], [1e-3, 1e-36]], "without the mean"
+    write_forces(answer, None, tmp_path / "plot.html")
+    text = (tmp_path / "plot.html").read_text()
+    ticks = [float(tick.replace("\u2212", "-")) for tick in re.findall(r">(1e\u2212\d+|0\.\d+)</text>", text)]
+    assert min(ticks) == 1e-10, "eight decades are shown"

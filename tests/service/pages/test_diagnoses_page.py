@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 
-from tests.service.pages.browsing import DRAWN, Seen
+from tests.service.pages.browsing import Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
@@ -40,36 +39,27 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     seen.wait(TEXT.format("diagnosis-progress") + ".includes('testing every effect')")
     assert seen.page.is_visible("#diagnosis-actions [data-action=cancel]")
     assert seen.page.is_hidden("#run")
-    seen.wait(TEXT.format("verdict") + " === 'named'")
-    assert "The hinge is off its place" in seen.page.inner_text("#diagnosis-summary")
+    seen.wait("document.getElementById('report').shadowRoot?.querySelector('h1')")
     diagnosis = server.api.get("/v1/diagnoses")["items"][0]
     finding = server.api.get(f"/v1/diagnoses/{diagnosis['id']}/finding")
-    for figure in ("markers-map", "phases-map", "missing-map", "overlay-plot"):
-        seen.wait(DRAWN.format(figure, 0))
-    assert seen.data("markers-map", 1, "x") == pytest.approx([1e3 * one["y"] for one in finding["markers"]])
-    before, after = (np.multiply(1e3, finding["phase_map"][name]) for name in ("before", "after"))
-    np.testing.assert_allclose(seen.data("phases-map", 0, "z"), before)
-    seen.page.check("input[name=stage][value=after]", force=True)
-    seen.wait(f"document.getElementById('phases-map').data[0].z[1][1] === {float(after[1][1])!r}")
-    np.testing.assert_allclose(seen.data("missing-map", 0, "z"), finding["missing"][0]["values"])
-    phases = finding["overlays"][0]["phase"]
-    assert seen.data("overlay-plot", 0, "x") == sorted(phases), "samples in the order of their phases"
-    assert seen.data("overlay-plot", 0, "y") == pytest.approx([1.0, 2.0, 3.0])
-    assert [row[0] for row in seen.rows("chances")] == list(finding["probabilities"])
-    ranked = seen.rows("ranking")
-    assert ranked[0][0].startswith("Hinge off its place actuation")
-    assert ranked[0][1] == "90 %"
-    assert seen.page.locator("#ranking tr.named").count() == 1
-    assert seen.rows("before-after")[0][:4] == ["slow", "fitted", "2 mm 1.8 to 2.2", "0.5 mm 0.45 to 0.55"]
-    assert seen.rows("found-genes")[0][:3] == ["hinge_offset.z", "0.004", "0.0038 to 0.0042"]
-    assert "would differ by 5 times" in seen.page.inner_text("#advice")
-    assert "Power of flap frequency with which it grows: 2.0 (1.8 to 2.2)" in seen.page.inner_text("#where-words")
+    shown = seen.page.locator("#report")
+    assert "verdict: named" in shown.locator(".over").inner_text()
+    assert "The hinge is off its place" in shown.locator("h1 + p").inner_text()
+    assert shown.locator("circle.marker").count() == 2 * len(finding["markers"]), "before and after"
+    assert shown.locator("li.named h3").inner_text().startswith("Hinge off its place")
+    assert any("would differ by 5 times" in words for words in shown.locator("strong").all_inner_texts())
+    # The report's own style is applied, in which markers have the colours of the map and hatches their pattern.
+    colour = "(node) => getComputedStyle(node).fill"
+    assert shown.locator("circle.marker").first.evaluate(colour) != shown.locator("circle.marker").last.evaluate(colour)
+    assert "hatch" in shown.locator(".legend .faint").first.evaluate(colour)
+    levels = shown.locator("h1, h2, h3").evaluate_all("(all) => all.map((one) => one.ariaLevel - one.tagName[1])")
+    assert set(levels) == {2}, "headings continue those of the page"
     with seen.page.expect_popup() as opened:
         seen.page.click("#report-link")
     report = opened.value
-    assert "The hinge is off its place" in report.locator("p").inner_text()
+    assert "The hinge is off its place" in report.locator("h1 + p").inner_text()
     # The report's own style is applied: its policy lets that in, and nothing else.
-    assert report.locator("p").evaluate("(node) => getComputedStyle(node).color") == "rgb(0, 128, 128)"
+    assert report.locator(".over").evaluate("(node) => getComputedStyle(node).marginTop") == "0px"
     report.close()
     seen.wait("document.querySelector('#newest-diagnoses .card').textContent.includes('named')")
     seen.page.on("dialog", lambda dialog: dialog.accept())
@@ -91,5 +81,5 @@ def test_a_run_is_diagnosed_from_its_best_genome_and_cancelled(seen: Seen, serve
     seen.wait(TEXT.format("diagnosis-name") + ".includes('cancelled')")
     (found,) = server.api.get(f"/v1/diagnoses?run_id={run}")["items"]
     assert (found["state"], len(found["spec"]["start"])) == ("CANCELLED", 2)
-    assert seen.page.is_hidden("#finding")
+    assert seen.page.evaluate("document.getElementById('report').shadowRoot.childNodes.length") == 0
     assert seen.errors == []

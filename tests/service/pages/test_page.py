@@ -75,7 +75,7 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert seen.page.locator("#genes tbody tr").count() == len(toy.TARGET)
     assert "yes" in seen.page.inner_text("#genes tbody tr:first-child")
     assert "solved to 0.1 mm" in seen.page.inner_text("#run-about")
-    assert "144 steps a beat, estimated error 0.02 mm" in seen.page.inner_text("#wing-note")
+    assert "144 steps per beat, estimated error 0.02 mm" in seen.page.inner_text("#wing-note")
     assert seen.page.locator(".cards li.current").count() == 1
     assert seen.errors == []
     assert seen.foreign == []

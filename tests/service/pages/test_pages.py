@@ -71,7 +71,7 @@ def test_all_runs_are_listed_filtered_and_compared(seen: Seen, dataset: dict[str
     assert seen.page.is_hidden("#listing-more")
     assert seen.page.is_disabled("#compare")
     seen.page.select_option("#listing-state", "FAILED")
-    seen.wait(f"{TEXT.format('listing-note')} === 'No runs like that.'")
+    seen.wait(f"{TEXT.format('listing-note')} === 'No runs match the filter.'")
     assert "state=FAILED" in seen.page.url
     seen.page.go_back()
     seen.wait(f"{ROWS.format('listing-table')} === 3")
@@ -173,12 +173,12 @@ def test_the_form_is_checked_while_one_types(seen: Seen, server: ServerProcess, 
     before = len(server.api.get("/v1/runs?limit=200")["items"])
     seen.show(f"dataset={dataset['id']}")
     seen.page.click("#dataset-run")
-    seen.wait(TEXT.format("submit-said") + ".includes('population 50')")
+    seen.wait(TEXT.format("submit-preview") + ".includes('population 50')")
     seen.page.fill("[name=population]", "2")
     seen.wait("document.querySelector('[name=population]').getAttribute('aria-invalid') === 'true'")
-    assert seen.page.inner_text("#submit-said") == ""
+    assert seen.page.inner_text("#submit-preview") == ""
     seen.page.fill("[name=population]", "20")
-    seen.wait(TEXT.format("submit-said") + ".includes('population 20')")
+    seen.wait(TEXT.format("submit-preview") + ".includes('population 20')")
     assert seen.page.is_hidden("#submit-errors")
     assert len(server.api.get("/v1/runs?limit=200")["items"]) == before, "nothing is submitted"
 
@@ -186,11 +186,11 @@ def test_the_form_is_checked_while_one_types(seen: Seen, server: ServerProcess, 
 def test_what_is_no_number_is_not_left_out(seen: Seen, dataset: dict[str, Any]) -> None:
     seen.show(f"dataset={dataset['id']}")
     seen.page.click("#dataset-run")
-    seen.wait(TEXT.format("submit-said") + ".includes('population 50')")
+    seen.wait(TEXT.format("submit-preview") + ".includes('population 50')")
     seen.page.click("[name=population]", click_count=3)
     seen.page.keyboard.type("1e999")
     seen.wait("document.querySelector('[name=population]').getAttribute('aria-invalid') === 'true'")
-    assert seen.page.inner_text("#submit-said") == ""
+    assert seen.page.inner_text("#submit-preview") == ""
     assert "not a number" in seen.page.inner_text("#submit-errors")
 
 
@@ -266,7 +266,7 @@ def test_nothing_stands_in_anyones_way(
         f"run={runs[0]}": DRAWN.format("beat", 1),
         "runs": f"{ROWS.format('listing-table')} > 0",
         f"dataset={dataset['id']}": DRAWN.format("conditions", 1),
-        f"diagnosis={diagnosis}": DRAWN.format("overlay-plot", 0),
+        f"diagnosis={diagnosis}": "document.getElementById('report').shadowRoot?.querySelector('h1')",
         f"compare={','.join(runs)}": DRAWN.format("compare-plot", 1),
         "effects=added_mass": "document.querySelectorAll('.effect').length > 0",
     }
@@ -293,15 +293,15 @@ def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path
     seen.wait("document.getElementById('submit-dialog').open")
     assert "from bench to verdict" in seen.page.inner_text("#submit-form [name=dataset_id] option:checked")
     seen.page.fill("#submit-form [name=name]", "first try")
-    seen.wait(TEXT.format("submit-said") + ".includes('first try')")
+    seen.wait(TEXT.format("submit-preview") + ".includes('first try')")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
     seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 90)
     seen.wait(f"{ROWS.format('misfit')} > 0")
     seen.page.click("#diagnose-run")
     seen.wait("location.hash.startsWith('#diagnosis=')")
-    seen.wait(TEXT.format("verdict") + " === 'named'", 30)
-    seen.wait(DRAWN.format("phases-map", 0))
+    seen.wait("document.getElementById('report').shadowRoot?.querySelector('svg[role=img]')", 30)
+    assert "verdict: named" in seen.page.inner_text("#report .over")
     assert "from the best genome of a run" in seen.page.inner_text("#diagnosis-about")
     diagnosis = seen.page.evaluate("location.hash").replace("#diagnosis=", "")
     for name, ending in (("csv", "-ranking.csv"), ("netcdf", ".nc"), ("json", ".json")):

@@ -155,7 +155,7 @@ def test_the_client(client: httpx.Client, api: Api) -> None:
 
 def test_a_line_for_people() -> None:
     how: NumericsAnswer = {"accuracy_mm": 0.1, "estimated_error_mm": 0.01963, "steps_per_beat": 144, "beats": 9}
-    assert solved(how) == "solved with 144 steps a beat, estimated error 0.02 mm"
+    assert solved(how) == "solved with 144 steps per beat, estimated error 0.02 mm"
     assert solved(how | {"estimated_error_mm": None}).endswith("error – mm")
 
 

@@ -83,7 +83,7 @@ def test_the_command_lists_what_a_backup_brings(copy: Path, tmp_path: Path) -> N
     done = CliRunner().invoke(commands, ["restore", str(copy), "--data", str(tmp_path / "new")])
     assert done.exit_code == 0, done.output
     listed = " ".join(done.stdout.split())
-    assert "API keys that are good in the backup: id name owner good for made key_" in listed
+    assert "valid API keys in the backup: id name owner scopes created key_" in listed
     assert "root root admin 20" in listed
     assert "ann ann read, write 20" in listed
     assert " old " not in listed
@@ -93,7 +93,7 @@ def test_the_command_lists_what_a_backup_brings(copy: Path, tmp_path: Path) -> N
     assert "--keep-keys" in said
     assert "wingfit keys create NAME --scope admin --data" in said
     kept = CliRunner().invoke(commands, ["restore", str(copy), "--data", str(tmp_path / "same"), "--keep-keys"])
-    assert "2 API keys of the backup are good in" in " ".join(kept.stderr.split())
+    assert "2 API keys of the backup are valid in" in " ".join(kept.stderr.split())
     assert good_keys(tmp_path / "same") == ["ann", "root"]
 
 
@@ -101,8 +101,8 @@ def test_a_backup_without_keys_and_data_says_so(tmp_path: Path) -> None:
     Database(tmp_path / "source").close()
     empty = snapshot(tmp_path / "source")
     done = CliRunner().invoke(commands, ["restore", str(empty), "--data", str(tmp_path / "new")])
-    assert "nobody: there is no data" in done.stdout
-    assert "brings no good API key" in done.stderr
+    assert "none: there is no data" in done.stdout
+    assert "has no valid API key" in done.stderr
 
 
 def test_names_in_a_backup_do_not_steer_a_terminal(copy: Path, tmp_path: Path) -> None:

@@ -1,0 +1,123 @@
+"""Options that several commands share, and the reading of their values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from wingfit.client.answers import CONDITION
+
+Url = Annotated[
+    str, typer.Option("--url", envvar="WINGFIT_URL", help="Address of the server.", rich_help_panel="Server")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the server's answer as JSON.")]
+JobId = Annotated[str, typer.Argument(help="Id, as the 'list' command prints it.")]
+DatasetOrPath = Annotated[
+    str | None, typer.Argument(help="Id of a dataset, or a folder, .zip or .nc file to upload first.")
+]
+
+Division = Annotated[
+    str | None, typer.Option(help="4, 11, 24, or number of bodies per strip, e.g. 3,3,3,2; default: 11.")
+]
+Accuracy = Annotated[
+    float | None, typer.Option(help="Largest error of a simulated marker in mm, 0.02 to 1; default: 0.1.")
+]
+Recordings = Annotated[list[str] | None, typer.Option("--recording", help="Fit only this recording; repeatable.")]
+Genes = Annotated[list[str] | None, typer.Option("--gene", help="Estimate only this gene; repeatable.")]
+BoundsFactor = Annotated[
+    float | None, typer.Option(help="Bounds of each gene: nominal value / factor to nominal value * factor.")
+]
+With = Annotated[
+    list[str] | None,
+    typer.Option("--with", help="Include these effects of 'wingfit effects', e.g. added_mass,hinge_offset."),
+]
+Preset = Annotated[str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; default: proposed.")]
+Without = Annotated[
+    list[str] | None, typer.Option(help="Vehicles: leave out this term, e.g. clap_and_peel; repeatable.")
+]
+Axes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--axis", help="Vehicles: fit this force axis, x or z; repeatable; default of runs: x, of diagnoses: all."
+    ),
+]
+LowPass = Annotated[
+    float | None, typer.Option(help="Vehicles: cut-off frequency; default: 3.2 x flap frequency; 0: no filter.")
+]
+PeelWidth = Annotated[
+    float | None, typer.Option(help="Vehicles: width, in beats, over which the end of the peel is smoothed.")
+]
+
+
+def names(words: list[str] | None, option: str) -> list[str] | None:
+    """Names in ``words``, each of which may hold several, separated by commas; None where there is none.
+
+    Hyphens count as underscores: clap-and-peel is understood.
+    """
+    listed = [name.strip().replace("-", "_") for word in words or [] for name in word.split(",")]
+    if "" in listed:
+        raise typer.BadParameter(
+            "a name is empty; use one comma between names, or leave the option out", param_hint=option
+        )
+    return listed or None
+
+
+def refuse(options: Mapping[str, object], why: str) -> None:
+    """Refuse those of ``options`` (name, value) that were given: they have no meaning here."""
+    for option, value in options.items():
+        if value not in (None, [], False):
+            raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
+
+
+def read_condition(words: list[str]) -> dict[str, float]:
+    """The quantities of a condition that ``name=value`` words set; the server checks the limits."""
+    values = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        if name not in CONDITION:
+            raise typer.BadParameter(f"{word}: the name must be one of {', '.join(CONDITION)}", param_hint="--at")
+        if not _is_number(value):
+            raise typer.BadParameter(f"{word}: give NAME=VALUE, such as airspeed_m_s=6", param_hint="--at")
+        values[name] = float(value)
+    return values
+
+
+def read_genome(words: list[str], option: str = "--genome") -> dict[str, float]:
+    """Gene values from ``name=value`` words and JSON files; later ones override earlier ones."""
+    values: dict[str, Any] = {}
+    for word in words:
+        name, equals, value = word.partition("=")
+        values |= {name: value} if equals else _read_genes(Path(word), option)
+    for name, value in values.items():
+        if not _is_number(value):
+            raise typer.BadParameter(f"{name}={value}: the value must be a number in SI units", param_hint=option)
+    return {name: float(value) for name, value in values.items()}
+
+
+def _read_genes(path: Path, option: str) -> dict[str, Any]:
+    """Read {name: value}, the output of 'runs genome --json', or the true genome that 'wingfit campaign' writes."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise typer.BadParameter(
+            f"{path}: {error.strerror}; give name=value or a JSON file", param_hint=option
+        ) from error
+    except ValueError as error:
+        raise typer.BadParameter(f"{path} is not JSON: {error}", param_hint=option) from error
+    if not isinstance(content, dict):
+        raise typer.BadParameter(f"{path} must hold {{name: value}}", param_hint=option)
+    if isinstance(content.get("genes"), list):
+        return {gene["name"]: gene["best"] for gene in content["genes"]}
+    return dict(content["genome"]) if isinstance(content.get("genome"), dict) else content
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        return False
+    return True

@@ -1,0 +1,157 @@
+"""What runs and diagnoses share: commands list, cancel, delete and export; following a job; uploading its dataset."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+import typer
+
+from wingfit.cli.base.files import check_file
+from wingfit.cli.base.options import AsJson, JobId, Url
+from wingfit.cli.base.output import duration, emit, moment, note, percent, progress, say, size, table
+from wingfit.client.client import DEFAULT_URL, Client, WingfitError
+from wingfit.client.transport import ENDINGS, Format
+
+INTERRUPTED = 130  # exit code after Ctrl-C
+STANDARD_OUTPUT = Path("-")
+FormatName = Annotated[
+    str, typer.Option("--format", help="json: everything; csv: a table; netcdf: series and maps, which needs a file.")
+]
+Output = Annotated[Path, typer.Option("--output", "-o", help="File to write to; default, or -: standard output.")]
+
+
+@dataclass(frozen=True)
+class JobKind:
+    """Words and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` take a job."""
+
+    name: str
+    plural: str
+    help: str
+    work: str
+    submit: str
+    outcome: str
+    outcome_of: Callable[[Any], str]
+    stage_of: Callable[[Any], str]
+    exported: str
+    find: Callable[..., list[Any]]
+    wait: Callable[[Client, str, Callable[[Any], None]], Any]
+    cancel: Callable[[Client, str], Any]
+    delete: Callable[[Client, str], None]
+    export: Callable[[Client, str, Format, Path], Path]
+
+
+def commands(kind: JobKind) -> typer.Typer:
+    """Commands list, cancel, delete and export, to which runs and diagnoses each add their own."""
+    app = typer.Typer(no_args_is_help=True, help=kind.help)
+    group = f"wingfit {kind.plural}"
+
+    def command(name: str, text: str, example: str) -> Callable[..., Any]:
+        return app.command(name, help=f"{text}\n\nExample: {group} {name} {example}")
+
+    @command("list", f"List the {kind.plural} on the server, the newest first.", "--state RUNNING")
+    def list_(
+        dataset: Annotated[str | None, typer.Option(help="Only those of this dataset id.")] = None,
+        state: Annotated[str | None, typer.Option(help="Only those in this state, e.g. RUNNING.")] = None,
+        url: Url = DEFAULT_URL,
+        as_json: AsJson = False,
+    ) -> None:
+        with Client(url) as client:
+            jobs = kind.find(client, dataset_id=dataset, state=state.upper() if state else None)
+        columns = ["id", "name", "state", ">progress", ">left", kind.outcome, "submitted"]
+        empty = f"no {kind.plural}; submit one: {kind.submit}"
+        emit(jobs, lambda jobs: table(columns, [_row(kind, job) for job in jobs], empty), as_json=as_json)
+
+    @command("cancel", f"Stop a {kind.name} for good; its results so far are kept.", "ID")
+    def cancel(job_id: JobId, url: Url = DEFAULT_URL) -> None:
+        with Client(url) as client:
+            say(state_of(kind, kind.cancel(client, job_id)))
+
+    @command("delete", f"Delete a {kind.name} that has ended, with its results.", "ID")
+    def delete(job_id: JobId, url: Url = DEFAULT_URL) -> None:
+        with Client(url) as client:
+            kind.delete(client, job_id)
+        say(f"{kind.name} {job_id} deleted")
+
+    @command("export", f"Write a {kind.name} to a file: {kind.exported}.", f"ID --format csv -o {kind.name}.csv")
+    def export(
+        job_id: JobId, format_name: FormatName = "json", output: Output = STANDARD_OUTPUT, url: Url = DEFAULT_URL
+    ) -> None:
+        _export(kind, job_id, format_name, output, url)
+
+    return app
+
+
+def _row(kind: JobKind, job: Any) -> list[object]:
+    progress = percent(job["progress"]), duration(job["eta_seconds"])
+    return [job["id"], job["name"] or "", job["state"], *progress, kind.outcome_of(job), moment(job["created_at"])]
+
+
+def state_of(kind: JobKind, job: Any) -> str:
+    """Kind, id and state of a job, in one line."""
+    return f"{kind.name} {job['id']} {job['state']}"
+
+
+def follow(client: Client, kind: JobKind, job_id: str) -> Any:
+    """Show the progress of a job until it ends, and return it; Ctrl-C ends the command and not the job."""
+    try:
+        with progress(kind.work) as report:
+            return kind.wait(
+                client, job_id, lambda job: report(job["progress"], job["eta_seconds"], kind.stage_of(job))
+            )
+    except KeyboardInterrupt:
+        note(
+            f"\n{kind.name} {job_id} continues on the server; follow it: 'wingfit {kind.plural} watch {job_id}', "
+            f"stop it: 'wingfit {kind.plural} cancel {job_id}'"
+        )
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def check_ended_well(kind: JobKind, job: Any) -> None:
+    """WingfitError for a job that failed or was cancelled."""
+    if job["state"] == "FAILED":
+        raise WingfitError(f"{kind.name} {job['id']} failed", job["error"] or "the server gives no reason")
+    if job["state"] == "CANCELLED":
+        raise WingfitError(f"{kind.name} {job['id']} was cancelled")
+
+
+def upload(client: Client, path: Path, name: str | None = None) -> Any:
+    """Upload a dataset with a progress bar and return it; a folder is zipped first."""
+    with progress("uploading") as report:
+        return client.upload_dataset(
+            path, name=name, on_bytes=lambda sent, total: report(sent / max(total, 1), note=size(total))
+        )
+
+
+def dataset_id(client: Client, dataset: str) -> str:
+    """The id of ``dataset``, which is uploaded first if it is a path."""
+    if not Path(dataset).exists():
+        return dataset
+    uploaded = upload(client, Path(dataset))
+    note(f"dataset {uploaded['id']} '{uploaded['name']}'")
+    return str(uploaded["id"])
+
+
+def _export(kind: JobKind, job_id: str, format_name: str, output: Path, url: str) -> None:
+    """Write an export in full or not at all, on standard output too."""
+    if format_name not in ENDINGS:
+        raise typer.BadParameter(f"{format_name}: must be one of {', '.join(ENDINGS)}", param_hint="--format")
+    if output != STANDARD_OUTPUT:
+        check_file(output, "--output", (ENDINGS[format_name],))
+    elif format_name == "netcdf":
+        raise typer.BadParameter("netcdf is not text; name a file, -o FILE.nc", param_hint="--output")
+    with Client(url) as client:
+        if output != STANDARD_OUTPUT:
+            kind.export(client, job_id, format_name, output)
+            note(f"{output}, {size(output.stat().st_size)}")
+            return
+        with TemporaryDirectory(prefix="wingfit-") as scratch:
+            path = kind.export(client, job_id, format_name, Path(scratch) / "export")
+            with path.open("rb") as stream:
+                sys.stdout.flush()
+                shutil.copyfileobj(stream, sys.stdout.buffer)

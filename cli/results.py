@@ -1,0 +1,77 @@
+"""The result of a run, printed: misfits and genes of a wing, coefficients of a vehicle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from wingfit.cli.base.output import interval, mm, number, remarks, say, table
+from wingfit.cli.forces.results import force_result
+from wingfit.client import answers as a
+
+SIGNIFICANT = 2.0  # standard errors from which a value differs from zero; the web page uses the same (parts/tables.js)
+
+
+def print_result(answer: Any) -> None:
+    """Print the result of a run on tracks or on forces."""
+    if answer["kind"] == "forces":
+        force_result(answer)
+        return
+    misfits(answer)
+    say("")
+    genes(answer["genes"])
+
+
+def genes(items: list[a.GeneInfo]) -> None:
+    """Print genes: nominal and estimated value, bounds, error, and whether the data identify them."""
+    columns = ["gene", ">nominal", ">best", "unit", "bounds", ">standard error", "identifiable"]
+    table(
+        columns,
+        [
+            [
+                gene["name"],
+                gene["nominal"],
+                gene["best"],
+                gene["unit"],
+                interval(gene["lower"], gene["upper"]),
+                _error(gene),
+                identifiable(gene),
+            ]
+            for gene in items
+        ],
+    )
+
+
+def misfits(answer: a.Result) -> None:
+    """Print the mean distance per marker before and after the calibration, mm."""
+    rows = [[one["name"], _use(one), mm(one["before_mm"]), mm(one["after_mm"])] for one in answer["recordings"]]
+    rows.append(["all fitted", "", mm(answer["before_mm"]), mm(answer["after_mm"])])
+    if answer["held_out_after_mm"] is not None:
+        rows.append(["all held out", "", mm(answer["held_out_before_mm"]), mm(answer["held_out_after_mm"])])
+    table(["mean distance per marker", "use", ">before mm", ">after mm"], rows)
+    if answer["noise_mm"] is not None:
+        say(f"expected from tracking noise alone: {mm(answer['noise_mm'])} mm")
+    remarks(answer["remarks"])
+
+
+def identifiable(gene: a.GeneInfo) -> str:
+    """Whether the data identify a gene, in words."""
+    if not gene["searched"]:
+        return "not estimated"
+    error = gene.get("standard_error")
+    if gene["nominal"] == 0 and error is not None and abs(gene["best"]) < SIGNIFICANT * error:
+        return "not different from zero"
+    return {True: "yes", False: "no", None: "not known yet"}[gene["identifiable"]]
+
+
+def _error(gene: a.GeneInfo) -> str:
+    """Standard error: in per cent of the value or, where the nominal value is zero, in the gene's unit."""
+    absolute, relative = gene.get("standard_error"), gene["standard_error_percent"]
+    if gene["nominal"] == 0 and absolute is not None:
+        return f"± {number(absolute, 2)} {gene['unit'] if gene['unit'] != '1' else ''}".strip()
+    return "–" if relative is None else f"± {number(relative, 2)} %"
+
+
+def _use(recording: a.RecordingResult) -> str:
+    if recording["held_out"]:
+        return "held out"
+    return "not fitted" if recording["stage"] is None else "fitted"

@@ -1,0 +1,102 @@
+"""A page of line charts as one HTML file, for the plots of the command line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.report.layout import document, figure, panels
+from wingfit.report.markup import Markup, tag
+from wingfit.report.svg import SERIES, Axis, area, axis, curve, dots, drawing, legend, x_axis, y_axis
+
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
+Values = Sequence[float] | npt.NDArray[np.float64]
+DECADES = 8  # shown of a logarithmic axis: smaller values are rounding errors
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Values ``y`` over ``x``, drawn as a line, as ``dots``, or as a ``band`` between its lower and upper ends."""
+
+    name: str
+    x: Values
+    y: Values
+    dots: bool = False
+    band: tuple[Values, ...] = ()
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves on common axes."""
+
+    title: str
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve]
+    logarithmic: bool = False
+
+
+def chart_page(title: str, charts: Sequence[Chart]) -> str:
+    """One HTML file with all ``charts`` that have values: no script, nothing loaded."""
+    figures = [_figure(chart) for chart in charts if any(map(_finite, chart.curves))]
+    return document(title, tag("main", tag("h1", title), panels(*figures, size="wide")))
+
+
+def _figure(chart: Chart) -> Markup:
+    across = axis([x for one in chart.curves for x, _ in _finite(one)], LEFT, RIGHT, room=0)
+    up = _y_axis(chart)
+    entries, drawn, colour = [], [], 0
+    for one in chart.curves:
+        kind = "band" if one.band else "points" if one.dots else f"s{colour % SERIES}"
+        colour += kind.startswith("s")
+        entries.append((kind, one.name))
+        drawn += _drawn(one, kind, across, up)
+    return figure(
+        chart.title,
+        drawing(
+            WIDTH,
+            BOTTOM + 34,
+            f"{chart.title}: {', '.join(one.name for one in chart.curves)}",
+            x_axis(across, TOP, BOTTOM, chart.x_label),
+            y_axis(up, LEFT, RIGHT, chart.y_label),
+            *drawn,
+        ),
+        legend(*entries),
+    )
+
+
+def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]:
+    if one.band:
+        low, high = ([(across.at(x), up.at(y)) for x, y in _pairs(one.x, edge)] for edge in one.band)
+        return [area([*low, *reversed(high)], "band")]
+    if one.dots:
+        return [dots([(across.at(x), up.at(y)) for x, y in _finite(one)], "points")]
+    pieces: list[list[tuple[float, float]]] = [[]]
+    for x, y in zip(one.x, one.y, strict=True):
+        if math.isfinite(y):
+            pieces[-1].append((across.at(x), up.at(y)))
+        elif pieces[-1]:
+            pieces.append([])  # a gap in the data is a gap in the curve
+    return [curve(piece, f"curve {kind}") for piece in pieces]
+
+
+def _y_axis(chart: Chart) -> Axis:
+    values = [y for one in chart.curves for edge in (one.band or (one.y,)) for _, y in _pairs(one.x, edge)]
+    if not chart.logarithmic:
+        return axis(values, BOTTOM, TOP)
+    highest = max(values)
+    if highest <= 0:
+        return axis(values, BOTTOM, TOP)
+    return Axis(highest / 10**DECADES, 2 * highest, BOTTOM, TOP, logarithmic=True)
+
+
+def _finite(one: Curve) -> list[tuple[float, float]]:
+    return _pairs(one.x, one.y)
+
+
+def _pairs(x: Values, y: Values) -> list[tuple[float, float]]:
+    return [(float(a), float(b)) for a, b in zip(x, y, strict=True) if math.isfinite(a) and math.isfinite(b)]
