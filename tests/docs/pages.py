@@ -26,7 +26,10 @@ PAGES = tuple(
 )
 
 # Pages none of whose blocks run, with the reason. Everything else is decided block by block.
-NOT_RUN = {"docs/deployment.md": "other machines, containers and clusters are needed"}
+NOT_RUN = {
+    "docs/deployment.md": "other machines, containers and clusters are needed",
+    "docs/security.md": "the fuzzer is not among the tools of development, and takes minutes",
+}
 
 
 @dataclass(frozen=True)
