@@ -112,6 +112,19 @@ def test_links_lead_to_files_and_headings_that_exist(page: str) -> None:
             assert anchor in _anchors(path.resolve().relative_to(ROOT).as_posix()), f"{page}: {link}"
 
 
+def test_the_lists_of_folders_and_pages_are_complete() -> None:
+    folders = {
+        path.parent.name for path in ROOT.glob("*/*") if path.suffix in (".py", ".md", ".yml") or path.is_symlink()
+    }
+    folders -= {name for name in folders if name.startswith((".", "build"))}
+    missing = [name for name in sorted(folders) if f"`{name}/`" not in _text("README.md")]
+    assert not missing, f"README.md, Folders, does not list {missing}"
+    listed = _text("docs/README.md")
+    pages = [page.removeprefix("docs/") for page in PAGES if page.startswith("docs/") and "/effects/" not in page]
+    missing = [page for page in pages if page != "README.md" and f"({page})" not in listed]
+    assert not missing, f"docs/README.md does not list {missing}"
+
+
 def _anchors(page: str) -> set[str]:
     """Anchors as code hosts make them of headings."""
     every = list(tokens(page))
@@ -122,7 +135,9 @@ def _anchors(page: str) -> set[str]:
 def test_every_block_is_run_or_checked_for_a_reason() -> None:
     every = [block for page in PAGES for block in blocks(page)]
     fences = [line for page in PAGES for line in _text(page).splitlines() if line.lstrip().startswith("```")]
-    assert len([block for block in every if block.language not in ("", "formula")]) == len(fences) / 2
+    assert len([block for block in every if block.language not in ("", "formula")]) == len(fences) / 2, (
+        "a fence has no language"
+    )
     command = re.compile(r"^\s*(\$ |wingfit |make |python |curl |docker |import )", re.MULTILINE)
     hidden = [block.place for block in every if block.language == "formula" and command.search(block.text)]
     assert not hidden, f"these blocks hold commands and need a fence with a language: {hidden}"
