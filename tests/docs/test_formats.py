@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-import re
-from collections.abc import Callable
 from decimal import Decimal
 from importlib import import_module
 from pathlib import Path
@@ -14,22 +11,22 @@ from typing import Any
 
 import pytest
 
+from tests.docs.pages import blocks
 from tests.records.malformed import YAML, error_of_zip, good_files, with_yaml, zipped
 from tests.records.vehicles import good_vehicle, vehicle_yaml
 from wingfit.records import FourBarDrive, LowPass, load_archive
 from wingfit.records import limits as limits_module
 from wingfit.records.description.schema import dataset_schema, schema_text
 from wingfit.records.description.yaml_text import read_yaml
-from wingfit.records.files.tracks import read_tracks
 from wingfit.records.limits import FORMAT_VERSION
 
 jsonschema: Any = import_module("jsonschema")
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "formats.md").read_text(encoding="utf-8")
 
 
-def block(language: str, number: int = 0) -> str:
-    return str(re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)[number])
+def block(file: str) -> str:
+    return next(block.text for block in blocks("docs/formats.md") if block.file == file)
 
 
 def plain(value: Any) -> Any:
@@ -41,14 +38,17 @@ def plain(value: Any) -> Any:
 
 
 def example() -> dict[str, bytes]:
-    tracks = block("csv").encode()
-    return {YAML: block("yaml").encode(), **{f"recordings/{n}-3hz.csv": tracks for n in ("vacuum", "tunnel")}}
+    tracks = block("falcon/recordings/vacuum-3hz.csv").encode()
+    return {
+        YAML: block("falcon/dataset.yaml").encode(),
+        **{f"recordings/{n}-3hz.csv": tracks for n in ("vacuum", "tunnel")},
+    }
 
 
 def vehicle_example() -> dict[str, bytes]:
-    forces = block("csv", 1).encode()
+    forces = block("hoverer/recordings/hover.csv").encode()
     files = {f"recordings/{name}.csv": forces for name in ("hover", "forward")}
-    return {YAML: block("yaml", 2).encode(), **files}
+    return {YAML: block("hoverer/dataset.yaml").encode(), **files}
 
 
 def test_the_published_schema_is_the_code_s() -> None:
@@ -136,34 +136,14 @@ def test_the_example_of_the_page_loads() -> None:
 
 
 def test_the_four_bar_of_the_page_loads() -> None:
-    text = block("yaml")
+    text = block("falcon/dataset.yaml")
     start, end = text.index("  drive:"), text.index("  estimates:")
-    files = {**example(), YAML: (text[:start] + block("yaml", 1) + text[end:]).encode()}
+    files = {**example(), YAML: (text[:start] + block("four-bar.yaml") + text[end:]).encode()}
     drive = load_archive(zipped(files), "page.zip").wing.drive
     assert drive == FourBarDrive(0.06, 0.012, 0.055, 0.03, -math.pi / 2)
 
 
-def test_the_converter_of_the_page_works(tmp_path: Path) -> None:
-    source, target = tmp_path / "xyzpts.csv", tmp_path / "out.csv"
-    with source.open("w", newline="") as file:
-        rows = [[f"pt{p}_{axis}" for p in (1, 2) for axis in "XYZ"], *([["1", "2", "3", "NaN", "NaN", "NaN"]] * 8)]
-        csv.writer(file).writerows(rows)
-    scope: dict[str, Any] = {}
-    exec(block("python"), scope)  # noqa: S102 - the page is ours
-    convert: Callable[[Path, Path], None] = scope["convert"]
-    convert(source, target)
-    tracks = read_tracks(target.read_bytes(), "out.csv", ["root", "tip"])
-    assert tracks.times[6] == 0.1
-    assert tracks.values[0, :3].tolist() == [0.001, 0.002, 0.003]
-    assert not (tracks.values[:, 3:] == tracks.values[:, 3:]).any()
-
-
-def test_the_errors_of_the_page_are_the_real_ones() -> None:
-    shown = [line for line in PAGE.splitlines() if line.startswith("dataset.yaml, line")]
-    assert str(error_of_zip(zipped(with_yaml("chord_m: 0.21", "chord_m: 210")))) == shown[0]
-
-
-def test_the_table_lists_every_limit() -> None:
+def test_every_limit_stands_in_the_table() -> None:
     names = [n for n in vars(limits_module) if n.isupper() and n not in {"MIB", "FORMAT_VERSION", "MAX_ERRORS"}]
     missing = [name for name in names if f"`{name}`" not in PAGE]
     assert missing == []
