@@ -9,7 +9,7 @@ import typer
 
 from wingfit.cli.base.output import AsJson, Url, moment, note, print_json, say, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
-from wingfit.client.key_client import Key, NewKey
+from wingfit.client.key_answers import Key, NewKey
 
 app = typer.Typer(no_args_is_help=True, help="Make, list and revoke API keys.")
 

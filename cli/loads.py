@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 from wingfit.cli.base.files import write_csv, write_text
 from wingfit.cli.base.output import number
-from wingfit.client import answers as a
+from wingfit.client import load_answers as a
 
 AXES = "xyz"
 VECTORS = {
@@ -23,6 +23,14 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 
 Column = tuple[str, list[float]]
 Panel = tuple[str, list[Column]]
+
+
+PORTS: tuple[tuple[Literal["front_motor", "rear_motor", "air", "dampers"], str], ...] = (
+    ("front_motor", "front motor"),
+    ("rear_motor", "rear motor"),
+    ("air", "air"),
+    ("dampers", "dampers"),
+)
 
 
 def write_loads(outputs: a.Outputs, path: Path) -> None:
@@ -63,10 +71,9 @@ def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
 def panels(outputs: a.Outputs) -> list[Panel]:
     """What is drawn: axis title and series of each panel."""
     stride = -(-len(outputs["sections"]) // len(COLOURS))
-    port = {"front_motor": "front motor", "rear_motor": "rear motor", "air": "air", "dampers": "dampers"}
     return [
         ("motor torque, N m", [(k, outputs["motor_torque_n_m"][k]) for k in ("front", "rear")]),
-        ("power into the wing, W", [(name, outputs["power_w"][key]) for key, name in port.items()]),
+        ("power into the wing, W", [(name, outputs["power_w"][key]) for key, name in PORTS]),
         ("force of the air, N", [("lift", outputs["lift_n"]), ("thrust", outputs["thrust_n"])]),
         ("bending moment, N m", [_bending(section) for section in outputs["sections"][::stride]]),
         ("energy, J", [(k, outputs["energy_j"][k]) for k in ("kinetic", "elastic", "gravitational")]),
@@ -101,10 +108,10 @@ def columns(outputs: a.Outputs) -> Iterator[Column]:
         if isinstance(value, dict):
             yield from ((f"{name}_{key}", series) for name, series in value.items())
         elif key in ("strips", "sections", "connectors"):
-            for part in value:  # type: ignore[attr-defined]
+            for part in cast(list[dict[str, Any]], value):
                 yield from _of_part(key, part)
         else:
-            yield key, value  # type: ignore[misc]
+            yield key, cast(list[float], value)
 
 
 def _of_part(key: str, part: dict[str, Any]) -> Iterator[Column]:

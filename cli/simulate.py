@@ -17,6 +17,7 @@ from wingfit.cli.forces.runs import given_forces, write_files
 from wingfit.cli.loads import summary, write_loads, write_plot
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
+from wingfit.client.load_answers import Loads
 
 Track = list[float | None]
 
@@ -113,7 +114,7 @@ def simulate(
 
 def _of_wing(
     client: Client, dataset: str, recording: str, condition: dict[str, float], asked: dict[str, Any], wanted: bool
-) -> a.Simulation | a.Loads:
+) -> a.Simulation | Loads:
     with progress("simulating") as report:
         report(None)
         if condition:
@@ -122,7 +123,7 @@ def _of_wing(
 
 
 def _write_and_say(
-    answer: a.Simulation | a.Loads, recording: str, output: Path | None, loads: Path | None, *, as_json: bool
+    answer: a.Simulation | Loads, recording: str, output: Path | None, loads: Path | None, *, as_json: bool
 ) -> None:
     tracks = cast(a.Simulation, answer) if "numerics" in answer else None
     if output and tracks:

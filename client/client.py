@@ -6,7 +6,7 @@
 >>> client.wait(run["id"], on_progress=lambda run: print(run["progress"]))  # doctest: +SKIP
 >>> client.result(run["id"])["after_mm"]                            # doctest: +SKIP
 
-Answers are plain dicts, typed in :mod:`wingfit.client.answers`. Every failure is a :class:`WingfitError`.
+Answers are plain dicts of the types in ``client/*answers.py``. Every failure is a :class:`WingfitError`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from wingfit.client import force_answers as f
 from wingfit.client.diagnosis_client import DiagnosisCalls
 from wingfit.client.effect_answers import Effect
 from wingfit.client.key_client import KeyCalls
+from wingfit.client.load_answers import Loads
 from wingfit.client.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -223,10 +224,10 @@ class Client(DiagnosisCalls, KeyCalls):
         recording: str | None = None,
         genome: Literal["best", "nominal"] = "best",
         outputs: Sequence[str] | None = None,
-    ) -> a.Loads:
+    ) -> Loads:
         """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
-        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+        return cast(Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
 
     def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
         return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
@@ -237,11 +238,11 @@ class Client(DiagnosisCalls, KeyCalls):
         A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
         without a server.
         """
-        return self._events(_run(run_id), lambda: self.run(run_id), last_event_id, patience_s)
+        return self._events(_run(run_id), last_event_id, patience_s)
 
     def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
         """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
-        return self._wait(_run(run_id), lambda: self.run(run_id), on_progress, patience_s)
+        return self._wait(_run(run_id), on_progress, patience_s)
 
     def simulate(
         self,
@@ -309,7 +310,7 @@ class Client(DiagnosisCalls, KeyCalls):
         accuracy_mm: float | None = None,
         outputs: Sequence[str] | None = None,
         effects: Sequence[str] = (),
-    ) -> a.Loads:
+    ) -> Loads:
         """Simulate a genome for its loads, where ``condition`` may change the recording's.
 
         Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
@@ -323,7 +324,7 @@ class Client(DiagnosisCalls, KeyCalls):
             "outputs": True if outputs is None else list(outputs),
             "effects": list(effects),
         } | given(accuracy_mm=accuracy_mm)
-        return cast(a.Loads, self._simulated("/v1/loads", body))
+        return cast(Loads, self._simulated("/v1/loads", body))
 
 
 def _body(dataset_id: str, spec: Mapping[str, Any]) -> dict[str, Any]:

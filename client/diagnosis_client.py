@@ -73,13 +73,13 @@ class DiagnosisCalls(Watching):
         self, diagnosis_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0
     ) -> Iterator[a.Event]:
         """Yield the server-sent events of a diagnosis until its final state, as :meth:`Client.events` of a run."""
-        return self._events(_path(diagnosis_id), lambda: self.diagnosis(diagnosis_id), last_event_id, patience_s)
+        return self._events(_path(diagnosis_id), last_event_id, patience_s)
 
     def wait_for_diagnosis(
         self, diagnosis_id: str, on_progress: OnDiagnosis | None = None, *, patience_s: float = 60.0
     ) -> Diagnosis:
         """Block until the diagnosis has ended and return it; ``on_progress`` gets it after each change."""
-        return self._wait(_path(diagnosis_id), lambda: self.diagnosis(diagnosis_id), on_progress, patience_s)
+        return self._wait(_path(diagnosis_id), on_progress, patience_s)
 
 
 def _path(diagnosis_id: str) -> str:

@@ -38,6 +38,7 @@ from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.runs.calibrating import Calibrating
 from wingfit.service.runs.engine import Engine, ModelEngine
 from wingfit.service.settings import Settings
+from wingfit.service.storage import store
 from wingfit.service.storage.backup import forget_snapshots
 from wingfit.service.storage.database import FILE_NAME, Database
 from wingfit.service.storage.retention import Housekeeping
@@ -100,7 +101,7 @@ class Service:
     def enqueue(self, work: Work, job_id: str) -> None:
         """Compute a job that was stored, when its turn comes."""
         with self.database.read() as session:
-            owner = work.row(session, job_id).owner
+            owner = store.one(session, work.table, job_id).owner
         self.runner.enqueue(work, job_id, owner)
 
     def load_keys(self) -> None:
@@ -144,7 +145,7 @@ class Service:
     def _last_step(self, job: Known) -> str:
         def stored() -> str:
             with self.database.read() as session:
-                return f"after step {job.work.row(session, job.id).generations}"
+                return f"after step {store.one(session, job.work.table, job.id).generations}"
 
         try:
             return threads.call("stop-look", stored).result(LOOK_SECONDS)

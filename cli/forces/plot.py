@@ -45,7 +45,7 @@ def write_plot(answer: f.Forces, path: Path) -> None:
     note(f"plots written to {path}; open it in a browser")
 
 
-def _beat(answer: f.Forces, name: str) -> Drawn:
+def _beat(answer: f.Forces, name: f.Quantity) -> Drawn:
     """The band of one standard deviation between beats, where there are several, and both mean beats over it."""
     phase, recorded, spread = answer["phase"], answer["recorded_n"][name], answer["spread_n"].get(name)
     band: Drawn = []
@@ -57,14 +57,14 @@ def _beat(answer: f.Forces, name: str) -> Drawn:
     return [*band, _line(phase, recorded, "recorded"), _line(phase, answer["modelled_n"][name], "modelled")]
 
 
-def _spectra(answer: f.Forces, name: str) -> Drawn:
+def _spectra(answer: f.Forces, name: f.Quantity) -> Drawn:
     """Both spectra, without the mean at 0 Hz, which has been taken off."""
     frequency = answer["frequency_hz"][1:]
     spectra = {"recorded": answer["recorded_spectrum_n2_hz"], "modelled": answer["modelled_spectrum_n2_hz"]}
     return [_line(frequency, found[name][1:], what) for what, found in spectra.items() if name in found]
 
 
-def _range(answer: f.Forces, name: str) -> list[float] | None:
+def _range(answer: f.Forces, name: f.Quantity) -> list[float] | None:
     """Powers of ten between which a spectrum is drawn; None where there is none."""
     spectra = (answer["recorded_spectrum_n2_hz"], answer["modelled_spectrum_n2_hz"])
     highest = max((value for found in spectra for value in found.get(name, [])[1:]), default=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, cast, get_args
+from typing import Annotated, Any, Literal, cast, get_args
 
 import typer
 
@@ -89,7 +89,7 @@ def predict(
         return
     table(["coefficient", ">value"], [[name, number(value)] for name, value in answer["coefficients"].items()])
     say("")
-    forces = {"lift": answer["lift_n"], "drag": answer["drag_n"]}
+    forces: dict[Literal["lift", "drag"], list[float]] = {"lift": answer["lift_n"], "drag": answer["drag_n"]}
     unit = force_unit(value for series in forces.values() for value in series)
     rows = [
         [name, *(unit.show(value) for value in (answer["averages_n"][name], min(series), max(series)))]

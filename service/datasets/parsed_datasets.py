@@ -21,6 +21,7 @@ from wingfit.records.files.storage import is_netcdf, label_of
 from wingfit.service.runs.engine import Engine
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, is_full
+from wingfit.service.storage.tables import DatasetRow
 
 LOG = logging.getLogger("wingfit")
 KEPT, KEPT_BYTES = 8, 2**28
@@ -46,7 +47,7 @@ class Datasets:
     def get(self, dataset_id: str) -> Dataset:
         """The dataset, or a 404."""
         with self._database.read() as session:
-            row = store.dataset(session, dataset_id)
+            row = store.one(session, DatasetRow, dataset_id)
         if (known := self._known(dataset_id)) is not None:
             return known
         old = self._is_old(dataset_id)

@@ -9,12 +9,12 @@ from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.records import Dataset
 from wingfit.service.diagnoses import specs
 from wingfit.service.diagnoses.diagnoser import Diagnoser
-from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.runs import spec_views
 from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.request_checks import gene_names, unknown_recordings
-from wingfit.service.runs.spec_schemas import VehicleModel
+from wingfit.service.runs.requests import VehicleModel
 
 
 def checked(

@@ -9,13 +9,13 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.spec import Progress
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses import specs
+from wingfit.service.diagnoses import specs, views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.jobs.job_kind import Points, Step
-from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
 from wingfit.workers import jobs
@@ -27,15 +27,15 @@ STORE_SECONDS = 0.5
 class Diagnosing:
     """How diagnoses are computed."""
 
-    what = "diagnosis"
-    table = DiagnosisRow
+    what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"
+    table, step_table, step_answer = DiagnosisRow, StepRow, StepEvent
 
     def __init__(self, database: Database, diagnoser: Diagnoser, datasets: Datasets) -> None:
         self._database, self._diagnoser, self._datasets = database, diagnoser, datasets
 
-    def row(self, session: Session, job_id: str) -> DiagnosisRow:
-        """The diagnosis, or a 404."""
-        return store.diagnosis(session, job_id)
+    def view(self, row: DiagnosisRow) -> Diagnosis:
+        """The answer that describes a diagnosis."""
+        return views.diagnosis(row)
 
     def begin(self, _session: Session, row: DiagnosisRow) -> Points:
         """Start from nothing. Sequences of steps go on, so that whoever watches misses none."""
@@ -60,7 +60,7 @@ def _step(progress: Progress) -> Step:
     def keep(session: Session, row: DiagnosisRow, eta: float | None) -> None:
         row.stage, row.evaluations = progress.stage, progress.evaluations
         row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
-        step = StepRow(diagnosis_id=row.id, sequence=row.generations, stage=row.stage, progress=row.progress)
+        step = StepRow(job_id=row.id, sequence=row.generations, stage=row.stage, progress=row.progress)
         step.evaluations, step.elapsed_seconds, step.eta_seconds = row.evaluations, row.elapsed_seconds, eta
         session.add(step)
 

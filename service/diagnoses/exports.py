@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from wingfit.client.export_answers import DiagnosisExport
 from wingfit.service.container import Service
 from wingfit.service.diagnoses import views as diagnosis_views
 from wingfit.service.http import csv_text
 from wingfit.service.runs import netcdf_variables, views
-from wingfit.service.runs.export_schemas import DiagnosisExportOut
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, DiagnosisRow
 from wingfit.service.version import wingfit_version
@@ -57,13 +57,14 @@ class Exported:
 def of(service: Service, diagnosis_id: str) -> Exported:
     """The diagnosis as it is now; a 404, or a 409 where it has found nothing."""
     with service.database.read() as session:
-        row, found = store.diagnosis(session, diagnosis_id), store.finding(session, diagnosis_id)
-        return Exported(row, found, store.dataset(session, row.dataset_id), store.now())
+        row, found = store.one(session, DiagnosisRow, diagnosis_id), store.finding(session, diagnosis_id)
+        return Exported(row, found, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
-def document(exported: Exported) -> DiagnosisExportOut:
+def document(exported: Exported) -> DiagnosisExport:
     """All of a diagnosis."""
-    return DiagnosisExportOut(
+    return DiagnosisExport(
+        schema_id="urn:wingfit:schema:diagnosis-export:1",
         wingfit_version=wingfit_version(),
         exported_at=exported.at,
         dataset=views.dataset(exported.dataset),

@@ -14,7 +14,7 @@ from wingfit.diagnosis.finding import Finding
 from wingfit.records import Dataset, load_dataset
 from wingfit.service.diagnoses.checks import checked
 from wingfit.service.diagnoses.diagnoser import ModelDiagnoser
-from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.runs.engine import ModelEngine
 from wingfit.service.runs.simulation_hints import with_remedy

@@ -8,8 +8,10 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.client import diagnosis_answers as answers
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.service.diagnoses.schemas import DiagnosisIn, DiagnosisSpecOut
+from wingfit.service.answers import checked
+from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.storage import store
 from wingfit.service.units import MM, tidy_mm
 
@@ -52,13 +54,13 @@ def stored(values: dict[str, Any]) -> DiagnosisSpec:
     return DiagnosisSpec(**(values | tuples | {"calibration": store.spec_from(values["calibration"])}))
 
 
-def out(spec: DiagnosisSpec) -> DiagnosisSpecOut:
-    """A specification as it goes out."""
+def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
+    """The settings of a diagnosis as answers give them."""
     model = asdict(spec.calibration)
     named = {name: model[inside] for name, inside in INSIDE.items()}
     named["accuracy_mm"] = tidy_mm(spec.calibration.accuracy)
     own = {name: getattr(spec, name) for name in ("start", "suspects", "refine", "refits", "axes")}
-    return DiagnosisSpecOut.model_validate({name: model[name] for name in ALIKE} | named | own)
+    return checked(answers.DiagnosisSpec, {name: model[name] for name in ALIKE} | named | own)
 
 
 def _frozen(value: Any) -> Any:

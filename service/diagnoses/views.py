@@ -1,21 +1,17 @@
-"""Diagnoses from rows to the wire."""
+"""Answers about diagnoses, from their rows."""
 
 from __future__ import annotations
 
+from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.service.answers import checked
 from wingfit.service.diagnoses import specs
-from wingfit.service.diagnoses.schemas import DiagnosisOut, StepEvent
 from wingfit.service.runs.views import columns
-from wingfit.service.storage.tables import DiagnosisRow, StepRow
+from wingfit.service.storage.tables import DiagnosisRow
 from wingfit.workers.jobs import Wish
 
 
-def diagnosis(row: DiagnosisRow) -> DiagnosisOut:
-    """A diagnosis."""
+def diagnosis(row: DiagnosisRow) -> Diagnosis:
+    """A diagnosis from its row."""
     wish = None if row.wish == Wish.NONE else row.wish
-    spec = specs.out(specs.stored(row.spec))
-    return DiagnosisOut.model_validate(columns(row) | {"wish": wish, "spec": spec, "steps": row.generations})
-
-
-def step(row: StepRow) -> StepEvent:
-    """A step as an event."""
-    return StepEvent.model_validate(columns(row))
+    spec = specs.diagnosis_settings(specs.stored(row.spec))
+    return checked(Diagnosis, columns(row) | {"wish": wish, "spec": spec, "steps": row.generations})

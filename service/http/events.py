@@ -8,17 +8,19 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import Header
-from pydantic import BaseModel
+from pydantic_core import to_json
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
+from wingfit.client.answers import GenerationEvent, Run
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.service.answers import checked
 from wingfit.service.auth.access import CALLER, Caller, KeyRing
-from wingfit.service.diagnoses.schemas import DiagnosisOut, StepEvent
 from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.jobs.job_kind import Work
 from wingfit.service.jobs.wakeups import Changes
-from wingfit.service.runs import views
-from wingfit.service.runs.schemas import GenerationEvent, RunOut
+from wingfit.service.runs.views import columns
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, DatabaseClosedError
 from wingfit.workers.jobs import State
@@ -36,7 +38,7 @@ LastEventId = Annotated[
 class Told:
     """The present state of a job, and its steps after a sequence, ascending."""
 
-    job: RunOut | DiagnosisOut
+    job: Run | Diagnosis
     steps: Sequence[GenerationEvent | StepEvent]
 
 
@@ -129,14 +131,15 @@ class Events:
         return await asyncio.shield(look)
 
 
-def of_run(run_id: str) -> Watched:
-    """Of a run: its generations."""
+def watched(kind: Work, job_id: str) -> Watched:
+    """A job to watch: of a run the generations, of a diagnosis the steps."""
 
     def look(session: Session, after: int, limit: int) -> Told:
-        generations = store.history(session, run_id, after, limit)
-        return Told(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
+        past = store.steps(session, kind.step_table, job_id, after, limit)
+        job = kind.view(store.one(session, kind.table, job_id))
+        return Told(job, [checked(kind.step_answer, columns(one)) for one in past])
 
-    return Watched(run_id, "generation", look)
+    return Watched(job_id, kind.step_event, look)
 
 
 def described(step: str, example: str) -> dict[str, Any]:
@@ -154,17 +157,17 @@ def _look(database: Database, watched: Watched, after: int) -> Seen | None:
     except (ProblemError, DatabaseClosedError):
         return None
     job, steps = told.job, told.steps
-    last = steps[-1].sequence if steps else after
+    last = steps[-1]["sequence"] if steps else after
     return Seen(
-        steps=b"".join(_event(watched.step, step, step.sequence) for step in steps),
+        steps=b"".join(_event(watched.step, step, step["sequence"]) for step in steps),
         after=last,
         complete=len(steps) < CHUNK,
-        standing=(job.state, job.wish, job.error),
+        standing=(job["state"], job["wish"], job["error"]),
         # The id of a state is that of the last step sent before it: a reconnect then misses nothing.
         state=_event("state", job, last),
-        final=State(job.state).final,
+        final=State(job["state"]).final,
     )
 
 
-def _event(kind: str, data: BaseModel, sequence: int) -> bytes:
-    return f"id: {sequence}\nevent: {kind}\ndata: {data.model_dump_json()}\n\n".encode()
+def _event(kind: str, data: object, sequence: int) -> bytes:
+    return b"id: %d\nevent: %b\ndata: %b\n\n" % (sequence, kind.encode(), to_json(data))

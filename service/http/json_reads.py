@@ -12,14 +12,14 @@ from typing import Any
 
 from pydantic_core import to_json
 
+from wingfit.client.answers import HistoryItem, Run
 from wingfit.service.auth.access import whose
 from wingfit.service.http.problems import not_found
 from wingfit.service.runs import views
-from wingfit.service.runs.schemas import HistoryItem, RunOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 
-RUN, ITEM = tuple(RunOut.model_fields), tuple(HistoryItem.model_fields)
+RUN, ITEM = tuple(Run.__annotations__), tuple(HistoryItem.__annotations__)
 # What is kept: answers of at most so many bytes, and runs.
 ANSWERS, LONGEST, RUNS = 512, 2**16, 2**14
 
@@ -108,7 +108,7 @@ def _run(row: tuple[Any, ...]) -> bytes:
     """A run as JSON; of the same stored values the same."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
-    return views.run_of(values).model_dump_json().encode()
+    return to_json(views.run_of(values))
 
 
 @lru_cache

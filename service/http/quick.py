@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import re
 import sqlite3
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from starlette.datastructures import Headers
 from starlette.responses import Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from wingfit.service.http import responses as http
-from wingfit.service.http.events import Events, of_run
+from wingfit.service.http.events import watched
 from wingfit.service.http.json_reads import Reading
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.storage.database import DatabaseClosedError
@@ -84,7 +84,7 @@ def _answer(scope: Scope) -> Response:
         raise UnusualError
     service, headers = scope["app"].state.service, Headers(scope=scope)
     if scope["path"].endswith("/events"):
-        return _events(scope, service.reading, service.events, headers.get("Last-Event-ID"))
+        return _events(scope, service, headers.get("Last-Event-ID"))
     scope["route"], body = read(scope["path"], scope["query_string"], service.reading)
     service.shortcut.remember(scope)
     if scope["route"] is RUN:
@@ -92,14 +92,15 @@ def _answer(scope: Scope) -> Response:
     return http.json_of(body)
 
 
-def _events(scope: Scope, reading: Reading, events: Events, last: str | None) -> Response:
+def _events(scope: Scope, service: Any, last: str | None) -> Response:
     # After a restart of the server all who watch come at once.
     *start, run_id, _ = scope["path"].split("/")
     if start != START or scope["query_string"]:
         raise UnusualError
-    reading.run(run_id)  # or there is none that the caller may see
+    service.reading.run(run_id)  # or there is none that the caller may see
     scope["route"] = EVENTS
-    return events.answer(of_run(run_id), last)
+    answer: Response = service.events.answer(watched(service.calibrating, run_id), last)
+    return answer
 
 
 def _runs(reading: Reading, asked: dict[str, str]) -> bytes:

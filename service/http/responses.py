@@ -9,7 +9,7 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import Header, Query, Request
-from pydantic import BaseModel
+from pydantic_core import to_json
 from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response
 
@@ -103,9 +103,9 @@ def sent(answer: store.Answer) -> Response:
     return JSONResponse(answer.body, answer.status, {"Location": answer.location})
 
 
-def tagged(model: BaseModel, known: str | None) -> Response:
-    """``model`` with an ETag, or 304 when the caller has it."""
-    return marked(model.model_dump_json().encode(), JSON, known)
+def tagged(answer: object, known: str | None) -> Response:
+    """``answer`` as JSON with an ETag, or 304 when the caller has it."""
+    return marked(to_json(answer), JSON, known)
 
 
 def json_of(body: bytes) -> Response:

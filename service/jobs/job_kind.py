@@ -9,7 +9,9 @@ from typing import Any, Protocol
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.service.storage.tables import JobRow
+from wingfit.client.answers import GenerationEvent, Run
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.service.storage.tables import JobRow, StepOfJob
 
 Points = list[tuple[float, float]]
 
@@ -36,20 +38,32 @@ class Step:
 
 
 class Work(Protocol):
-    """A kind of job: where its rows are, and how one is computed."""
+    """A kind of job (run, diagnosis): its resource in the API, its tables, and how one is computed.
+
+    Attributes:
+        what: singular name of the resource, also for messages.
+        path: of the resource, e.g. "/v1/runs"; ids start with ``prefix``.
+        table: of the jobs.
+        step_table: of their steps.
+        step_event: name of the event that reports a step, whose data are a ``step_answer``.
+    """
+
+    what: str
+    path: str
+    prefix: str
+    step_event: str
 
     @property
-    def what(self) -> str:
-        """A job of this kind in words, for messages."""
-        ...
+    def table(self) -> type[JobRow]: ...  # noqa: D102
 
     @property
-    def table(self) -> type[JobRow]:
-        """Its rows."""
-        ...
+    def step_table(self) -> type[StepOfJob]: ...  # noqa: D102
 
-    def row(self, session: Session, job_id: str) -> JobRow:
-        """The job, or a 404."""
+    @property
+    def step_answer(self) -> type[GenerationEvent] | type[StepEvent]: ...  # noqa: D102
+
+    def view(self, row: Any) -> Run | Diagnosis:
+        """The answer that describes a job."""
         ...
 
     def begin(self, session: Session, row: Any) -> Points:

@@ -117,7 +117,7 @@ class Runner:
         """Apply a user's event; a 409 with the state when the job does not admit it."""
         with self._lock:
             with self._database.write() as session:
-                row = work.row(session, job_id)
+                row = store.one(session, work.table, job_id)
                 job = Known(work, job_id, row.owner)
                 if row.state == jobs.State.RUNNING and job not in self._threads and not self._stopping:
                     _step(row, jobs.Restart(self._most_starts))  # its end could not be stored
@@ -283,7 +283,7 @@ class Runner:
             with self._database.write() as session:
                 if self._stopping:  # what starts after the stop has taken note of what runs would count as a death
                     raise InterruptedStepError
-                row = job.work.row(session, job.id)
+                row = store.one(session, job.work.table, job.id)
                 instructions = _step(row, jobs.Start())
                 return row, job.work.begin(session, row), instructions
 
@@ -300,7 +300,7 @@ class Runner:
 
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
-                row = job.work.row(session, job.id)
+                row = store.one(session, job.work.table, job.id)
                 instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress, step.lasting))
                 row.elapsed_seconds = points[-1][0]
                 if not step.last or row.state == jobs.State.SUCCEEDED:
@@ -325,7 +325,7 @@ class Runner:
     def _end(self, job: Known, event: jobs.Fail) -> None:
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
-                return _step(job.work.row(session, job.id), event)
+                return _step(store.one(session, job.work.table, job.id), event)
 
         try:
             self._obey(job, self._patiently(job, write))

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from sqlalchemy import inspect
 
+from wingfit.client.answers import Health as HealthAnswer
 from wingfit.service.http import threads
 from wingfit.service.jobs.evaluator_startup import Pool
 from wingfit.service.jobs.job_kind import Work
-from wingfit.service.runs.schemas import HealthOut
 from wingfit.service.settings import Settings
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -45,11 +45,11 @@ class Health:
             return f"the database cannot be read: {error}"
         return None
 
-    async def now(self) -> HealthOut:
+    async def now(self) -> HealthAnswer:
         """Standing of the service, of all owners, whoever asks."""
         silent = await self.look()
         run, diagnosis = (None if self.jobs is None else _active(self.jobs[work.what]) for work in self._kinds)
-        return HealthOut(
+        return HealthAnswer(
             status="degraded" if silent else self._pool.status,
             version=wingfit_version(),
             sqlite_version=sqlite3.sqlite_version,

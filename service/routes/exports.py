@@ -8,16 +8,18 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
+from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
+from wingfit.client.export_answers import DiagnosisExport, RunExport
+from wingfit.client.transport import Format
 from wingfit.service.container import IN_TURN_OF_DOWNLOADS, PlaceDep, Service, ServiceDep
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
 from wingfit.service.runs import best_genome, netcdf_variables, run_netcdf
 from wingfit.service.runs import exports as run_exports
-from wingfit.service.runs.export_schemas import DiagnosisExportOut, Format, RunExportOut
 
 router = APIRouter(prefix="/v1", tags=["exports"])
 JSON = "application/json"
@@ -47,7 +49,7 @@ def _described(example: str) -> dict[str, Any]:
 
 @router.get(
     "/runs/{run_id}/export",
-    response_model=RunExportOut,
+    response_model=RunExport,
     responses={200: _described(_HISTORY), **http.errors(404, 409)},
     summary="Export a run",
 )
@@ -93,7 +95,7 @@ def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A0
 
 @router.get(
     "/diagnoses/{diagnosis_id}/export",
-    response_model=DiagnosisExportOut,
+    response_model=DiagnosisExport,
     responses={200: _described(_RANKING), **http.errors(404, 409)},
     summary="Export a diagnosis",
     dependencies=[IN_TURN_OF_DOWNLOADS],
@@ -111,5 +113,5 @@ def export_diagnosis(
     elif format == "netcdf":
         body, media_type, name = diagnosis_exports.file(exported), netcdf_variables.MEDIA_TYPE, ".nc"
     else:
-        body, media_type, name = diagnosis_exports.document(exported).model_dump_json(), JSON, ".json"
+        body, media_type, name = to_json(diagnosis_exports.document(exported)), JSON, ".json"
     return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))

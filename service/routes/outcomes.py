@@ -3,55 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, cast
 
 from fastapi import APIRouter, Query
-from starlette.responses import JSONResponse, Response, StreamingResponse
+from pydantic import Field
+from starlette.responses import JSONResponse, Response
 
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client import answers as a
+from wingfit.client.force_answers import ForceResult, ForceSimulation
+from wingfit.client.load_answers import Loads
 from wingfit.records import Dataset, Recording
 from wingfit.service.container import IN_TURN, IN_TURN_OF_DOWNLOADS, Service, ServiceDep
 from wingfit.service.http import responses as http
-from wingfit.service.http.events import LastEventId, described, of_run
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.outcomes import force_views, load_views
-from wingfit.service.outcomes.force_schemas import AnyResult, ForceSimulationOut
-from wingfit.service.outcomes.load_schemas import LoadsOut, OutputName
-from wingfit.service.routes.runs import load
+from wingfit.service.outcomes.requests import LoadsIn, OutputName, SimulationIn, WingIn
+from wingfit.service.routes.jobs import load
 from wingfit.service.runs import best_genome, spec_views, views
 from wingfit.service.runs.request_checks import gene_names
-from wingfit.service.runs.schemas import (
-    ComparisonOut,
-    GenomeOut,
-    HistoryItem,
-    LoadsIn,
-    Page,
-    SimulationIn,
-    SimulationOut,
-    WingIn,
-)
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
 from wingfit.sim.wing.outputs import Outputs
 from wingfit.workers.jobs import State
 
+AnyResult = Annotated[a.Result | ForceResult, Field(discriminator="kind")]
 router = APIRouter(prefix="/v1", tags=["outcomes"])
-
-_EVENTS = """id: 12
-event: generation
-data: {"sequence": 12, "stage": "structural", "generation": 11, "best_mm": 1.84, "progress": 0.31}
-
-id: 12
-event: state
-data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
-
-"""
 
 
 @router.get(
     "/runs/{run_id}/history",
-    response_model=Page[HistoryItem],
+    response_model=a.Page[a.HistoryItem],
     responses=http.errors(404),
     summary="Fetch the history",
     dependencies=[IN_TURN_OF_DOWNLOADS],
@@ -66,7 +49,9 @@ def history(
     return http.json_of(service.reading.history(run_id, after, limit))
 
 
-@router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
+@router.get(
+    "/runs/{run_id}/genome", response_model=a.GenomeInfo, responses=http.errors(404, 409), summary="Best genome"
+)
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the best genome so far, beside the nominal one."""
     return http.tagged(best_genome.standing(service, run_row(service, run_id)), if_none_match)
@@ -83,7 +68,7 @@ def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
 
 @router.get(
     "/runs/{run_id}/comparison",
-    response_model=ComparisonOut,
+    response_model=a.Comparison,
     responses=http.errors(404, 409),
     summary="Tracks",
     dependencies=[IN_TURN],
@@ -105,7 +90,7 @@ def comparison(
 
 @router.get(
     "/runs/{run_id}/loads",
-    response_model=LoadsOut,
+    response_model=Loads,
     responses=http.errors(404, 409),
     summary="Loads",
     dependencies=[IN_TURN],
@@ -125,21 +110,9 @@ def loads(
     return JSONResponse({"recording": wanted, "outputs": load_views.outputs(found, load_views.wanted(outputs or True))})
 
 
-@router.get(
-    "/runs/{run_id}/events",
-    response_class=StreamingResponse,
-    responses={200: described("generation", _EVENTS), **http.errors(404)},
-    summary="Watch a run",
-)
-def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
-    """Send generations and states as they happen; ends after the final state."""
-    run_row(service, run_id)
-    return service.events.answer(of_run(run_id), last_event_id)
-
-
 @router.post(
     "/simulations",
-    response_model=SimulationOut | ForceSimulationOut,
+    response_model=a.Simulation | ForceSimulation,
     responses=http.errors(409),
     summary="Simulate one recording's condition",
     dependencies=[IN_TURN],
@@ -162,7 +135,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
 
 @router.post(
     "/loads",
-    response_model=LoadsOut,
+    response_model=Loads,
     responses=http.errors(409),
     summary="Simulate any condition's loads",
     dependencies=[IN_TURN],
@@ -187,9 +160,9 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
 
 def _tracks(
     service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
-) -> dict[str, Any]:
+) -> a.Simulation:
     tracks = service.engine.compare(spec, dataset, genome, body.recording)
-    answer = views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)}
+    answer = cast(a.Simulation, {**views.comparison(tracks), "mean_distance_mm": views.mean_distance_mm(tracks)})
     names = load_views.wanted(body.outputs)
     if names:
         found = _loads(service, spec, dataset, genome, dataset.recording(body.recording))
@@ -199,10 +172,11 @@ def _tracks(
 
 def _forces(
     service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
-) -> dict[str, Any]:
+) -> ForceSimulation:
     found = service.engine.forces(spec, dataset, genome, body.recording, "nominal")
-    agreements = service.engine.agreements(spec, dataset, genome, body.recording)
-    return force_views.forces(found, "given") | {"agreements": [force_views.agreement(a, "given") for a in agreements]}
+    agreed = service.engine.agreements(spec, dataset, genome, body.recording)
+    agreements = [force_views.agreement(one, "given") for one in agreed]
+    return {**force_views.forces(found, "given"), "agreements": agreements}
 
 
 def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
@@ -247,7 +221,7 @@ def _loads(
 def run_row(service: Service, run_id: str) -> RunRow:
     """The run, or a 404."""
     with service.database.read() as session:
-        return store.run(session, run_id)
+        return store.one(session, RunRow, run_id)
 
 
 def _no_result(row: RunRow) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.search import Generation
+from wingfit.client.answers import GenerationEvent, Run
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.jobs.job_kind import Points, Step
 from wingfit.service.outcomes import force_views
@@ -25,19 +26,19 @@ from wingfit.workers import jobs
 class Calibrating:
     """How runs are computed."""
 
-    what = "run"
-    table = RunRow
+    what, path, prefix, step_event = "run", "/v1/runs", "run", "generation"
+    table, step_table, step_answer = RunRow, GenerationRow, GenerationEvent
 
     def __init__(self, database: Database, engine: Engine, datasets: Datasets) -> None:
         self._database, self._engine, self._datasets = database, engine, datasets
 
-    def row(self, session: Session, job_id: str) -> RunRow:
-        """The run, or a 404."""
-        return store.run(session, job_id)
+    def view(self, row: RunRow) -> Run:
+        """The answer that describes a run."""
+        return views.run(row)
 
     def begin(self, session: Session, row: RunRow) -> Points:
         """Go on where the run was: its generations so far."""
-        return [(g.elapsed_seconds, g.progress) for g in store.history(session, row.id, 0)]
+        return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
         """Search generation by generation, then judge what was found."""
@@ -51,10 +52,9 @@ class Calibrating:
             raise ValueError("the search ended without a generation")
         judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
         if isinstance(judged, ForceResult):
-            outcome = force_views.result(judged, spec, dataset).model_dump(mode="json")
+            yield _judged(force_views.result(judged, spec, dataset))
         else:
-            outcome = views.result(judged).model_dump(mode="json")
-        yield _judged(outcome)
+            yield _judged(views.result(judged))
 
 
 def _step(generation: Generation) -> Step:
@@ -72,9 +72,9 @@ def _step(generation: Generation) -> Step:
     return Step(generation.progress, keep)
 
 
-def _judged(outcome: dict[str, Any]) -> Step:
+def _judged(outcome: Mapping[str, Any]) -> Step:
     def keep(_session: Session, row: RunRow, _eta: float | None) -> None:
-        row.result = outcome
+        row.result = dict(outcome)
         # while it runs, the best of the present stage; in the end, over all that was fitted
         row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
 
@@ -83,7 +83,7 @@ def _judged(outcome: dict[str, Any]) -> Step:
 
 def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> GenerationRow:
     return GenerationRow(
-        run_id=row.id,
+        job_id=row.id,
         sequence=row.generations,
         stage=generation.stage,
         generation=generation.index,

@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from pydantic_core import to_json
+
+from wingfit.client.answers import HistoryItem, Run
+from wingfit.client.export_answers import RunExport
+from wingfit.service.answers import checked
 from wingfit.service.container import Service
 from wingfit.service.http import csv_text
 from wingfit.service.outcomes import force_views
 from wingfit.service.runs import best_genome, views
-from wingfit.service.runs.export_schemas import RunExportOut
-from wingfit.service.runs.schemas import RunOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DatasetRow, GenerationRow, RunRow
@@ -38,8 +41,8 @@ class Exported:
 def of(service: Service, run_id: str) -> Exported:
     """The run as it is now, or a 404."""
     with service.database.read() as session:
-        row = store.run(session, run_id)
-        return Exported(row, store.dataset(session, row.dataset_id), store.now())
+        row = store.one(session, RunRow, run_id)
+        return Exported(row, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
 def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
@@ -49,8 +52,8 @@ def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
     """
     for after in range(0, row.generations, BLOCK):
         with database.read() as session:
-            store.run(session, row.id)
-            found = store.history(session, row.id, after, min(BLOCK, row.generations - after))
+            store.one(session, RunRow, row.id)
+            found = store.steps(session, GenerationRow, row.id, after, min(BLOCK, row.generations - after))
         yield found
 
 
@@ -64,22 +67,23 @@ def table(database: Database, row: RunRow) -> Iterator[str]:
 
 
 def document(service: Service, exported: Exported) -> Iterator[str]:
-    """All of a run as JSON (`export_schemas.RunExportOut`); a part that needs the dataset is made at once."""
-    empty = _without_history(service, exported).model_dump_json()
+    """A RunExport as JSON; the part that needs the dataset is computed at once, the history while it is sent."""
+    empty = to_json(_without_history(service, exported)).decode()
     return _filled(service.database, exported.row, empty.removesuffix("]}"))
 
 
 def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
     yield head
     for number, block in enumerate(blocks(database, row)):
-        items = ",\n".join(views.history_item(one).model_dump_json() for one in block)
+        items = ",\n".join(to_json(checked(HistoryItem, views.columns(one))).decode() for one in block)
         yield f",\n{items}" if number else items
     yield "]}\n"
 
 
-def _without_history(service: Service, exported: Exported) -> RunExportOut:
+def _without_history(service: Service, exported: Exported) -> RunExport:
     row, run = exported.row, views.run(exported.row)
-    return RunExportOut(
+    return RunExport(
+        schema_id="urn:wingfit:schema:run-export:1",
         wingfit_version=wingfit_version(),
         exported_at=exported.at,
         run=run,
@@ -91,9 +95,9 @@ def _without_history(service: Service, exported: Exported) -> RunExportOut:
     )
 
 
-def request(run: RunOut) -> dict[str, object]:
+def request(run: Run) -> dict[str, object]:
     """The body of POST /v1/runs that repeats a run."""
-    return {"dataset_id": run.dataset_id, "name": run.name, **run.spec.model_dump(mode="json")}
+    return {"dataset_id": run["dataset_id"], "name": run["name"], **run["spec"]}
 
 
 def _cell(generation: GenerationRow, name: str) -> csv_text.Cell:

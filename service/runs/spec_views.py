@@ -9,10 +9,12 @@ from pydantic import BaseModel
 
 from wingfit.calibration.effects import effect_of
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client.answers import RunSpec
 from wingfit.records import Dataset, Recording
+from wingfit.service.answers import checked
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
+from wingfit.service.runs.requests import RunIn, VehicleModel
 from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
-from wingfit.service.runs.spec_schemas import RunIn, SpecOut, VehicleModel
 from wingfit.service.units import MM, tidy_mm
 from wingfit.sim.effects.registry import chosen
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
@@ -26,14 +28,14 @@ USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
 LONGEST_NAME = 200
 
 
-def spec_out(given: CalibrationSpec) -> SpecOut:
-    """How a run calibrates, as it goes out."""
+def run_settings(given: CalibrationSpec) -> RunSpec:
+    """The settings of a run as answers give them."""
     named = {
         "accuracy_mm": tidy_mm(given.accuracy),
         "low_pass_hz": given.low_pass,
         "peel_width_beats": given.peel_width,
     }
-    return SpecOut.model_validate(vars(given) | named)
+    return checked(RunSpec, vars(given) | named)
 
 
 def of_run(body: RunIn) -> CalibrationSpec:

@@ -8,6 +8,7 @@ import json
 import logging
 import secrets
 import sqlite3
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
@@ -25,12 +26,11 @@ from wingfit.service.storage.tables import (
     DatasetRow,
     DiagnosisRow,
     FindingRow,
-    GenerationRow,
     JobRow,
     OwnedRow,
     ParsedRow,
     RunRow,
-    StepRow,
+    StepOfJob,
 )
 from wingfit.workers.jobs import Job, State, Wish
 
@@ -41,7 +41,8 @@ MB = 10**6
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
-Row = TypeVar("Row", DatasetRow, RunRow, DiagnosisRow)
+Row = TypeVar("Row", bound=OwnedRow)
+Step = TypeVar("Step", bound=StepOfJob)
 
 
 def now() -> str:
@@ -57,6 +58,17 @@ def timestamp(moment: datetime) -> str:
 def new_id(prefix: str) -> str:
     """An id that nobody can guess."""
     return f"{prefix}_{secrets.token_hex(8)}"
+
+
+# -- rows of any kind ------------------------------------------------------------------------------------
+
+
+def one(session: Session, table: type[Row], row_id: str) -> Row:
+    """The row with the id, or a 404."""
+    found = session.scalar(select(table).where(table.id == row_id))
+    if found is None:
+        raise not_found(table.__tablename__, row_id)
+    return found
 
 
 # -- lists -----------------------------------------------------------------------------------------------
@@ -97,14 +109,6 @@ def number(cursor: str) -> int:
 
 
 # -- datasets --------------------------------------------------------------------------------------------
-
-
-def dataset(session: Session, dataset_id: str) -> DatasetRow:
-    """The dataset's row, or a 404."""
-    row = session.scalar(select(DatasetRow).where(DatasetRow.id == dataset_id))
-    if row is None:
-        raise not_found("dataset", dataset_id)
-    return row
 
 
 def archive(session: Session, dataset_id: str) -> bytes:
@@ -157,7 +161,7 @@ def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> N
 
 def delete_dataset(session: Session, dataset_id: str) -> None:
     """Delete a dataset that no run or diagnosis refers to."""
-    row = dataset(session, dataset_id)
+    row = one(session, DatasetRow, dataset_id)
     for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
         count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
         if count:
@@ -165,52 +169,31 @@ def delete_dataset(session: Session, dataset_id: str) -> None:
     session.delete(row)
 
 
-# -- runs ------------------------------------------------------------------------------------------------
+# -- jobs ------------------------------------------------------------------------------------------------
 
 
-def run(session: Session, run_id: str) -> RunRow:
-    """The run's row, or a 404."""
-    row = session.scalar(select(RunRow).where(RunRow.id == run_id))
-    if row is None:
-        raise not_found("run", run_id)
-    return row
+def delete_job(session: Session, table: type[JobRow], job_id: str) -> None:
+    """Delete a job that has ended, with its steps and results; a 409 for one that has not."""
+    row = one(session, table, job_id)
+    if row.state in ACTIVE:
+        raise conflict(f"{table.__tablename__} {row.id} is {row.state}; cancel it first", state=row.state)
+    session.delete(row)
 
 
-def delete_run(session: Session, run_id: str) -> None:
-    """Delete a run that has ended, with its history."""
-    _delete_ended(session, run(session, run_id), "run")
-
-
-def history(session: Session, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
-    """Generations of a run after sequence ``after``, ascending."""
-    query = select(GenerationRow).where(GenerationRow.run_id == run_id, GenerationRow.sequence > after)
-    return list(session.scalars(query.order_by(GenerationRow.sequence).limit(limit)))
+def steps(session: Session, table: type[Step], job_id: str, after: int = 0, limit: int | None = None) -> list[Step]:
+    """Generations of a run, or steps of a diagnosis, after sequence ``after``, ascending."""
+    query = select(table).where(table.job_id == job_id, table.sequence > after)
+    return list(session.scalars(query.order_by(table.sequence).limit(limit)))
 
 
 def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
-    """Where the run goes on, or None at its start."""
+    """The checkpoint from which the run continues, or None at its start."""
     return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
 
 
-# -- diagnoses ---------------------------------------------------------------------------------------------
-
-
-def diagnosis(session: Session, diagnosis_id: str) -> DiagnosisRow:
-    """The diagnosis's row, or a 404."""
-    row = session.scalar(select(DiagnosisRow).where(DiagnosisRow.id == diagnosis_id))
-    if row is None:
-        raise not_found("diagnosis", diagnosis_id)
-    return row
-
-
-def delete_diagnosis(session: Session, diagnosis_id: str) -> None:
-    """Delete a diagnosis that has ended, with its finding."""
-    _delete_ended(session, diagnosis(session, diagnosis_id), "diagnosis")
-
-
 def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
-    """What a diagnosis found, as JSON; a 404, or a 409 before it has succeeded."""
-    row = diagnosis(session, diagnosis_id)
+    """The finding of a diagnosis as JSON; a 404, or a 409 before it has succeeded."""
+    row = one(session, DiagnosisRow, diagnosis_id)
     body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
     if body is None:
         raise conflict(
@@ -219,18 +202,9 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     return body
 
 
-def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | None = None) -> list[StepRow]:
-    """Steps of a diagnosis after sequence ``after``, ascending."""
-    query = select(StepRow).where(StepRow.diagnosis_id == diagnosis_id, StepRow.sequence > after)
-    return list(session.scalars(query.order_by(StepRow.sequence).limit(limit)))
-
-
-# -- jobs of any kind ------------------------------------------------------------------------------------
-
-
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
-    owner = dataset(session, dataset_id).owner
+    owner = one(session, DatasetRow, dataset_id).owner
     count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
     if count >= most:
         raise ProblemError(
@@ -266,12 +240,6 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
         LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
         return None
     return row
-
-
-def _delete_ended(session: Session, row: JobRow, what: str) -> None:
-    if row.state in ACTIVE:
-        raise conflict(f"{what} {row.id} is {row.state}; cancel it first", state=row.state)
-    session.delete(row)
 
 
 def job(row: JobRow) -> Job:
@@ -321,8 +289,8 @@ def spec_json(given: CalibrationSpec) -> dict[str, Any]:
 # -- answers to repeated requests ------------------------------------------------------------------------
 
 
-# By the part of a location that says what is there.
-_MADE: dict[str, type[DatasetRow | RunRow | DiagnosisRow]] = {
+# By the part of a location that names the resource.
+_MADE: dict[str, type[OwnedRow]] = {
     "datasets": DatasetRow,
     "runs": RunRow,
     "diagnoses": DiagnosisRow,
@@ -344,7 +312,7 @@ class Answer:
 
     status: int
     location: str
-    body: dict[str, Any]
+    body: Mapping[str, Any]
 
 
 def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
@@ -376,7 +344,7 @@ def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None
                 fingerprint=repeat.fingerprint,
                 status=answer.status,
                 location=answer.location,
-                body=answer.body,
+                body=dict(answer.body),
                 created_at=now(),
             )
         )

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.service.conftest import Api
-from wingfit.service.runs import schemas
+from wingfit.service.runs import views
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_of_a_long_recording_some_instants_are_answered(api: Api, monkeypatch: p
     body: dict[str, Any] = {"dataset_id": api.upload()["id"], "recording": "fast"}
     whole = api.client.post("/v1/simulations", json=body).json()
     assert (whole["every"], len(whole["phase"])) == (1, 4)
-    monkeypatch.setattr(schemas, "MOST_COORDINATES", 4 * 6 // 2)
+    monkeypatch.setattr(views, "MOST_COORDINATES", 4 * 6 // 2)
     thinned = api.client.post("/v1/simulations", json=body).json()
     assert thinned["every"] == 2
     for name in ("phase", "recorded_mm", "simulated_mm"):

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from tests.service.conftest import Api
+from tests.service.shapes import valid
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client.effect_answers import Effects
 from wingfit.records import Dataset, Genome
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.outcomes.effect_schemas import EffectsOut
 from wingfit.service.runs.engine import ModelEngine
-from wingfit.service.runs.spec_schemas import RunIn
-from wingfit.service.runs.spec_views import of_run, of_simulation, refuse_effects, run_name, spec_out
+from wingfit.service.runs.requests import RunIn
+from wingfit.service.runs.spec_views import of_run, of_simulation, refuse_effects, run_name, run_settings
 from wingfit.service.storage import store
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
@@ -26,7 +27,7 @@ Json = dict[str, Any]
 
 
 def test_the_list_is_the_registry(api: Api) -> None:
-    found = EffectsOut.model_validate(api.get("/v1/effects")).effects
+    found = valid(Effects, api.get("/v1/effects")).effects
     assert [one.name for one in found] == list(EFFECTS)
     for one in found:
         effect = EFFECTS[one.name]
@@ -122,7 +123,7 @@ def test_specifications_go_around_and_those_of_before_name_no_effect() -> None:
     assert spec.effects == ("camera_shift",)
     stored = store.spec_json(spec)
     assert store.spec_from(stored) == spec
-    assert spec_out(spec).effects == ["camera_shift"]
+    assert run_settings(spec)["effects"] == ["camera_shift"]
     del stored["effects"]
     assert store.spec_from(stored).effects == ()
 

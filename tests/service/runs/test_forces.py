@@ -12,20 +12,21 @@ import pytest
 
 from tests.service.conftest import Api, serving
 from tests.service.runs import force_data
+from tests.service.shapes import fields, valid
 from wingfit.calibration.search import CalibrationSpec, resolved
-from wingfit.records import LowPass, Recording
-from wingfit.service.app import create_app
-from wingfit.service.outcomes.force_schemas import (
-    ForceResultOut,
-    ForceSimulationOut,
-    ForcesOut,
-    ModelsOut,
-    PredictionOut,
+from wingfit.client.answers import Dataset, Run
+from wingfit.client.force_answers import (
+    ForceResult,
+    Forces,
+    ForceSimulation,
+    Models,
+    Prediction,
     Quantity,
     Source,
 )
-from wingfit.service.runs.schemas import DatasetOut, RunOut
-from wingfit.service.runs.spec_schemas import Preset
+from wingfit.records import LowPass, Recording
+from wingfit.service.app import create_app
+from wingfit.service.runs.requests import Preset
 from wingfit.service.runs.spec_views import run_name
 from wingfit.service.settings import Settings
 from wingfit.sim.vehicle.lift_drag import lift_drag
@@ -81,7 +82,7 @@ def result(api: Api, local: Json) -> Json:
 
 
 def test_a_dataset_of_forces_is_described(dataset: Json) -> None:
-    shown = DatasetOut.model_validate(dataset)
+    shown = valid(Dataset, dataset)
     assert (shown.kind, shown.markers) == ("forces", 0)
     first = shown.recordings[0]
     assert (first.markers, first.channels, first.missing_percent) == (0, ["force_x", "force_z"], 0.0)
@@ -90,7 +91,7 @@ def test_a_dataset_of_forces_is_described(dataset: Json) -> None:
 
 
 def test_what_is_left_open_is_decided_and_shown(api: Api, local: Json) -> None:
-    run = RunOut.model_validate(local)
+    run = valid(Run, local)
     assert (run.kind, run.best_mm, run.name) == ("forces", None, "delfly, proposed, local")
     spec = run.spec
     assert (spec.mode, spec.method, spec.preset, spec.axes) == ("local", "gauss_newton", "proposed", ["x"])
@@ -102,7 +103,7 @@ def test_what_is_left_open_is_decided_and_shown(api: Api, local: Json) -> None:
 
 
 def test_the_result_has_the_coefficients_that_were_put_in(local: Json, result: Json) -> None:
-    found = ForceResultOut.model_validate(result)
+    found = valid(ForceResult, result)
     assert result["after_mn"] == local["best_mn"]
     assert result["after_mn"] < 0.3 * result["before_mn"]
     assert result["held_out_after_mn"] < 0.5 * result["held_out_before_mn"]
@@ -163,8 +164,8 @@ def test_the_global_model_is_in_hertz_and_degrees(result: Json) -> None:
 def test_forces_over_the_beat_agree_as_the_result_says(api: Api, local: Json, result: Json, source: Source) -> None:
     name = "test-4"
     answer = api.get(f"/v1/runs/{local['id']}/forces?recording={name}&source={source}")
-    shown = ForcesOut.model_validate(answer)
-    assert set(answer) == set(ForcesOut.model_fields)
+    shown = valid(Forces, answer)
+    assert set(answer) == fields(Forces)
     assert (shown.recording, shown.source) == (name, source)
     n = len(shown.phase)
     assert [shown.phase[0], shown.phase[-1]] == pytest.approx([0.0, 1 - 1 / n])
@@ -230,8 +231,8 @@ def test_a_prediction_at_a_fitted_condition_is_the_global_model(api: Api, local:
     body = {"flap_frequency_hz": 12.5, "body_pitch_deg": 71.0, "airspeed_m_s": trial.condition.airspeed}
     answer = api.client.post(f"/v1/runs/{local['id']}/predictions", json=body)
     assert answer.status_code == 200, answer.text
-    found = PredictionOut.model_validate(answer.json())
-    assert set(answer.json()) == set(PredictionOut.model_fields)
+    found = valid(Prediction, answer.json())
+    assert set(answer.json()) == fields(Prediction)
     assert found.warnings == []
     lengths = {len(s) for s in (found.phase, found.x_n, found.z_n, found.lift_n, found.drag_n)}
     assert len(lengths) == 1
@@ -297,11 +298,11 @@ def test_a_force_that_is_constant_has_no_percentage(api: Api) -> None:
     given = force_data.dataset()
     flat = replace(given, recordings=tuple(without_z(r) for r in given.recordings))
     run = finished(api, upload(api, force_data.zipped(flat)))
-    found = ForceResultOut.model_validate(api.get(f"/v1/runs/{run['id']}/result"))
+    found = valid(ForceResult, api.get(f"/v1/runs/{run['id']}/result"))
     for a in (*found.agreements, *found.left_out):
         assert ((a.rmse_percent, a.correlation) == (None, None)) is (a.quantity == "z")
         assert a.rmse_n is not None
-    shown = ForcesOut.model_validate(api.get(f"/v1/runs/{run['id']}/forces"))
+    shown = valid(Forces, api.get(f"/v1/runs/{run['id']}/forces"))
     assert set(shown.recorded_n["z"]) == {0.0}
 
 
@@ -324,7 +325,7 @@ def test_a_simulation_of_a_genome_of_ones_own(api: Api, dataset: Json) -> None:
     body: Json = {"dataset_id": dataset["id"], "recording": "test-4", "genome": TRUTH["test-4"]}
     answer = api.client.post("/v1/simulations", json=body)
     assert answer.status_code == 200, answer.text
-    true = ForceSimulationOut.model_validate(answer.json())
+    true = valid(ForceSimulation, answer.json())
     assert {(a.quantity, a.source) for a in true.agreements} == {(q, "given") for q in ("lift", "drag", "x", "z")}
     x = next(a for a in true.agreements if a.quantity == "x")
     assert x.correlation is not None
@@ -401,7 +402,7 @@ def test_a_search_followed_by_gauss_newton(api: Api, dataset: Json) -> None:
 
 
 def test_the_models_are_those_of_the_simulator(api: Api) -> None:
-    found = ModelsOut.model_validate(api.get("/v1/models"))
+    found = valid(Models, api.get("/v1/models"))
     assert [p.name for p in found.presets] == list(PRESETS) == list(Preset.__args__)  # type: ignore[attr-defined]
     assert {t.name: [g.name for g in t.genes] for t in found.terms} == {
         t.name: [g.name for g in t.genes] for t in TERMS.values()
