@@ -93,8 +93,8 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
         ("given to the air", f"{means['to_air_w']:.4g} W"),
         ("closing error", f"{means['closing_error_w']:.2g} W, {means['closing_error_percent']:.2g} % of what enters"),
     ]
-    if "solved" in outputs:
-        solved = outputs["solved"]
+    if "numerics" in outputs:
+        solved = outputs["numerics"]
         error = number(solved["estimated_error_mm"], 2)
         rows.append(("solved with", f"{solved['steps_per_beat']} steps a beat, estimated error {error} mm"))
     return [list(row) for row in rows]
@@ -103,7 +103,7 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
 def columns(outputs: a.Outputs) -> Iterator[Column]:
     """Every series with a name of its own, units last; vectors by component."""
     for key, value in outputs.items():
-        if key in ("averages", "solved"):
+        if key in ("averages", "numerics"):
             continue
         if isinstance(value, dict):
             yield from ((f"{name}_{key}", series) for name, series in value.items())

@@ -153,13 +153,13 @@ class Job(TypedDict):
 
 
 class Run(Job):
-    """A calibration; ``wish`` is a pause or cancellation that takes effect after the current generation.
+    """A calibration; ``pending_action`` is a pause or cancellation that takes effect after the current generation.
 
     ``best_mm`` (tracks) is the mean distance per marker, ``best_mn`` (forces) the RMS difference; the other is null.
     """
 
     spec: RunSpec
-    wish: Literal["PAUSE", "CANCEL"] | None
+    pending_action: Literal["PAUSE", "CANCEL"] | None
     generations: int
     best_mm: float | None
     best_mn: float | None
@@ -258,7 +258,7 @@ class Numerics(TypedDict):
 class Comparison(TypedDict):
     """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded.
 
-    The answer contains one of ``every`` instants: 1, except for recordings that are too long for one answer.
+    The answer contains every ``stride``-th instant: all, except of recordings that are too long for one answer.
     """
 
     recording: str
@@ -266,7 +266,7 @@ class Comparison(TypedDict):
     markers: list[str]
     recorded_mm: list[list[Point]]
     simulated_mm: list[list[Point]]
-    every: int
+    stride: int
     numerics: Numerics
 
 

@@ -34,14 +34,14 @@ class DiagnosisSpec(TypedDict):
 
 
 class Diagnosis(Job):
-    """A diagnosis; ``wish`` is a cancellation that takes effect within seconds.
+    """A diagnosis; ``pending_action`` is a cancellation that takes effect within seconds.
 
     ``verdict`` and ``summary`` are null until it has succeeded.
     """
 
     run_id: str | None
     spec: DiagnosisSpec
-    wish: Literal["CANCEL"] | None
+    pending_action: Literal["CANCEL"] | None
     steps: int
     verdict: Verdict | None
     summary: str | None

@@ -10,26 +10,26 @@ from typing_extensions import TypedDict
 class EffectParameter(TypedDict):
     """One gene of an effect.
 
-    With ``of``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its mean
-    chord, or the mass of its wing. The genes of a run have them in ``unit``.
+    With ``relative_to``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its
+    mean chord, or the mass of its wing. The genes of a run have them in ``unit``.
     """
 
     name: str
     unit: str
-    of: Literal["span", "chord", "mass"] | None
+    relative_to: Literal["span", "chord", "mass"] | None
     lower: float
     upper: float
     typical: float
     scale: Literal["log", "linear"]
-    size: bool
-    place: bool
+    is_size: bool
+    is_location: bool
     description: str
 
 
 class Effect(TypedDict):
     """One piece of physics, or one measurement error, that a model can contain.
 
-    The effect is off where all its parameters with ``size`` are zero, as in every nominal genome.
+    The effect is off where all its parameters with ``is_size`` are zero, as in every nominal genome.
     """
 
     name: str

@@ -36,7 +36,7 @@ class Estimate(TypedDict):
     """Maximum-likelihood estimate on one recording, or on several together.
 
     ``correlation`` is in the order of the coefficients; ``noise_mn2`` is the covariance of the fitted outputs, one
-    matrix per recording. ``cost`` is the negative log-likelihood without its constant term.
+    matrix per recording. The log-likelihood lacks its constant term.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Estimate(TypedDict):
     coefficients: list[Coefficient]
     correlation: list[list[float | None]]
     noise_mn2: list[list[list[float | None]]]
-    cost: float | None
+    negative_log_likelihood: float | None
     converged: bool
     remarks: list[str]
 
@@ -58,7 +58,7 @@ class GlobalGene(TypedDict):
     per_deg: float
     scatter: float | None
     largest_error_percent: float | None
-    left_out_error_percent: float | None
+    leave_one_out_error_percent: float | None
 
 
 class GlobalModel(TypedDict):
@@ -91,8 +91,8 @@ class Agreement(TypedDict):
 class ForceResult(TypedDict):
     """Result of a calibration on forces; RMS differences of the fitted axes, nominal and calibrated.
 
-    ``agreements`` compare each recording with every model; for ``left_out`` the global model was fitted without the
-    recording that it predicts (leave-one-out cross-validation).
+    ``agreements`` compare each recording with every model; for ``leave_one_out`` the global model was fitted without
+    the recording that it predicts.
     """
 
     kind: Literal["forces"]
@@ -105,22 +105,22 @@ class ForceResult(TypedDict):
     estimates: list[Estimate]
     global_model: GlobalModel | None
     agreements: list[Agreement]
-    left_out: list[Agreement]
+    leave_one_out: list[Agreement]
     held_out: list[str]
 
 
 class Forces(TypedDict):
     """Forces over the beat and their spectra: recorded (mean beat, standard deviation between beats) and modelled.
 
-    ``phase`` is t*: 0 where the wings are closest. ``spread_n`` is empty with a single beat; the spectra are empty
-    where the recording has no piece without gaps.
+    ``phase`` is t*: 0 where the wings are closest. ``standard_deviation_n`` is empty with a single beat; the spectra
+    are empty where the recording has no piece without gaps.
     """
 
     recording: str
     source: SourceOrGiven
     phase: Series
     recorded_n: ByQuantity
-    spread_n: ByQuantity
+    standard_deviation_n: ByQuantity
     modelled_n: ByQuantity
     frequency_hz: Series
     recorded_spectrum_n2_hz: ByQuantity

@@ -65,7 +65,7 @@ class Averages(TypedDict):
     dissipated_by_connector_w: dict[str, float]
 
 
-class Solved(TypedDict):
+class OutputNumerics(TypedDict):
     """How the beat was solved; loads are solved more accurately than tracks where possible."""
 
     steps_per_beat: int
@@ -76,7 +76,7 @@ class Solved(TypedDict):
 class OutputGroups(TypedDict, total=False):
     """The outputs that can be requested."""
 
-    solved: Solved
+    numerics: OutputNumerics
     motor_angle_deg: MotorSeries
     motor_rate_rad_s: MotorSeries
     motor_torque_n_m: MotorSeries

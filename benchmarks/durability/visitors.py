@@ -115,7 +115,9 @@ class Visitor(threading.Thread):
         for _ in range(int(self._rng.integers(1, 20))):
             self._look(run)
         # Of a request that was carried out the answer may be lost: the state says what is left to ask.
-        while (now := self._fetch(f"/v1/runs/{run}")) and (now["state"] == "PAUSED" or now["wish"] == "PAUSE"):
+        while (now := self._fetch(f"/v1/runs/{run}")) and (
+            now["state"] == "PAUSED" or now["pending_action"] == "PAUSE"
+        ):
             if self._ask("POST", f"/v1/runs/{run}/resume").status_code == 202:
                 self._ledger.acknowledge()
 

@@ -47,7 +47,7 @@ def write_plot(answer: f.Forces, path: Path) -> None:
 
 def _beat(answer: f.Forces, name: f.Quantity) -> Drawn:
     """The band of one standard deviation between beats, where there are several, and both mean beats over it."""
-    phase, recorded, spread = answer["phase"], answer["recorded_n"][name], answer["spread_n"].get(name)
+    phase, recorded, spread = answer["phase"], answer["recorded_n"][name], answer["standard_deviation_n"].get(name)
     band: Drawn = []
     if spread:
         upper = [value + wide for value, wide in zip(recorded, spread, strict=True)]

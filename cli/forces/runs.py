@@ -162,7 +162,7 @@ def write_files(answer: f.Forces, output: Path | None, plot: Path | None) -> Non
     """Write the beat as CSV, and a page with plots."""
     if output:
         columns = {"phase": answer["phase"]}
-        for kind in ("recorded_n", "spread_n", "modelled_n"):
+        for kind in ("recorded_n", "standard_deviation_n", "modelled_n"):
             columns |= {f"{kind[:-2]}_{name}_n": series for name, series in answer[kind].items()}
         _write_forces(output, list(columns), list(columns.values()))
     if plot:
@@ -195,10 +195,10 @@ def _coefficients(estimates: Sequence[f.Estimate]) -> None:
 def _agreements(answer: f.ForceResult) -> None:
     """Models side by side: RMS difference of each force, also in % of its range; mean and correlation of the lift."""
     shown = [source for source in PREFERENCE if _has(answer["agreements"], source)]
-    heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["left_out"] else [])
+    heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["leave_one_out"] else [])
     cells = {(a["recording"], a["quantity"], a["source"]): a for a in answer["agreements"]}
-    left_out = {(a["recording"], a["quantity"]): a for a in answer["left_out"]}
-    every = [*answer["agreements"], *answer["left_out"]]
+    left_out = {(a["recording"], a["quantity"]): a for a in answer["leave_one_out"]}
+    every = [*answer["agreements"], *answer["leave_one_out"]]
     quantity = answer["agreements"][0]["quantity"]
     of_rms = force_unit(a["rmse_n"] for a in every)
     of_means = force_unit(
@@ -232,7 +232,7 @@ def _global(law: f.GlobalModel) -> None:
             number(gene["per_hz"]),
             number(gene["per_deg"]),
             _percent(gene["largest_error_percent"]),
-            _percent(gene["left_out_error_percent"]),
+            _percent(gene["leave_one_out_error_percent"]),
         ]
         for gene in law["genes"]
     ]

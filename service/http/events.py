@@ -162,7 +162,7 @@ def _look(database: Database, watched: Watched, after: int) -> Seen | None:
         steps=b"".join(_event(watched.step, step, step["sequence"]) for step in steps),
         after=last,
         complete=len(steps) < CHUNK,
-        standing=(job["state"], job["wish"], job["error"]),
+        standing=(job["state"], job["pending_action"], job["error"]),
         # The id of a state is that of the last step sent before it: a reconnect then misses nothing.
         state=_event("state", job, last),
         final=State(job["state"]).final,

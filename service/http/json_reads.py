@@ -12,14 +12,16 @@ from typing import Any
 
 from pydantic_core import to_json
 
-from wingfit.client.answers import HistoryItem, Run
+from wingfit.client.answers import HistoryItem
 from wingfit.service.auth.access import whose
 from wingfit.service.http.problems import not_found
 from wingfit.service.runs import views
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import RunRow
 
-RUN, ITEM = tuple(Run.__annotations__), tuple(HistoryItem.__annotations__)
+RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result"))
+ITEM = tuple(HistoryItem.__annotations__)
 # What is kept: answers of at most so many bytes, and runs.
 ANSWERS, LONGEST, RUNS = 512, 2**16, 2**14
 

@@ -47,6 +47,7 @@ def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.F
         kind="forces",
         genes=[gene(one) for one in outcome.genes],
         estimates=[_estimate(one, spec, dataset) for one in outcome.estimates],
+        leave_one_out=[answer(f.Agreement, one) for one in outcome.left_out],
         global_model=model and answer(f.GlobalModel, model, genes=[_global_gene(one) for one in model.genes]),
     )
 
@@ -69,7 +70,7 @@ def forces(found: ForceComparison, source: f.SourceOrGiven | None = None) -> f.F
         "source": source or found.source,
         "phase": np.round(found.phase, 9).tolist(),
         "recorded_n": _named(found.recorded),
-        "spread_n": _named(found.spread),
+        "standard_deviation_n": _named(found.spread),
         "modelled_n": _named(found.modelled),
         "frequency_hz": np.round(found.frequency, 6).tolist(),
         "recorded_spectrum_n2_hz": _named(found.recorded_spectrum, exact=True),
@@ -89,7 +90,7 @@ def law(stored: f.GlobalModel, dataset: Dataset) -> GlobalModel:
                 per_rad=math.degrees(one["per_deg"]),
                 scatter=one["scatter"],
                 largest_error=_fraction(one["largest_error_percent"], math.inf),
-                left_out_error=_fraction(one["left_out_error_percent"], None),
+                left_out_error=_fraction(one["leave_one_out_error_percent"], None),
             )
             for one in stored["genes"]
         ),
@@ -134,6 +135,7 @@ def _estimate(found: LocalEstimate, spec: CalibrationSpec, dataset: Dataset) -> 
         f.Estimate,
         found,
         coefficients=[_coefficient(name, value, found.standard_errors[name]) for name, value in found.values.items()],
+        negative_log_likelihood=finite(found.cost),
         noise_mn2=[[[finite(MN2 * value) for value in row] for row in matrix] for matrix in noise],
     )
 
@@ -151,7 +153,9 @@ def _coefficient(name: str, value: float, error: float) -> f.Coefficient:
 
 
 def _global_gene(one: GlobalGene) -> f.GlobalGene:
-    return answer(f.GlobalGene, one, per_deg=math.radians(one.per_rad))
+    error = one.left_out_error
+    percent = None if error is None else finite(100 * error)
+    return answer(f.GlobalGene, one, per_deg=math.radians(one.per_rad), leave_one_out_error_percent=percent)
 
 
 def _fraction(percent: float | None, nothing: Any) -> Any:

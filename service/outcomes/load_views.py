@@ -48,7 +48,7 @@ def outputs(found: Outputs, names: Iterable[OutputName]) -> answers.Outputs:
     }
     if found.solution is not None:
         steps, beats, error = found.solution
-        answer["solved"] = {"steps_per_beat": steps, "beats": beats, "estimated_error_mm": mm(error)}
+        answer["numerics"] = {"steps_per_beat": steps, "beats": beats, "estimated_error_mm": mm(error)}
     for name in names:
         answer.update(_VIEWS[name](found, lambda series: rounded(series[order])))
     return cast(answers.Outputs, answer)

@@ -39,4 +39,11 @@ def _effect(effect: Effect) -> answers.Effect:
 
 
 def _parameter(effect: Effect, one: Parameter) -> answers.EffectParameter:
-    return answer(answers.EffectParameter, one, name=f"{effect.name}.{one.name}", size=one in effect.size)
+    return answer(
+        answers.EffectParameter,
+        one,
+        name=f"{effect.name}.{one.name}",
+        relative_to=one.of,
+        is_size=one in effect.size,
+        is_location=one.place,
+    )

@@ -195,7 +195,12 @@ def _beats(group: Any, beats: dict[str, Forces]) -> None:
     along = ("quantity", "phase")
     netcdf_variables.numbers(group, "recorded_n", along, "N", "recorded force, mean beat", series(first["recorded_n"]))
     netcdf_variables.numbers(
-        group, "spread_n", along, "N", "standard deviation between beats", series(first["spread_n"])
+        group,
+        "standard_deviation_n",
+        along,
+        "N",
+        "standard deviation between beats",
+        series(first["standard_deviation_n"]),
     )
     modelled = [series(beat["modelled_n"]) for beat in beats.values()]
     netcdf_variables.numbers(group, "modelled_n", ("source", *along), "N", "modelled force", modelled)

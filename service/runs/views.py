@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from wingfit.service.storage.tables import DatasetRow, RunRow
 from wingfit.service.units import MM, finite, mm, mn, tidy_mm
 from wingfit.workers.jobs import Wish
 
+T = TypeVar("T")
 MOST_COORDINATES = 1_000_000  # recorded ones in one answer
 # Fields that rows of recordings do not have if they were stored before datasets could contain forces.
 BEFORE_FORCES: dict[str, Any] = {"channels": []}
@@ -63,8 +64,13 @@ def run(row: RunRow) -> a.Run:
 
 def run_of(values: Mapping[str, Any]) -> a.Run:
     """A run from the values of its row."""
-    wish = None if values["wish"] == Wish.NONE else values["wish"]
-    return checked(a.Run, {**values, "wish": wish, "spec": run_settings(store.spec_from(values["spec"]))})
+    return job_of(a.Run, values, run_settings(store.spec_from(values["spec"])))
+
+
+def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
+    """A run or diagnosis from the values of its row."""
+    action = None if values["wish"] == Wish.NONE else values["wish"]
+    return checked(shape, {**values, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 
 def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
@@ -80,14 +86,14 @@ def result(outcome: tracks_result.Result) -> a.Result:
 
 def comparison(tracks: tracks_result.Comparison) -> Comparison:
     """Recorded and simulated tracks."""
-    every = max(1, -(-tracks.recorded.size // MOST_COORDINATES))
+    stride = max(1, -(-tracks.recorded.size // MOST_COORDINATES))
     return {
         "recording": tracks.recording,
-        "phase": tidy_phase(tracks.phase[::every]).tolist(),
+        "phase": tidy_phase(tracks.phase[::stride]).tolist(),
         "markers": list(tracks.markers),
-        "recorded_mm": _track(tracks.recorded[::every]),
-        "simulated_mm": _track(tracks.simulated[::every]),
-        "every": every,
+        "recorded_mm": _track(tracks.recorded[::stride]),
+        "simulated_mm": _track(tracks.simulated[::stride]),
+        "stride": stride,
         "numerics": numerics(tracks),
     }
 

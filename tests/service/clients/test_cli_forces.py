@@ -226,7 +226,13 @@ def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(
     monkeypatch.setattr(Figure, "to_html", caught)
     phase, recorded, spread = [0.0, 0.5], {"x": [1.0, 3.0]}, {"x": [0.1, 0.2]}
     spectra = {"frequency_hz": [0.0, 1.0, 2.0], "recorded_spectrum_n2_hz": {"x": [9.0, 1e-2, 1e-5]}}
-    answer: Any = {"recording": "r", "source": "local", "phase": phase, "recorded_n": recorded, "spread_n": spread}
+    answer: Any = {
+        "recording": "r",
+        "source": "local",
+        "phase": phase,
+        "recorded_n": recorded,
+        "standard_deviation_n": spread,
+    }
     answer |= {"modelled_n": {"x": [1.0, 2.0]}, "modelled_spectrum_n2_hz": {"x": [9.0, 1e-3, 1e-36]}, **spectra}
     write_plot(answer, tmp_path / "plot.html")
     (figure,) = drawn
@@ -234,5 +240,5 @@ def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(
     assert list(figure.data[0].x) == [0.0, 0.5, 0.5, 0.0]
     assert list(figure.layout.yaxis2.range) == pytest.approx([-10, -1.7])
     assert figure.layout.yaxis2.exponentformat == "power"
-    write_plot(answer | {"spread_n": {}}, tmp_path / "plot.html")
+    write_plot(answer | {"standard_deviation_n": {}}, tmp_path / "plot.html")
     assert [trace.name for trace in drawn[1].data] == ["recorded", "modelled", "recorded", "modelled"]

@@ -126,10 +126,10 @@ def test_a_simulation(api: Api) -> None:
 def test_of_a_long_recording_some_instants_are_answered(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     body: dict[str, Any] = {"dataset_id": api.upload()["id"], "recording": "fast"}
     whole = api.client.post("/v1/simulations", json=body).json()
-    assert (whole["every"], len(whole["phase"])) == (1, 4)
+    assert (whole["stride"], len(whole["phase"])) == (1, 4)
     monkeypatch.setattr(views, "MOST_COORDINATES", 4 * 6 // 2)
     thinned = api.client.post("/v1/simulations", json=body).json()
-    assert thinned["every"] == 2
+    assert thinned["stride"] == 2
     for name in ("phase", "recorded_mm", "simulated_mm"):
         assert thinned[name] == whole[name][::2]
     assert thinned["mean_distance_mm"] == whole["mean_distance_mm"]

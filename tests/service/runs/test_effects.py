@@ -35,7 +35,7 @@ def test_the_list_is_the_registry(api: Api) -> None:
             rig for rig, data in (("wing", robird_wing()), ("vehicle", delfly())) if effect.applies_to(data)
         } == set(one.applies_to)
         assert [p.name for p in one.parameters] == [f"{one.name}.{p.name}" for p in effect.parameters]
-        assert [p.size for p in one.parameters] == [p in effect.size for p in effect.parameters]
+        assert [p.is_size for p in one.parameters] == [p in effect.size for p in effect.parameters]
         assert one.source
         assert one.signature
 
@@ -46,7 +46,7 @@ def test_bounds_that_scale_with_the_rig_are_parts_of_it(api: Api) -> None:
     assert shift["applies_to"] == ["wing"]
     first = shift["parameters"][0]
     gene = EFFECTS["camera_shift"].genes(robird_wing())[0]
-    assert (first["name"], first["unit"], first["of"], first["size"]) == (gene.name, "m", "chord", True)
+    assert (first["name"], first["unit"], first["relative_to"], first["is_size"]) == (gene.name, "m", "chord", True)
     assert first["upper"] / first["lower"] == gene.upper / gene.lower
     assert first["upper"] != gene.upper
 
@@ -112,7 +112,7 @@ def test_a_run_keeps_its_effects_and_is_named_after_them(api: Api) -> None:
 
 def test_effects_tell_requests_apart_that_repeat_a_key(api: Api) -> None:
     dataset, key = api.upload()["id"], {"Idempotency-Key": "one"}
-    bodies: list[Json] = [{}, {"effects": []}, {"effects": ["camera_shift"]}]
+    bodies: list[Json] = [{"effects": []}, {"effects": []}, {"effects": ["camera_shift"]}]
     answers = [api.client.post("/v1/runs", json={"dataset_id": dataset} | body, headers=key) for body in bodies]
     assert [answer.status_code for answer in answers] == [202, 202, 422]
     assert answers[0].json()["id"] == answers[1].json()["id"]

@@ -49,15 +49,15 @@ def test_loads_come_only_when_asked_for(api: Api) -> None:
     assert "outputs" not in simulate(api, outputs=False).json()
     assert "outputs" not in simulate(api, outputs=[]).json()
     whole = simulate(api, outputs=True).json()["outputs"]
-    assert set(whole) == {"phase", "drive_phase", "solved"}.union(*GROUPS.values())
-    assert whole["solved"] == {"steps_per_beat": 96, "beats": 5, "estimated_error_mm": 0.02}
+    assert set(whole) == {"phase", "drive_phase", "numerics"}.union(*GROUPS.values())
+    assert whole["numerics"] == {"steps_per_beat": 96, "beats": 5, "estimated_error_mm": 0.02}
     valid(Outputs, whole)
 
 
 @pytest.mark.parametrize("name", OUTPUT_NAMES)
 def test_each_name_brings_its_own(api: Api, name: str) -> None:
     found = simulate(api, outputs=[name, name]).json()["outputs"]
-    assert set(found) == {"phase", "drive_phase", "solved"} | GROUPS[name]
+    assert set(found) == {"phase", "drive_phase", "numerics"} | GROUPS[name]
 
 
 def test_the_beat_begins_at_the_upstroke_crossing(api: Api) -> None:
@@ -104,7 +104,7 @@ def test_loads_of_a_run(api: Api) -> None:
     assert best.recording == "slow"
     nominal = api.get(f"/v1/runs/{run_id}/loads?recording=fast&genome=nominal&outputs=averages&outputs=air")
     assert nominal["recording"] == "fast"
-    assert set(nominal["outputs"]) == {"phase", "drive_phase", "solved", "averages"} | GROUPS["air"]
+    assert set(nominal["outputs"]) == {"phase", "drive_phase", "numerics", "averages"} | GROUPS["air"]
     assert best.outputs.averages is not None
     assert best.outputs.averages.supplied_w > nominal["outputs"]["averages"]["supplied_w"]
     for query, where in (("outputs=torque", "query.outputs.0"), ("recording=nope", "query.recording")):
@@ -173,7 +173,7 @@ def test_the_client(client: httpx.Client, api: Api) -> None:
     api.finish(run_id)
     with Client(str(client.base_url)) as mine:
         outputs = mine.simulate(dataset, "slow", outputs=["motors"])["outputs"]
-        assert set(outputs) == {"phase", "drive_phase", "solved"} | GROUPS["motors"]
+        assert set(outputs) == {"phase", "drive_phase", "numerics"} | GROUPS["motors"]
         loads = mine.loads(run_id, "fast", "nominal", ["air", "energy"])
         assert (loads["recording"], len(loads["outputs"]["energy_j"])) == ("fast", 3)
         assert "connectors" in mine.loads(run_id)["outputs"]
