@@ -27,6 +27,7 @@ UNITS: Mapping[str, tuple[Convert, Convert]] = {
     "_mbar": (lambda pascals: pascals / PASCAL_PER_MBAR, lambda mbar: mbar * PASCAL_PER_MBAR),
     "_c": (lambda kelvins: kelvins - ZERO_CELSIUS, lambda celsius: celsius + ZERO_CELSIUS),
     "_percent": (lambda fraction: 100 * fraction, lambda percent: percent / 100),
+    "_beats": (float, float),
     "_hz": (float, float),
     "_m_s": (float, float),
     "_n": (float, float),
@@ -50,12 +51,13 @@ def checked(shape: type[T], values: Mapping[str, Any]) -> T:
     return _adapter(shape).validate_python(values)  # type: ignore[no-any-return]
 
 
-def in_si(values: Mapping[str, float]) -> dict[str, float]:
-    """Values by the names of fields, converted to SI and by the names of attributes."""
-    found = {}
-    for name, value in values.items():
-        ending = _ending(name)
-        found[name.removesuffix(ending)] = UNITS[ending][1](value)
+def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
+    """``values`` of fields by the names of attributes; those of fields that end in a unit are converted to SI."""
+    found = dict(values)
+    for name in values:
+        if ending := _ending(name):
+            value = found.pop(name)
+            found[name.removesuffix(ending)] = None if value is None else UNITS[ending][1](value)
     return found
 
 
@@ -63,7 +65,7 @@ def _attribute(source: object, name: str) -> tuple[Any, Convert | None]:
     """The attribute that a field stands for, and the conversion of its numbers."""
     if hasattr(source, name):
         return getattr(source, name), None
-    if (ending := _ending(name)) in UNITS:
+    if ending := _ending(name):
         return getattr(source, name.removesuffix(ending)), UNITS[ending][0]
     raise AttributeError(f"{type(source).__name__} has no attribute for the field {name!r}, which is not computed")
 

@@ -12,7 +12,7 @@ from fastapi import Depends, Request
 
 from wingfit.service.auth.access import KeyRing
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses.diagnoser import Diagnoser, ModelDiagnoser
+from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.diagnosing import Diagnosing
 from wingfit.service.http import threads
 from wingfit.service.http.concurrency_limit import (
@@ -36,7 +36,7 @@ from wingfit.service.operations.health import Health
 from wingfit.service.operations.metrics_and_log import Gauges, Metrics
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.runs.calibrating import Calibrating
-from wingfit.service.runs.engine import Engine, ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings
 from wingfit.service.storage import store
 from wingfit.service.storage.backup import forget_snapshots
@@ -64,8 +64,8 @@ class Service:
         diagnoser: Diagnoser | None = None,
     ) -> None:
         self.settings, self.database = settings, database
-        self.engine: Engine = engine or ModelEngine()
-        self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
+        self.engine: Engine = engine or Engine()
+        self.diagnoser: Diagnoser = diagnoser or Diagnoser()
         self.keys = KeyRing()
         # Requests that are being answered: method, path, and when they came.
         self.under_way: dict[int, tuple[str, str, float]] = {}

@@ -30,7 +30,7 @@ def checked(
     Of the genome those genes are taken that the model asked for has.
     """
     spec_views.refuse_foreign(body, dataset)
-    calibration = specs.calibration(body, of_run)
+    calibration = specs.nominal_model(body, of_run)
     spec_views.refuse_cutoff(calibration.low_pass, dataset.recordings)
     vehicle = VehicleModel.model_validate({"preset": calibration.preset, "without": list(calibration.without)})
     spec_views.refuse_effects(calibration.effects, dataset, vehicle)
@@ -38,7 +38,7 @@ def checked(
     _refuse_unknown(calibration, dataset, known)
     _refuse_bounds(engine, calibration, dataset)
     start = {name: value for name, value in (genome or {}).items() if name in known}
-    spec = specs.asked(body, calibration, start)
+    spec = specs.diagnosis_spec(body, calibration, start)
     try:
         diagnoser.check(spec, dataset)
     except ValueError as error:

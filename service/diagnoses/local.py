@@ -13,10 +13,10 @@ from wingfit.client.transport import WingfitError
 from wingfit.diagnosis.finding import Finding
 from wingfit.records import Dataset, load_dataset
 from wingfit.service.diagnoses.checks import checked
-from wingfit.service.diagnoses.diagnoser import ModelDiagnoser
+from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.workers import make_evaluator
 from wingfit.workers.jobs import eta_seconds
@@ -29,9 +29,9 @@ def diagnose(path: Path, asked: dict[str, Any], workers: int | None, on_progress
 
     ``on_progress`` gets the part that is done, the seconds left, and the stage. WingfitError says what is wrong.
     """
-    dataset, diagnoser = _loaded(path), ModelDiagnoser()
+    dataset, diagnoser = _loaded(path), Diagnoser()
     try:
-        spec = checked(DiagnosisIn.model_validate(asked), dataset, ModelEngine(), diagnoser)
+        spec = checked(DiagnosisIn.model_validate(asked), dataset, Engine(), diagnoser)
     except ValidationError as error:
         faults = [
             {"where": ".".join(map(str, one["loc"])), "value": one.get("input"), "message": one["msg"]}

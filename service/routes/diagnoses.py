@@ -11,7 +11,7 @@ from starlette.responses import HTMLResponse, Response
 from wingfit.client.answers import Page
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.service.container import IN_TURN_OF_DOWNLOADS, Service, ServiceDep
-from wingfit.service.diagnoses import checks, specs, views
+from wingfit.service.diagnoses import checks, views
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
@@ -66,7 +66,7 @@ def submit(
         spec = checks.checked(body, dataset, service.engine, service.diagnoser, of_run, _genome(run))
         name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"
         row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, name=name[: spec_views.LONGEST_NAME])
-        row.run_id, row.spec = body.run_id, specs.plain(spec)
+        row.run_id, row.spec = body.run_id, store.spec_json(spec)
         return row
 
     return submit_job(request, service, service.diagnosing, idempotency_key, body, plan)

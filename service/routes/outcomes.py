@@ -124,7 +124,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
     spec_views.refuse_effects(body.effects, dataset, body)
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects, body)
+    spec = spec_views.simulation_spec(body)
     values = _asked(service, dataset, spec, body)
     try:
         simulated = _tracks if dataset.kind == "tracks" else _forces
@@ -148,7 +148,7 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
         item = error_item("body.dataset_id", body.dataset_id, "describes a vehicle; loads inside the wing need a wing")
         raise invalid("there are no such loads", [item])
     spec_views.refuse_effects(body.effects, dataset)
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects)
+    spec = spec_views.simulation_spec(body)
     values = _asked(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))

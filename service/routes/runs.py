@@ -89,7 +89,7 @@ def _asked(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
     spec_views.refuse_effects(body.effects, dataset, body)
-    spec = _checked(service, spec_views.of_run(body), dataset)
+    spec = _checked(service, spec_views.calibration_spec(body), dataset)
     spec_views.refuse_idle(body, spec.method)
     return dataset, spec
 

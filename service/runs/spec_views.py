@@ -1,8 +1,9 @@
-"""Specifications between the wire and the inside: SI, tuples, and what belongs to the other kind of dataset."""
+"""Specifications of calibrations from requests and in answers; refusal of settings that do not fit the dataset."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 from pydantic import BaseModel
@@ -11,16 +12,18 @@ from wingfit.calibration.effects import effect_of
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.client.answers import RunSpec
 from wingfit.records import Dataset, Recording
-from wingfit.service.answers import checked
+from wingfit.service.answers import answer, in_si
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
+from wingfit.service.outcomes.requests import WingIn
 from wingfit.service.runs.requests import RunIn, VehicleModel
 from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
-from wingfit.service.units import MM, tidy_mm
+from wingfit.service.units import tidy_mm
 from wingfit.sim.effects.registry import chosen
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.terms import PRESETS
 from wingfit.sim.vehicle.terms import chosen as terms_of
 
+SPEC_FIELDS = {field.name for field in fields(CalibrationSpec)}
 # A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
 WIDEST_BOUNDS = 100.0
 METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
@@ -28,43 +31,23 @@ USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
 LONGEST_NAME = 200
 
 
-def run_settings(given: CalibrationSpec) -> RunSpec:
+def run_settings(spec: CalibrationSpec) -> RunSpec:
     """The settings of a run as answers give them."""
-    named = {
-        "accuracy_mm": tidy_mm(given.accuracy),
-        "low_pass_hz": given.low_pass,
-        "peel_width_beats": given.peel_width,
+    return answer(RunSpec, spec, accuracy_mm=tidy_mm(spec.accuracy))
+
+
+def calibration_spec(body: BaseModel, base: CalibrationSpec | None = None) -> CalibrationSpec:
+    """The specification that a request gives; fields that it does not give are those of ``base``, or the defaults."""
+    given = in_si({name: getattr(body, name) for name in body.model_fields_set})
+    changes: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in given.items() if name in SPEC_FIELDS
     }
-    return checked(RunSpec, vars(given) | named)
+    return replace(base or CalibrationSpec(), **changes)
 
 
-def of_run(body: RunIn) -> CalibrationSpec:
-    """What a request for a run asks for."""
-    alike = ("division", "mode", "method", "population", "stall", "tolerance", "max_generations", "seed")
-    return CalibrationSpec(
-        **{name: getattr(body, name) for name in alike},
-        bounds_factor=body.bounds_factor,
-        accuracy=body.accuracy_mm / MM,
-        recordings=tuple(body.recordings),
-        genes=tuple(body.genes),
-        effects=tuple(body.effects),
-        finish=body.finish,
-        axes=tuple(body.axes),
-        **_vehicle(body),
-    )
-
-
-def of_simulation(
-    division: str, accuracy_mm: float, effects: Iterable[str], vehicle: VehicleModel | None = None
-) -> CalibrationSpec:
-    """The model that a request for a simulation asks for."""
-    return CalibrationSpec(
-        division=division,
-        bounds_factor=WIDEST_BOUNDS,
-        accuracy=accuracy_mm / MM,
-        effects=tuple(effects),
-        **(_vehicle(vehicle) if vehicle else {}),
-    )
+def simulation_spec(body: WingIn) -> CalibrationSpec:
+    """The model that a request for a simulation gives."""
+    return replace(calibration_spec(body), bounds_factor=WIDEST_BOUNDS)
 
 
 def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) -> None:
@@ -173,12 +156,3 @@ def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorIte
     fields = type(body).model_fields
     given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
     return [error_item(f"body.{name}", getattr(body, name), message) for name in given]
-
-
-def _vehicle(body: VehicleModel) -> dict[str, Any]:
-    return {
-        "preset": body.preset,
-        "without": tuple(body.without),
-        "low_pass": body.low_pass_hz,
-        "peel_width": body.peel_width_beats,
-    }

@@ -13,10 +13,12 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
 
+from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid, not_found
 from wingfit.service.storage.database import is_full
 from wingfit.service.storage.tables import (
@@ -38,6 +40,7 @@ LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
 # What specifications meant that were stored before there was a choice.
+_SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
@@ -274,14 +277,11 @@ def spec(row: RunRow) -> CalibrationSpec:
 
 def spec_from(values: dict[str, Any]) -> CalibrationSpec:
     """A specification from its JSON form."""
-    tuples: dict[str, Any] = {
-        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes", "effects") if name in values
-    }
-    return CalibrationSpec(**(BEFORE_METHODS | values | tuples))
+    return _SPEC.validate_python(BEFORE_METHODS | values)
 
 
-def spec_json(given: CalibrationSpec) -> dict[str, Any]:
-    """A specification as JSON."""
+def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
+    """The specification of a run or diagnosis as JSON."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
     return plain
 

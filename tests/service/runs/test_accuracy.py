@@ -23,7 +23,7 @@ from wingfit.client.client import Client
 from wingfit.records import Dataset, FourBarDrive
 from wingfit.service.app import create_app
 from wingfit.service.runs import views
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.requests import COARSEST_MM, FINEST_MM
 from wingfit.service.runs.simulation_hints import FLUTTER, with_remedy
 from wingfit.service.runs.spec_views import run_settings
@@ -174,7 +174,7 @@ def dataset() -> Dataset:
 
 
 def test_the_real_engine_solves_as_well_as_asked(dataset: Dataset) -> None:
-    engine = ModelEngine()
+    engine = Engine()
     rough, fine = (CalibrationSpec(division="4", accuracy=accuracy) for accuracy in (1e-3, 2e-5))
     genome = engine.genome(rough, dataset, {})
     found = [engine.compare(spec, dataset, genome, "still") for spec in (rough, fine, fine)]
@@ -197,7 +197,7 @@ def test_the_real_loads_are_given_the_accuracy_too(dataset: Dataset, monkeypatch
     monkeypatch.setattr(
         "wingfit.service.runs.engine.simulate_outputs", lambda model, *_: given.append(model.numerics.accuracy)
     )
-    engine, spec = ModelEngine(), CalibrationSpec(division="4", accuracy=3e-4)
+    engine, spec = Engine(), CalibrationSpec(division="4", accuracy=3e-4)
     engine.loads(spec, dataset, engine.genome(spec, dataset, {}), dataset.recordings[0])
     assert given == [3e-4]
 

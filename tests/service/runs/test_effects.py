@@ -13,9 +13,10 @@ from wingfit.calibration.search import CalibrationSpec
 from wingfit.client.effect_answers import Effects
 from wingfit.records import Dataset, Genome
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.outcomes.requests import SimulationIn
+from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.requests import RunIn
-from wingfit.service.runs.spec_views import of_run, of_simulation, refuse_effects, run_name, run_settings
+from wingfit.service.runs.spec_views import calibration_spec, refuse_effects, run_name, run_settings, simulation_spec
 from wingfit.service.storage import store
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
@@ -119,7 +120,7 @@ def test_effects_tell_requests_apart_that_repeat_a_key(api: Api) -> None:
 
 
 def test_specifications_go_around_and_those_of_before_name_no_effect() -> None:
-    spec = of_run(RunIn(dataset_id="x", effects=["camera_shift"], mode="joint", method="genetic"))
+    spec = calibration_spec(RunIn(dataset_id="x", effects=["camera_shift"], mode="joint", method="genetic"))
     assert spec.effects == ("camera_shift",)
     stored = store.spec_json(spec)
     assert store.spec_from(stored) == spec
@@ -141,7 +142,7 @@ def test_a_vehicle_takes_effects_on_forces_and_no_others() -> None:
     refuse_effects(["clap_and_peel"], dataset, RunIn(dataset_id="x", without=["clap_and_peel"]))
     spec = CalibrationSpec(effects=("balance_offset",), without=("inertial",), mode="local")
     assert run_name(dataset, spec) == "delfly, proposed without inertial with balance_offset, local"
-    names = ModelEngine().gene_names(spec, dataset)
+    names = Engine().gene_names(spec, dataset)
     assert [name for name in names if "." in name] == [gene.name for gene in EFFECTS["balance_offset"].genes(delfly())]
 
 
@@ -152,8 +153,11 @@ def test_a_simulation_with_an_effect_contains_it() -> None:
     recording = record(
         model, Genome.nominal(model.genes), vacuum(10.0, 0.0, 3.0), Tracking(beats=1), np.random.default_rng(1)
     )
-    dataset, engine = Dataset("robird", wing, (recording,)), ModelEngine()
-    plain, shifted = (of_simulation("4", 1.0, effects) for effects in ([], ["camera_shift"]))
+    dataset, engine = Dataset("robird", wing, (recording,)), Engine()
+    plain, shifted = (
+        simulation_spec(SimulationIn(dataset_id="d", recording="r", division="4", accuracy_mm=1.0, effects=effects))
+        for effects in ([], ["camera_shift"])
+    )
     genome = engine.genome(shifted, dataset, {"camera_shift.y": 2e-3})
     before = engine.compare(plain, dataset, engine.genome(plain, dataset, {}), recording.name)
     after = engine.compare(shifted, dataset, genome, recording.name)

@@ -24,7 +24,7 @@ from wingfit.client.load_answers import Loads, Outputs
 from wingfit.records import Condition, Dataset
 from wingfit.service.outcomes import load_views
 from wingfit.service.outcomes.requests import OUTPUT_NAMES, ConditionIn
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, tunnel
 
 Json = dict[str, Any]
@@ -268,7 +268,7 @@ def test_the_real_engine() -> None:
     wing = robird_wing()
     recording = blank_recording(wing, tunnel(0.05, 3.0, 6.0), "windy")
     dataset = Dataset("robird", wing, (recording,))
-    engine, spec = ModelEngine(), CalibrationSpec(division="4", bounds_factor=100.0)
+    engine, spec = Engine(), CalibrationSpec(division="4", bounds_factor=100.0)
     found = engine.loads(spec, dataset, engine.genome(spec, dataset, {}), recording)
     answer = load_views.outputs(found, load_views.wanted(True))
     checked = valid(Outputs, json.loads(json.dumps(answer)))
