@@ -29,8 +29,8 @@ from wingfit.service.http.events import Events
 from wingfit.service.http.json_reads import Reading
 from wingfit.service.http.shortcut import Shortcut
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import Work
-from wingfit.service.jobs.runner import Known, Runner
+from wingfit.service.jobs.job_kind import JobKind
+from wingfit.service.jobs.runner import JobRef, Runner
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
 from wingfit.service.operations.metrics_and_log import Gauges, Metrics
@@ -98,11 +98,11 @@ class Service:
         self._housekeeping.start()
         self._pool.start()
 
-    def enqueue(self, work: Work, job_id: str) -> None:
+    def enqueue(self, kind: JobKind, job_id: str) -> None:
         """Compute a job that was stored, when its turn comes."""
         with self.database.read() as session:
-            owner = store.one(session, work.table, job_id).owner
-        self.runner.enqueue(work, job_id, owner)
+            owner = store.one(session, kind.table, job_id).owner
+        self.runner.enqueue(kind, job_id, owner)
 
     def load_keys(self) -> None:
         """Take the keys that are good now; streams that were opened with another one end."""
@@ -142,10 +142,10 @@ class Service:
         for job in self.runner.under_way():
             yield f"{job} is left as stored ({self._last_step(job)}) and goes on at the next start"
 
-    def _last_step(self, job: Known) -> str:
+    def _last_step(self, job: JobRef) -> str:
         def stored() -> str:
             with self.database.read() as session:
-                return f"after step {store.one(session, job.work.table, job.id).generations}"
+                return f"after step {store.one(session, job.kind.table, job.id).generations}"
 
         try:
             return threads.call("stop-look", stored).result(LOOK_SECONDS)

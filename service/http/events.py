@@ -18,7 +18,7 @@ from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
 from wingfit.service.answers import checked
 from wingfit.service.auth.access import CALLER, Caller, KeyRing
 from wingfit.service.http.problems import ProblemError, error_item, invalid
-from wingfit.service.jobs.job_kind import Work
+from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.runs.views import columns
 from wingfit.service.storage import store
@@ -131,7 +131,7 @@ class Events:
         return await asyncio.shield(look)
 
 
-def watched(kind: Work, job_id: str) -> Watched:
+def watched(kind: JobKind, job_id: str) -> Watched:
     """A job to watch: of a run the generations, of a diagnosis the steps."""
 
     def look(session: Session, after: int, limit: int) -> Told:

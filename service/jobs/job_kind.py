@@ -1,4 +1,4 @@
-"""What the runner computes: a kind of job (calibration, diagnosis), told in steps that are each stored."""
+"""Interface between the runner and the kinds of job (calibration, diagnosis), which compute in stored steps."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ Points = list[tuple[float, float]]
 
 
 class InterruptedStepError(Exception):
-    """A step was given up because the job is to be cancelled, or the service stops."""
+    """A step was abandoned because the job is to be cancelled or the service stops."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One piece of a job that is done.
+    """One finished step of a job.
 
     Attributes:
         progress: of the whole job, in [0, 1].
-        keep: writes what the step found: ``keep(session, row, eta_seconds)``, in one transaction with the job's state.
-        last: whether the job has ended; what it ``keep`` s is then kept only if the job was not cancelled meanwhile.
-        lasting: whether a job that is started again goes on after it.
+        store: ``store(session, row, eta_seconds)`` writes the results, in one transaction with the job's state.
+        last: whether the job has ended; its results are stored only if it was not cancelled meanwhile.
+        resumable: whether a restarted job continues after this step.
     """
 
     progress: float
-    keep: Callable[[Session, Any, float | None], None]
+    store: Callable[[Session, Any, float | None], None]
     last: bool = False
-    lasting: bool = True
+    resumable: bool = True
 
 
-class Work(Protocol):
+class JobKind(Protocol):
     """A kind of job (run, diagnosis): its resource in the API, its tables, and how one is computed.
 
     Attributes:
@@ -67,9 +67,9 @@ class Work(Protocol):
         ...
 
     def begin(self, session: Session, row: Any) -> Points:
-        """Prepare ``row`` for a start or a restart; (elapsed s, progress) of the steps that it goes on from."""
+        """Prepare ``row`` for a start or restart; (elapsed s, progress) of the steps after which it continues."""
         ...
 
     def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
-        """Compute; the last step has ``last``."""
+        """Compute; only the last step has ``last``."""
         ...

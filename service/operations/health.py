@@ -10,7 +10,7 @@ from sqlalchemy import inspect
 from wingfit.client.answers import Health as HealthAnswer
 from wingfit.service.http import threads
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import Work
+from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.settings import Settings
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -27,7 +27,7 @@ Jobs = dict[str, dict[str, int]]
 class Health:
     """Counts jobs in a thread of its own; who asks meanwhile shares the count."""
 
-    def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[Work]) -> None:
+    def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[JobKind]) -> None:
         self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
         self._counting = threads.Shared("health", self._count)
         self.jobs: Jobs | None = None
@@ -48,7 +48,7 @@ class Health:
     async def now(self) -> HealthAnswer:
         """Standing of the service, of all owners, whoever asks."""
         silent = await self.look()
-        run, diagnosis = (None if self.jobs is None else _active(self.jobs[work.what]) for work in self._kinds)
+        run, diagnosis = (None if self.jobs is None else _active(self.jobs[kind.what]) for kind in self._kinds)
         return HealthAnswer(
             status="degraded" if silent else self._pool.status,
             version=wingfit_version(),
@@ -63,7 +63,7 @@ class Health:
     def _count(self) -> Jobs:
         with self._database.look() as look:
             return {
-                work.what: dict(look.execute(_COUNT.format(inspect(work.table).local_table))) for work in self._kinds
+                kind.what: dict(look.execute(_COUNT.format(inspect(kind.table).local_table))) for kind in self._kinds
             }
 
 

@@ -15,17 +15,17 @@ from wingfit.service.container import Service, ServiceDep
 from wingfit.service.http import responses as http
 from wingfit.service.http.events import LastEventId, described, watched
 from wingfit.service.http.problems import ProblemError, error_item, invalid
-from wingfit.service.jobs.job_kind import Work
+from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import JobRow
 from wingfit.workers import jobs
 
-KindOf = Callable[[Service], Work]
+KindOf = Callable[[Service], JobKind]
 Actions = Mapping[str, tuple[jobs.Event, str]]
 
 
 def submit_job(
-    request: Request, service: Service, kind: Work, key: str | None, body: BaseModel, plan: Callable[[], JobRow]
+    request: Request, service: Service, kind: JobKind, key: str | None, body: BaseModel, plan: Callable[[], JobRow]
 ) -> Response:
     """Store the job of a request and queue it; the same answer again for a repeated request.
 

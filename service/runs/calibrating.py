@@ -1,4 +1,4 @@
-"""Runs: calibrations that go on from their last stored generation."""
+"""Runs: calibrations, which continue after their last stored generation."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Calibrating:
         return views.run(row)
 
     def begin(self, session: Session, row: RunRow) -> Points:
-        """Go on where the run was: its generations so far."""
+        """Continue after the generations so far."""
         return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Search generation by generation, then judge what was found."""
+        """Search generation by generation, then evaluate the result on every recording."""
         spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, row.id)
@@ -50,17 +50,17 @@ class Calibrating:
             yield _step(generation)
         if checkpoint is None:
             raise ValueError("the search ended without a generation")
-        judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
-        if isinstance(judged, ForceResult):
-            yield _judged(force_views.result(judged, spec, dataset))
+        summary = self._engine.summarise(spec, dataset, evaluator, checkpoint)
+        if isinstance(summary, ForceResult):
+            yield _result(force_views.result(summary, spec, dataset))
         else:
-            yield _judged(views.result(judged))
+            yield _result(views.result(summary))
 
 
 def _step(generation: Generation) -> Step:
     """One generation with its checkpoint and genome."""
 
-    def keep(session: Session, row: RunRow, eta: float | None) -> None:
+    def store_step(session: Session, row: RunRow, eta: float | None) -> None:
         row.stage, row.genome = generation.stage, generation.genome
         misfit = views.misfit(row.kind, generation.distance)
         row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
@@ -69,16 +69,16 @@ def _step(generation: Generation) -> Step:
         session.add(_generation_row(row, generation, eta))
         session.merge(CheckpointRow(run_id=row.id, body=generation.checkpoint))
 
-    return Step(generation.progress, keep)
+    return Step(generation.progress, store_step)
 
 
-def _judged(outcome: Mapping[str, Any]) -> Step:
-    def keep(_session: Session, row: RunRow, _eta: float | None) -> None:
+def _result(outcome: Mapping[str, Any]) -> Step:
+    def store_step(_session: Session, row: RunRow, _eta: float | None) -> None:
         row.result = dict(outcome)
-        # while it runs, the best of the present stage; in the end, over all that was fitted
+        # While the run is running, the best of the current stage; in the end, the misfit to all fitted recordings.
         row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
 
-    return Step(1.0, keep, last=True)
+    return Step(1.0, store_step, last=True)
 
 
 def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> GenerationRow:

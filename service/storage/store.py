@@ -1,4 +1,4 @@
-"""What the database is asked and told. Every function works in a session: callers decide what is atomic."""
+"""Queries and changes of the database. Every function works in a session, so that callers decide what is atomic."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from wingfit.workers.jobs import Job, State, Wish
 LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
-# What specifications meant that were stored before there was a choice.
+# Value of fields that the first version did not store.
 _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
@@ -49,17 +49,17 @@ Step = TypeVar("Step", bound=StepOfJob)
 
 
 def now() -> str:
-    """Give the time, RFC 3339 in UTC."""
+    """The present time, RFC 3339 in UTC."""
     return timestamp(datetime.now(UTC))
 
 
 def timestamp(moment: datetime) -> str:
-    """A time in UTC as it is stored: RFC 3339, so that texts are in the order of the times."""
+    """A time in UTC as it is stored: RFC 3339, which sorts by time."""
     return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def new_id(prefix: str) -> str:
-    """An id that nobody can guess."""
+    """A random id that cannot be guessed."""
     return f"{prefix}_{secrets.token_hex(8)}"
 
 
@@ -98,7 +98,7 @@ def cursor_before(number: int) -> str:
 
 
 def number(cursor: str) -> int:
-    """The number before which a cursor leads, or a 422."""
+    """The number that a cursor stands for, or a 422."""
     try:
         text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
         if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
@@ -123,23 +123,23 @@ def archive(session: Session, dataset_id: str) -> bytes:
 
 
 def parsed(session: Session, dataset_id: str) -> bytes | None:
-    """The dataset in the project's own form, where it is stored so."""
+    """The dataset in the parsed form, if that is stored."""
     return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
 
 
 def has_parsed(connection: sqlite3.Connection, dataset_id: str) -> bool:
-    """Whether the dataset is stored in the project's own form."""
+    """Whether the parsed form of the dataset is stored."""
     return connection.execute("SELECT 1 FROM parsed WHERE dataset_id = ?", (dataset_id,)).fetchone() is not None
 
 
 def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
-    """Store a dataset in the project's own form, unless it was deleted meanwhile."""
+    """Store the parsed form of a dataset, unless it was deleted meanwhile."""
     if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):
         session.merge(ParsedRow(dataset_id=dataset_id, body=body))
 
 
 def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
-    """``size`` bytes of the dataset's archive from ``start``, without reading the others; a 404 where it is gone."""
+    """``size`` bytes of the dataset's archive from ``start``, without reading the rest; a 404 if it is deleted."""
     row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
     if row is None:
         raise not_found("dataset", dataset_id)
@@ -149,7 +149,7 @@ def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, s
 
 
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
-    """A 429 where the archives of an owner, with what is stored beside them, would take more than ``most_mb``."""
+    """A 429 if the archives of an owner and their parsed forms would take more than ``most_mb``."""
     held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
     beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
     held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
@@ -206,7 +206,7 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
 
 
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
-    """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
+    """The owner of a dataset, who will own a job on it; a 429 if ``most`` jobs of that owner have not ended."""
     owner = one(session, DatasetRow, dataset_id).owner
     count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
     if count >= most:
@@ -219,8 +219,8 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
 
 
 def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
-    his = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
-    return session.scalar(his) or 0
+    active = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+    return session.scalar(active) or 0
 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
@@ -228,7 +228,7 @@ def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> list[JobRow]:
-    """Jobs in ``state``, oldest first; one whose row cannot be read is logged and passed over."""
+    """Jobs in ``state``, oldest first; unreadable rows are logged and skipped."""
     numbers = session.scalars(select(table.number).where(table.state == state.value).order_by(table.number)).all()
     return [row for number in numbers if (row := _readable(session, table, number))]
 
@@ -237,8 +237,8 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
     try:
         row = session.get_one(table, number)
         job(row)
-    except Exception as error:  # whatever it is that stands there
-        if is_full(error):  # the disk fails, and not the row
+    except Exception as error:  # the stored values may be anything
+        if is_full(error):  # the disk fails, the row may be readable
             raise
         LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
         return None
@@ -246,7 +246,7 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
 
 
 def job(row: JobRow) -> Job:
-    """The row's job; ValueError or TypeError for values that no server stored."""
+    """The job of a row; ValueError or TypeError for values that a server cannot have stored."""
     starts = row.starts or 0
     numbers: tuple[object, ...] = (row.generations, starts, row.progress)
     times: tuple[object, ...] = (row.created_at, row.started_at, row.finished_at)
@@ -259,7 +259,7 @@ def job(row: JobRow) -> Job:
 
 
 def put_job(row: JobRow, after: Job) -> None:
-    """Store a job in its row; the times follow from the states."""
+    """Store a job in its row, and the times that follow from its state."""
     row.state, row.wish = after.state.value, after.wish.value
     row.generations, row.progress, row.error, row.starts = after.generations, after.progress, after.error, after.starts
     if after.state is State.RUNNING and row.started_at is None:
@@ -299,7 +299,7 @@ _MADE: dict[str, type[OwnedRow]] = {
 
 @dataclass(frozen=True)
 class Repeat:
-    """The key of a request that may be repeated, and what must be equal for it to be the same request."""
+    """The Idempotency-Key of a request, and a fingerprint that is equal for the same request."""
 
     path: str
     key: str
@@ -308,7 +308,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer that created something."""
+    """The answer to a request that created a resource."""
 
     status: int
     location: str
@@ -316,9 +316,9 @@ class Answer:
 
 
 def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
-    """What the same request was answered before; a 422 when the key was used for another one.
+    """The earlier answer to the same request; a 422 if the key was used for another request.
 
-    A 409 when what it made was deleted since: to tell of it would be wrong, and to make it again unasked.
+    A 409 if the resource was deleted since: it neither exists nor should a repetition create it again.
     """
     row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
     if row is None or repeat is None:
@@ -335,7 +335,7 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
 
 
 def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
-    """Remember an answer together with what it created."""
+    """Store an answer in the transaction that creates its resource."""
     if repeat:
         session.add(
             AnswerRow(
@@ -351,5 +351,5 @@ def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None
 
 
 def forget_answers(session: Session) -> None:
-    """Drop answers that nobody will ask for again."""
+    """Delete answers that are older than ANSWERS_KEPT."""
     session.execute(delete(AnswerRow).where(AnswerRow.created_at < timestamp(datetime.now(UTC) - ANSWERS_KEPT)))

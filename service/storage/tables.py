@@ -38,7 +38,7 @@ class OwnedRow:
 
 
 class KeyRow(Table):
-    """An API key. ``sha256`` is of its secret, which is stored nowhere; a key that was revoked stays, to be told of."""
+    """An API key. Of its secret only ``sha256`` is stored; revoked keys stay listed."""
 
     __tablename__ = "key"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
@@ -54,7 +54,7 @@ class KeyRow(Table):
 
 
 class DatasetRow(OwnedRow, Table):
-    """An uploaded dataset: what lists show; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
+    """An uploaded dataset, described; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
@@ -77,7 +77,7 @@ class ArchiveRow(Table):
 
 
 class ParsedRow(Table):
-    """A dataset in the project's own form (`records/files/parsed.py`), where its archive must not be opened again."""
+    """A dataset in the parsed form (`records/files/parsed.py`), if its archive must not be opened again."""
 
     __tablename__ = "parsed"
 
@@ -86,7 +86,7 @@ class ParsedRow(Table):
 
 
 class ClockRow(Table):
-    """The service's own clock, one row: seconds that the service has run, and the wall time when they were stored."""
+    """The service clock, one row: seconds that the service has run, and the wall time when they were stored."""
 
     __tablename__ = "clock"
 
@@ -96,7 +96,7 @@ class ClockRow(Table):
 
 
 class JobRow(OwnedRow):
-    """What every job has; state, wish, generations, progress, error and starts are those of `wingfit.workers.jobs.Job`.
+    """The columns of every job: state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
 
     ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
     """
@@ -142,7 +142,7 @@ class DiagnosisRow(JobRow, Table):
 
 
 class FindingRow(Table):
-    """The Finding of a diagnosis that has succeeded; apart, because lists need no maps and overlays."""
+    """The finding of a diagnosis that has succeeded; in its own table, because lists do not need it."""
 
     __tablename__ = "finding"
 
@@ -173,7 +173,7 @@ class StepRow(StepOfJob, Table):
 
 
 class CheckpointRow(Table):
-    """All that a run needs to go on after its last stored generation."""
+    """The state of the search after the last stored generation of a run."""
 
     __tablename__ = "checkpoint"
 
