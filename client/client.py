@@ -47,7 +47,7 @@ class Client(DiagnosisCalls, KeyCalls):
     """Talks to one server; usable as a context manager."""
 
     def health(self) -> a.Health:
-        """Ask whether the server is up, for its version, evaluator and load."""
+        """Fetch the status, version, evaluator and load of the server."""
         return cast(a.Health, self._json("GET", "/v1/health"))
 
     def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
@@ -110,12 +110,12 @@ class Client(DiagnosisCalls, KeyCalls):
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
         name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
-        peel_width_beats. What is left out takes the server's default.
+        peel_width_beats. Omitted settings have the server's defaults.
         """
         return cast(a.Run, self._json("POST", "/v1/runs", json=_body(dataset_id, spec), key=str(uuid.uuid4())))
 
     def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
-        """What :meth:`submit_run` would submit, or the error that it would raise; nothing is stored."""
+        """Return what :meth:`submit_run` would submit, or raise the error that it would raise; nothing is stored."""
         return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=_body(dataset_id, spec)))
 
     def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
@@ -127,7 +127,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Run, self._json("GET", _run(run_id)))
 
     def cancel(self, run_id: str) -> a.Run:
-        """Stop a run for good; what it has found so far stays."""
+        """Stop a run permanently; its results so far stay."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/cancel"))
 
     def pause(self, run_id: str) -> a.Run:
@@ -135,7 +135,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/pause"))
 
     def resume(self, run_id: str) -> a.Run:
-        """Go on with a paused run."""
+        """Continue a paused run."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/resume"))
 
     def delete_run(self, run_id: str) -> None:
@@ -235,8 +235,7 @@ class Client(DiagnosisCalls, KeyCalls):
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
 
-        A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
-        without a server.
+        A broken connection is resumed; :class:`ServerAwayError` after ``patience_s`` without a server.
         """
         return self._events(_run(run_id), last_event_id, patience_s)
 

@@ -1,4 +1,4 @@
-"""What is refused of a request for a diagnosis, with the place and the remedy."""
+"""Checks of requests for diagnoses."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def checked(
     of_run: CalibrationSpec | None = None,
     genome: Mapping[str, float] | None = None,
 ) -> DiagnosisSpec:
-    """What ``body`` asks for, from the settings and the ``genome`` of a run if there is one; else a 422.
+    """The specification that ``body`` gives, with the settings and the ``genome`` of a run if there is one; or a 422.
 
-    Of the genome those genes are taken that the model asked for has.
+    Genes of ``genome`` that the requested model does not have are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
     calibration = specs.nominal_model(body, of_run)

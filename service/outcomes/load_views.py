@@ -25,11 +25,11 @@ Array = npt.NDArray[np.float64]
 SIDE = np.array([0.0, 1.0, 0.0])
 
 
-def wanted(asked: bool | Iterable[OutputName]) -> tuple[OutputName, ...]:
+def wanted(requested: bool | Iterable[OutputName]) -> tuple[OutputName, ...]:
     """The outputs that a request names."""
-    if isinstance(asked, bool):
-        return OUTPUT_NAMES if asked else ()
-    return tuple(dict.fromkeys(asked))
+    if isinstance(requested, bool):
+        return OUTPUT_NAMES if requested else ()
+    return tuple(dict.fromkeys(requested))
 
 
 def condition(recorded: Condition, changes: ConditionIn) -> Condition:

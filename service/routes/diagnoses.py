@@ -23,7 +23,7 @@ from wingfit.workers import jobs
 
 router = APIRouter(prefix="/v1/diagnoses", tags=["diagnoses"])
 
-# A report is drawn with styles of its own, and does and loads nothing; the page may show it in a frame.
+# A report has inline styles, runs no scripts and loads nothing; the web page may show it in a frame.
 REPORT_HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; "
@@ -56,7 +56,7 @@ add_job_routes(router, "diagnosis", lambda service: service.diagnosing, Diagnosi
 def submit(
     request: Request, service: ServiceDep, body: DiagnosisIn, idempotency_key: http.RepeatKey = None
 ) -> Response:
-    """Submit a diagnosis of a dataset, or of a run; it is stored when this answers, and made when its turn comes."""
+    """Submit a diagnosis of a dataset or run; it is stored before the answer, and computed when its turn comes."""
 
     def plan() -> DiagnosisRow:
         run = _run(service, body.run_id)
@@ -96,7 +96,7 @@ def list_diagnoses(
     dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return what a diagnosis found; see /v1/schemas/finding."""
+    """Return the finding of a diagnosis; see /v1/schemas/finding."""
     body = json.dumps(_finding(service, diagnosis_id)).encode()
     return http.marked(body, "application/json", if_none_match)
 
@@ -109,7 +109,7 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
     dependencies=[IN_TURN_OF_DOWNLOADS],
 )
 def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the report: one HTML file that needs nothing else."""
+    """Return the report: one HTML file without external resources."""
     text = service.diagnoser.html(_finding(service, diagnosis_id))
     return http.marked(text.encode(), "text/html", if_none_match, REPORT_HEADERS)
 

@@ -1,4 +1,4 @@
-"""Runs and diagnoses as files: to archive, for a spreadsheet, for a program that reads NetCDF."""
+"""Runs and diagnoses as files: JSON, CSV, NetCDF."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _RANKING = (
 
 
 def _described(example: str) -> dict[str, Any]:
-    """The answers besides JSON, which the models describe."""
+    """The description of the CSV and NetCDF answers."""
     saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
     return {
         "headers": saved,
@@ -60,7 +60,7 @@ async def export_run(
     run_id: str,
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
-    """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
+    """Return a run as a file; NetCDF requires a simulation of every recording, and may wait for other exports."""
     if format != "netcdf":
         await place.take(service.downloads)
         return await run_in_threadpool(_run, service, run_id, format)
@@ -73,7 +73,7 @@ async def export_run(
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """What ``make`` makes in a thread; it is told, by what it is given, whether nobody waits for it any more."""
+    """The result of ``make`` in a thread; the function that it gets returns whether the client is gone."""
     gone = threading.Event()
     making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
     while not making.done():

@@ -1,4 +1,4 @@
-"""What a run on forces has found: forces over the beat, and predictions; the models that there are."""
+"""Results of a run on forces: forces over the beat and predictions; the available models."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ router = APIRouter(prefix="/v1", tags=["forces"])
 
 @router.get("/models", responses=http.errors(), summary="Models of vehicles")
 def models() -> Models:
-    """List the blade-element models that there are, and the terms they are made of, with their sources."""
+    """List the blade-element models and their terms, with sources."""
     return force_views.models()
 
 

@@ -28,7 +28,7 @@ def list_keys(service: ServiceDep) -> Keys:
 
 @router.post("/keys", status_code=201, responses=http.errors(), summary="Make a key")
 def make(service: ServiceDep, body: KeyIn) -> NewKey:
-    """Make a key. Its secret is in the answer, and nowhere else."""
+    """Create a key. Only this answer contains its secret."""
     with service.database.write() as session:
         row, secret = keys.make(session, body.name, body.owner or body.name, body.scopes)
     service.load_keys()
@@ -37,7 +37,7 @@ def make(service: ServiceDep, body: KeyIn) -> NewKey:
 
 @router.delete("/keys/{key_id}", responses=http.errors(404, 409), summary="Revoke a key")
 def revoke(service: ServiceDep, key_id: str) -> Key:
-    """Make a key good for nothing, at once; what was made with it stays."""
+    """Revoke a key at once; datasets and jobs that were made with it stay."""
     with service.database.write() as session:
         row = keys.revoke(session, key_id)
     service.load_keys()
@@ -46,13 +46,13 @@ def revoke(service: ServiceDep, key_id: str) -> Key:
 
 @router.get("/session", responses=http.errors(), summary="Who is calling")
 def session(service: ServiceDep) -> Session:
-    """Say whether keys are asked for, and whose key came."""
+    """Return whether keys are required, and the key of this request."""
     return _session(service, CALLER.get())
 
 
 @router.post("/session", response_model=Session, responses=http.errors(401), summary="Let a browser in")
 def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
-    """Keep a key in a cookie that no script can read and no other site can send."""
+    """Store a key in a cookie that scripts cannot read and other sites cannot send."""
     caller = service.keys.caller(body.key)
     if caller is None:
         raise ProblemError(401, "key", "this is not a key of this server, or one that was revoked")
@@ -65,7 +65,7 @@ def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
 
 @router.delete("/session", status_code=204, responses=http.errors(), summary="Forget the key of a browser")
 def end() -> Response:
-    """Forget the cookie; the key stays good."""
+    """Delete the cookie; the key stays valid."""
     response = Response(status_code=204)
     response.delete_cookie(COOKIE)
     return response

@@ -1,4 +1,4 @@
-"""What a run has found: history, genome, result, tracks, events; and simulations of a given genome."""
+"""Results of a run: history, genome, result, tracks, loads; and simulations of a given genome."""
 
 from __future__ import annotations
 
@@ -118,14 +118,14 @@ def loads(
     dependencies=[IN_TURN],
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
-    """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
+    """Simulate a recording's condition with the genome of the request; nothing is stored."""
     dataset = load(service, body.dataset_id)
     check_recording(dataset, body.recording, "body.recording")
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
     spec_views.refuse_effects(body.effects, dataset, body)
     spec = spec_views.simulation_spec(body)
-    values = _asked(service, dataset, spec, body)
+    values = _genome_of(service, dataset, spec, body)
     try:
         simulated = _tracks if dataset.kind == "tracks" else _forces
         return JSONResponse(simulated(service, spec, dataset, values, body))
@@ -149,7 +149,7 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
         raise invalid("there are no such loads", [item])
     spec_views.refuse_effects(body.effects, dataset)
     spec = spec_views.simulation_spec(body)
-    values = _asked(service, dataset, spec, body)
+    values = _genome_of(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))
     found = _loads(service, spec, dataset, values, changed)
@@ -179,8 +179,8 @@ def _forces(
     return {**force_views.forces(found, "given"), "agreements": agreements}
 
 
-def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
-    """Full genome of a simulation; a 422 where it cannot be."""
+def _genome_of(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
+    """The full genome of a simulation, or a 422."""
     known = gene_names(service.engine, spec, dataset)
     faults = spec_views.unknown_genes((("body.genome", name) for name in body.genome), known)
     if faults:
@@ -194,7 +194,7 @@ def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: Wing
 def _chosen(
     service: Service, run_id: str, recording: str | None, genome: Literal["best", "nominal"]
 ) -> tuple[Dataset, CalibrationSpec, str, dict[str, float]]:
-    """What a simulation of a run is of: its dataset and spec, the name of a recording, and a genome."""
+    """The dataset, specification, recording and genome of a simulation of a run."""
     row = run_row(service, run_id)
     if row.kind != "tracks":
         raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")

@@ -57,14 +57,14 @@ def submit(
     validate_only: Annotated[bool, Query(description="only say whether it would be accepted")] = False,
     idempotency_key: http.RepeatKey = None,
 ) -> Response:
-    """Submit a calibration; it is stored when this answers, and computed when its turn comes."""
+    """Submit a calibration; it is stored before the answer is sent, and computed when its turn comes."""
     if validate_only:
-        dataset, spec = _asked(service, body)
+        dataset, spec = _planned(service, body)
         name = body.name or spec_views.run_name(dataset, spec)
         return JSONResponse(Checked(name=name, spec=spec_views.run_settings(spec)))
 
     def plan() -> RunRow:
-        dataset, spec = _asked(service, body)
+        dataset, spec = _planned(service, body)
         name = body.name or spec_views.run_name(dataset, spec)
         return RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, spec=store.spec_json(spec))
 
@@ -83,8 +83,8 @@ def list_runs(
     return http.json_of(service.reading.runs(limit, cursor, dataset_id, state))
 
 
-def _asked(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
-    """What a request is about and asks for, or a 422."""
+def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
+    """The dataset and specification of a request, or a 422."""
     dataset = load(service, body.dataset_id)
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
@@ -95,7 +95,7 @@ def _asked(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
 
 
 def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-    """The specification with everything decided, or a 422."""
+    """The specification with every default filled in, or a 422."""
     known_genes = gene_names(service.engine, spec, dataset)
     known_recordings = tuple(recording.name for recording in dataset.recordings)
     genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]

@@ -18,7 +18,7 @@ def best(row: RunRow) -> dict[str, float]:
 
 
 def standing(service: Service, row: RunRow) -> GenomeInfo:
-    """The best genome so far beside the nominal one, or a 409."""
+    """The best and the nominal genome, or a 409."""
     if row.result is not None:
         return GenomeInfo(genes=row.result["genes"], final=True)
     genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))

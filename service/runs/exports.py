@@ -1,6 +1,6 @@
 """Exports of a run: its history as a table, or all of it as one document.
 
-Both are made while they are sent, ``BLOCK`` generations at a time, however long the history is.
+Both are computed while they are sent, ``BLOCK`` generations at a time.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MORE_COLUMNS = ("evaluations", "failed", "reasons", "elapsed_seconds")
 
 @dataclass(frozen=True)
 class Exported:
-    """A run and its dataset as they were ``at`` a moment."""
+    """A run and its dataset, read ``at`` this time."""
 
     row: RunRow
     dataset: DatasetRow
@@ -46,9 +46,9 @@ def of(service: Service, run_id: str) -> Exported:
 
 
 def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
-    """The generations that ``row`` counts, ascending; each block is a reading of its own, so that none lasts long.
+    """The generations of ``row``, ascending; each block is a separate short read.
 
-    A 404 where the run is deleted meanwhile: what was sent is then seen not to be whole.
+    A 404 if the run is deleted meanwhile; the client then sees that the answer is incomplete.
     """
     for after in range(0, row.generations, BLOCK):
         with database.read() as session:
@@ -58,7 +58,7 @@ def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
 
 
 def table(database: Database, row: RunRow) -> Iterator[str]:
-    """The history as CSV, a generation a row; units are in the names of the columns."""
+    """The history as CSV, one generation per row; the names of columns end in units."""
     square, misfit = ("m2", "best_mm") if row.kind == "tracks" else ("n2", "best_mn")
     fields = (*COLUMNS, misfit, *MORE_COLUMNS)
     yield csv_text.lines([[f"{name}_{square}" if name in SQUARES else name for name in fields]])

@@ -42,7 +42,7 @@ GENE_NUMBERS = (
 
 
 def file(service: Service, exported: Exported, genome: GenomeInfo, gone: Callable[[], bool]) -> bytes:
-    """The file; once ``gone``, for whom it is, a 503 before the next recording."""
+    """The file; a 503 before the next recording once the client is ``gone``."""
     dataset = service.datasets.get(exported.row.dataset_id)
 
     def write(root: Any) -> None:
@@ -178,7 +178,7 @@ def _forces(
 
 
 def _beats(group: Any, beats: dict[str, Forces]) -> None:
-    """Recorded forces, which are the same beside every source, and modelled ones."""
+    """Recorded forces, which are the same for every source, and modelled forces."""
     first = next(iter(beats.values()))
     quantities, phase = tuple(first["recorded_n"]), first["phase"]
     group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}

@@ -24,7 +24,7 @@ from wingfit.sim.vehicle.terms import PRESETS
 from wingfit.sim.vehicle.terms import chosen as terms_of
 
 SPEC_FIELDS = {field.name for field in fields(CalibrationSpec)}
-# A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
+# Genes of a simulated wing may lie outside the bounds of a search, up to the limit of `bounds_factor`.
 WIDEST_BOUNDS = 100.0
 METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
 USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
@@ -51,7 +51,7 @@ def simulation_spec(body: WingIn) -> CalibrationSpec:
 
 
 def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) -> None:
-    """A 422 for a low-pass that takes away the beat itself."""
+    """A 422 for a low-pass below the flap frequency."""
     for recording in recordings:
         flap = recording.condition.flap_frequency
         if low_pass_hz and low_pass_hz < flap:
@@ -63,9 +63,9 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
 
 
 def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel | None = None) -> None:
-    """A 422 for effects that are unknown, named twice, of no use to what the dataset describes, or terms already.
+    """A 422 for effects that are unknown, named twice, not applicable to the dataset, or already terms of the model.
 
-    What is known is listed with the first that is not.
+    Only the first fault lists the known effects.
     """
     faults, listed = [], set[str]()
     for place, name in enumerate(names):
@@ -82,7 +82,7 @@ def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel
 
 
 def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
-    """Faults for the genes among ``named`` (place in the request, name) that are not ``known``: listed once."""
+    """Faults for those of ``named`` (place in the request, name) that are not ``known``; the first lists the known."""
     faults, remedy = [], f"known are {', '.join(known)}"
     for where, name in named:
         if name in known:
@@ -100,7 +100,7 @@ def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> lis
 
 
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
-    """A 422 for settings of a wing in a request about a vehicle, or the reverse; defaults do no harm."""
+    """A 422 for settings of a wing in a request about a vehicle, or the reverse, unless they have their default."""
     what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
     message = f"means nothing for a {what}, which the dataset describes; leave it out"
     if faults := _given(body, names, message):
@@ -108,7 +108,7 @@ def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
 
 
 def refuse_idle(body: RunIn, method: str | None) -> None:
-    """A 422 for settings of a search in a request for Gauss-Newton alone; defaults do no harm."""
+    """A 422 for settings of a search in a request for Gauss-Newton, unless they have their default."""
     if method != "gauss_newton":
         return
     message = (
@@ -119,7 +119,7 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
 
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """A name for a run that was given none: what tells it from the other runs on its dataset."""
+    """Default name of a run: its settings that other runs on the dataset may not have."""
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:
@@ -129,7 +129,7 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """The model in words that tell it from others."""
+    """The model, for names of runs and diagnoses."""
     model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
@@ -139,9 +139,9 @@ def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:
-    """ValueError where the model of a vehicle has the effect as a term already, or its wings do not meet."""
+    """ValueError if the model of a vehicle already has the effect as a term, or the effect does not apply to it."""
     if vehicle is None or dataset.kind != "forces" or set(vehicle.without) - set(PRESETS[vehicle.preset].terms):
-        return  # what is wrong with the terms is said of them
+        return  # unknown terms are reported by another check
     terms = terms_of(vehicle.preset, tuple(vehicle.without))
     if name in terms:
         raise ValueError(
