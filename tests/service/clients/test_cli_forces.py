@@ -124,7 +124,7 @@ def test_forces_as_table_csv_and_page(wingfit: Wingfit, client: Client, run_id: 
     rows = list(csv.DictReader(beat.open()))
     assert [float(row["modelled_lift_n"]) for row in rows] == answer["modelled_n"]["lift"]
     assert [float(row["phase"]) for row in rows] == answer["phase"]
-    assert {"recorded_x_n", "spread_z_n"} <= set(rows[0])
+    assert {"recorded_x_n", "standard_deviation_z_n"} <= set(rows[0])
     text = page.read_text()
     assert "lift, spectrum" in text
     assert "<script src=" not in text
