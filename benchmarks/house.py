@@ -22,7 +22,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("records", "tracking", "sim", "inference", "calibration", "diagnosis", "report", "workers", "service", "client", "cli")
+PARTS = (
+    "records", "tracking", "sim", "inference", "calibration", "diagnosis", "report", "workers", "service",
+    "client", "cli",
+)  # fmt: skip
 PRODUCT = (*PARTS, "wingfit")
 CODE = (*PRODUCT, "benchmarks", "docs", "examples", "tests")
 SOURCES = (".py", ".js", ".css", ".html")

@@ -56,15 +56,15 @@ def _describe(effect: Effect) -> None:
     say("")
     columns = ["gene", ">typical", "bounds", "unit", "description"]
     table(columns, [_row(parameter) for parameter in effect["parameters"]])
-    for of, unit in dict.fromkeys((p["of"], p["unit"]) for p in effect["parameters"] if p["of"]):
+    for of, unit in dict.fromkeys((p["relative_to"], p["unit"]) for p in effect["parameters"] if p["relative_to"]):
         say(f"'x {of}': multiples of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
     say("the effect is off where all genes marked 'size' are zero")
     say(f"estimate its genes: wingfit runs submit ID --with {effect['name']}")
 
 
 def _row(one: EffectParameter) -> list[str]:
-    unit = one["unit"] if one["of"] is None else f"x {one['of']}"
-    role = "size" if one["size"] else "place" if one["place"] else "shape"
+    unit = one["unit"] if one["relative_to"] is None else f"x {one['relative_to']}"
+    role = "size" if one["is_size"] else "place" if one["is_location"] else "shape"
     return [
         one["name"],
         number(one["typical"], 3),

@@ -10,7 +10,7 @@ import typer
 from wingfit.cli.base.options import AsJson, Url
 from wingfit.cli.base.output import emit, moment, note, say, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
-from wingfit.client.key_client import Key, NewKey
+from wingfit.client.key_answers import Key, NewKey
 
 app = typer.Typer(no_args_is_help=True, help="Create, list and revoke API keys.")
 

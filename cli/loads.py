@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 from wingfit.cli.base.files import write_csv, write_text
 from wingfit.cli.base.output import number
-from wingfit.client import answers as a
+from wingfit.client import load_answers as a
 
 AXES = "xyz"
 SECTIONS_SHOWN = 6  # of the bending moment: more curves cannot be distinguished
@@ -20,6 +20,14 @@ VECTORS = {
     "velocity_m_s": "velocity_{}_m_s",
 }
 Column = tuple[str, list[float]]
+
+
+PORTS: tuple[tuple[Literal["front_motor", "rear_motor", "air", "dampers"], str], ...] = (
+    ("front_motor", "front motor"),
+    ("rear_motor", "rear motor"),
+    ("air", "air"),
+    ("dampers", "dampers"),
+)
 
 
 def write_loads(outputs: a.Outputs, path: Path) -> None:
@@ -37,10 +45,10 @@ def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
     from wingfit.report.charts import Chart, Curve, chart_page  # drawn only where a plot was requested
 
     stride = -(-len(outputs["sections"]) // SECTIONS_SHOWN)
-    ports = {"front_motor": "front motor", "rear_motor": "rear motor", "air": "air", "dampers": "dampers"}
+    power = [(name.replace("_", " "), series) for name, series in outputs["power_w"].items()]
     shown: list[tuple[str, str, list[Column]]] = [
         ("Motor torque", "N m", [(k, outputs["motor_torque_n_m"][k]) for k in ("front", "rear")]),
-        ("Power into the wing", "W", [(name, outputs["power_w"][key]) for key, name in ports.items()]),
+        ("Power into the wing", "W", power),
         ("Aerodynamic force", "N", [("lift", outputs["lift_n"]), ("thrust", outputs["thrust_n"])]),
         ("Bending moment", "N m", [_bending(section) for section in outputs["sections"][::stride]]),
         ("Energy", "J", [(k, outputs["energy_j"][k]) for k in ("kinetic", "elastic", "gravitational")]),
@@ -68,8 +76,8 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
             f"{means['closing_error_w']:.2g} W, {means['closing_error_percent']:.2g} % of the supplied power",
         ),
     ]
-    if "solved" in outputs:
-        solved = outputs["solved"]
+    if "numerics" in outputs:
+        solved = outputs["numerics"]
         error = number(solved["estimated_error_mm"], 2)
         rows.append(("solved with", f"{solved['steps_per_beat']} steps per beat, estimated error {error} mm"))
     return [list(row) for row in rows]
@@ -78,15 +86,15 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
 def columns(outputs: a.Outputs) -> Iterator[Column]:
     """Every series with a unique name that ends in its unit; vectors by component."""
     for key, value in outputs.items():
-        if key in ("averages", "solved"):
+        if key in ("averages", "numerics"):
             continue
         if isinstance(value, dict):
             yield from ((f"{name}_{key}", series) for name, series in value.items())
         elif key in ("strips", "sections", "connectors"):
-            for part in value:  # type: ignore[attr-defined]
+            for part in cast(list[dict[str, Any]], value):
                 yield from _of_part(key, part)
         else:
-            yield key, value  # type: ignore[misc]
+            yield key, cast(list[float], value)
 
 
 def _of_part(key: str, part: dict[str, Any]) -> Iterator[Column]:

@@ -15,6 +15,7 @@ from wingfit.cli.forces.results import force_simulation, write_forces
 from wingfit.cli.loads import summary, write_loads, write_plot
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
+from wingfit.client.load_answers import Loads
 
 
 def simulate(
@@ -107,7 +108,7 @@ def simulate(
     emit(answer, lambda answer: _show(answer, name), as_json=as_json)
 
 
-def _show(answer: a.Simulation | a.Loads, recording: str) -> None:
+def _show(answer: a.Simulation | Loads, recording: str) -> None:
     tracks = cast(a.Simulation, answer) if "numerics" in answer else None
     if tracks:
         table(["marker", ">mean distance mm"], [[name, mm(mean)] for name, mean in marker_distances(tracks).items()])

@@ -1,12 +1,23 @@
-"""Shapes of the server's answers, as the Python client hands them out (docs/api.md explains the fields)."""
+"""The answers of the server: one definition, which the server publishes (OpenAPI) and the Python client hands out.
+
+Names of fields end in their unit. ``docs/api.md`` explains the resources. Answers about forces, loads, effects,
+diagnoses and keys are in the other ``*_answers.py`` of this folder.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Literal, NotRequired, TypedDict
+from typing import Annotated, Any, Generic, Literal, NotRequired, TypeVar
+
+from annotated_types import Len
+from typing_extensions import TypedDict
+
+from wingfit.client.load_answers import Outputs
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
 Kind = Literal["tracks", "forces"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
+Point = Annotated[list[float | None], Len(3, 3)]
+Item = TypeVar("Item")
 
 CONDITION = (
     "flap_frequency_hz",
@@ -18,20 +29,50 @@ CONDITION = (
 )
 
 
-class Health(TypedDict):
-    """Answer of ``GET /v1/health``; the numbers of active jobs are None where the database does not answer."""
+class Page(TypedDict, Generic[Item]):
+    """One page of a list; ``next_cursor`` requests the next page and is null on the last."""
 
-    status: str
+    items: list[Item]
+    next_cursor: str | None
+
+
+class ErrorItem(TypedDict):
+    """One faulty input: its place in the request, its value, and what is wrong with it."""
+
+    where: str
+    value: Any
+    message: str
+
+
+class Problem(TypedDict):
+    """Problem details (RFC 9457); ``state`` is that of the job to which a conflict refers."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    state: NotRequired[State]
+    errors: NotRequired[list[ErrorItem]]
+
+
+class Health(TypedDict):
+    """Status of the service; ``detail`` gives the cause when it is degraded.
+
+    The numbers of jobs that have not ended are null where the database does not answer.
+    """
+
+    status: Literal["starting", "ok", "degraded"]
     version: str
     sqlite_version: str
     evaluator: str
     workers: int | None
     runs_active: int | None
     diagnoses_active: int | None
+    detail: str | None
 
 
 class RecordingInfo(TypedDict):
-    """One recording of a dataset: its condition, and the markers tracked or the channels of forces."""
+    """One recording and its condition: ``markers`` counts the tracked markers, ``channels`` names those of forces."""
 
     name: str
     rig: str
@@ -62,42 +103,72 @@ class Dataset(TypedDict):
     recordings: list[RecordingInfo]
 
 
+class RunSpec(TypedDict):
+    """The settings of a run, with every default filled in."""
+
+    preset: str
+    without: list[str]
+    low_pass_hz: float | None
+    peel_width_beats: float
+    division: str
+    population: int
+    stall: int
+    tolerance: float
+    max_generations: int
+    seed: int
+    bounds_factor: float
+    accuracy_mm: float
+    recordings: list[str]
+    genes: list[str]
+    effects: list[str]
+    finish: bool
+    axes: list[Literal["x", "z"]]
+    mode: Literal["staged", "joint", "local"]
+    method: Literal["genetic", "cma_es", "gauss_newton"]
+
+
 class Checked(TypedDict):
-    """A run as it would be submitted."""
+    """A run as it would be submitted: its name and its settings."""
 
     name: str
-    spec: dict[str, Any]
+    spec: RunSpec
 
 
-class Run(TypedDict):
-    """A calibration run and how far it is."""
+class Job(TypedDict):
+    """The fields that runs and diagnoses share."""
 
     id: str
     name: str
     dataset_id: str
     kind: Kind
-    spec: dict[str, Any]
     state: State
-    wish: Literal["PAUSE", "CANCEL"] | None
     stage: str | None
     progress: float
     eta_seconds: float | None
     created_at: str
     started_at: str | None
     finished_at: str | None
-    generations: int
     evaluations: int
-    best_mm: float | None
-    best_mn: float | None
     error: str | None
 
 
+class Run(Job):
+    """A calibration; ``pending_action`` is a pause or cancellation that takes effect after the current generation.
+
+    ``best_mm`` (tracks) is the mean distance per marker, ``best_mn`` (forces) the RMS difference; the other is null.
+    """
+
+    spec: RunSpec
+    pending_action: Literal["PAUSE", "CANCEL"] | None
+    generations: int
+    best_mm: float | None
+    best_mn: float | None
+
+
 class HistoryItem(TypedDict):
-    """One generation; ``best`` and ``mean`` are Eq. 14 in m^2 or N^2.
+    """One finished generation; ``best`` and ``mean`` are the fitness (Eq. 14) in m^2 or N^2.
 
-    ``best_mm`` is the mean distance per marker of tracks, ``best_mn`` the RMS difference of forces; the other is None.
-
-    ``evaluations`` counts since the run began, ``failed`` in this generation, with up to ten of their ``reasons``.
+    ``evaluations`` counts from the start of the run, ``failed`` in this generation, with up to ten of the ``reasons``.
     """
 
     sequence: int
@@ -114,8 +185,18 @@ class HistoryItem(TypedDict):
     elapsed_seconds: float
 
 
+class GenerationEvent(HistoryItem):
+    """The data of a ``generation`` event."""
+
+    progress: float
+    eta_seconds: float | None
+
+
 class GeneInfo(TypedDict):
-    """One gene, nominal and best, with its bounds and whether the data can tell it; ``standard_error`` in ``unit``."""
+    """One gene, nominal and best, with its bounds; ``identifiable`` says whether the data determine it.
+
+    Values and ``standard_error`` are in ``unit``; shares are normalised to sum to one.
+    """
 
     name: str
     unit: str
@@ -127,11 +208,11 @@ class GeneInfo(TypedDict):
     searched: bool
     standard_error_percent: float | None
     identifiable: bool | None
-    standard_error: float | None
+    standard_error: NotRequired[float | None]
 
 
 class GenomeInfo(TypedDict):
-    """Best genome so far; ``final`` once the run has ended."""
+    """The best genome so far; ``final`` when the run has succeeded."""
 
     genes: list[GeneInfo]
     final: bool
@@ -149,7 +230,7 @@ class RecordingResult(TypedDict):
 
 
 class Result(TypedDict):
-    """Outcome of a finished run on tracks."""
+    """Result of a calibration on tracks; means over recordings are weighted by samples."""
 
     kind: Literal["tracks"]
     before_mm: float | None
@@ -163,7 +244,10 @@ class Result(TypedDict):
 
 
 class Numerics(TypedDict):
-    """How a simulation was solved; errors are the largest of any marker at any instant."""
+    """How a simulation was solved: the largest error of any marker, as requested and as estimated.
+
+    ``beats`` were simulated until the motion was periodic, with at most ``steps_per_beat`` steps each.
+    """
 
     accuracy_mm: float
     estimated_error_mm: float | None
@@ -172,112 +256,29 @@ class Numerics(TypedDict):
 
 
 class Comparison(TypedDict):
-    """Recorded and simulated tracks [frame][marker][x, y, z] in mm; None where not recorded."""
+    """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded.
+
+    The answer contains every ``stride``-th instant: all, except of recordings that are too long for one answer.
+    """
 
     recording: str
     phase: list[float]
     markers: list[str]
-    recorded_mm: list[list[list[float | None]]]
-    simulated_mm: list[list[list[float | None]]]
+    recorded_mm: list[list[Point]]
+    simulated_mm: list[list[Point]]
+    stride: int
     numerics: Numerics
 
 
-class Strip(TypedDict):
-    """Air on one strip."""
-
-    name: str
-    span_mm: list[float]
-    lift_n: list[float]
-    thrust_n: list[float]
-    side_n: list[float]
-    power_w: list[float]
-
-
-class SectionLoad(TypedDict):
-    """What the inner part of the wing exerts on the outer through a cut; vectors [phase][x, y, z]."""
-
-    name: str
-    span_mm: float
-    moment_n_m: list[list[float]]
-    force_n: list[list[float]]
-
-
-class ConnectorLoad(TypedDict):
-    """Wrench on, and motion of, the second of the bodies ``between`` relative to the first, in the first's axes."""
-
-    name: str
-    kind: Literal["root", "spanwise", "chordwise"]
-    between: list[str]
-    point_mm: list[float]
-    moment_n_m: list[list[float]]
-    force_n: list[list[float]]
-    angular_velocity_rad_s: list[list[float]]
-    velocity_m_s: list[list[float]]
-    dissipated_w: list[float]
-    stored_j: list[float]
-
-
-class Averages(TypedDict):
-    """Means over the beat, and the largest motor torques."""
-
-    lift_n: float
-    thrust_n: float
-    side_n: float
-    motor_power_w: dict[str, float]
-    peak_motor_torque_n_m: dict[str, float]
-    supplied_w: float
-    dissipated_w: float
-    to_air_w: float
-    closing_error_w: float
-    closing_error_percent: float
-    dissipated_by_connector_w: dict[str, float]
-
-
-class Solved(TypedDict):
-    """How a beat was solved."""
-
-    steps_per_beat: int
-    beats: int
-    estimated_error_mm: float | None
-
-
-class Outputs(TypedDict, total=False):
-    """Loads, powers and energies over one beat in order of ``phase``; only what was asked for is there."""
-
-    phase: list[float]
-    drive_phase: list[float]
-    solved: Solved
-    motor_angle_deg: dict[str, list[float]]
-    motor_rate_rad_s: dict[str, list[float]]
-    motor_torque_n_m: dict[str, list[float]]
-    motor_power_w: dict[str, list[float]]
-    lift_n: list[float]
-    thrust_n: list[float]
-    side_n: list[float]
-    strips: list[Strip]
-    sections: list[SectionLoad]
-    connectors: list[ConnectorLoad]
-    power_w: dict[str, list[float]]
-    energy_j: dict[str, list[float]]
-    averages: Averages
-
-
 class Simulation(Comparison):
-    """A comparison of one simulation with the recording under whose condition it ran; loads where asked for."""
+    """Tracks, their mean distance per marker, and the loads that were requested."""
 
     mean_distance_mm: float | None
     outputs: NotRequired[Outputs]
 
 
-class Loads(TypedDict):
-    """Loads under a recording's condition, or one that differs from it in what was asked."""
-
-    recording: str
-    outputs: Outputs
-
-
 class Event(TypedDict):
-    """A server-sent event: ``generation`` (a history item with progress) or ``state`` (a run)."""
+    """A server-sent event: ``generation`` or ``step`` (with the progress) or ``state`` (the job)."""
 
     id: str | None
     event: str

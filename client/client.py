@@ -6,7 +6,7 @@
 >>> client.wait(run["id"], on_progress=lambda run: print(run["progress"]))  # doctest: +SKIP
 >>> client.result(run["id"])["after_mm"]                            # doctest: +SKIP
 
-Answers are plain dicts, typed in :mod:`wingfit.client.answers`. Every failure is a :class:`WingfitError`.
+Answers are plain dicts of the types in ``client/*answers.py``. Every failure is a :class:`WingfitError`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from wingfit.client import force_answers as f
 from wingfit.client.diagnosis_client import DiagnosisCalls
 from wingfit.client.effect_answers import Effect
 from wingfit.client.key_client import KeyCalls
+from wingfit.client.load_answers import Loads
 from wingfit.client.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -46,7 +47,7 @@ class Client(DiagnosisCalls, KeyCalls):
     """Talks to one server; usable as a context manager."""
 
     def health(self) -> a.Health:
-        """Ask whether the server is up, for its version, evaluator and load."""
+        """Fetch the status, version, evaluator and load of the server."""
         return cast(a.Health, self._json("GET", "/v1/health"))
 
     def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
@@ -109,12 +110,12 @@ class Client(DiagnosisCalls, KeyCalls):
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
         name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
-        peel_width_beats. What is left out takes the server's default.
+        peel_width_beats. Omitted settings have the server's defaults.
         """
         return cast(a.Run, self._json("POST", "/v1/runs", json=_body(dataset_id, spec), key=str(uuid.uuid4())))
 
     def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
-        """What :meth:`submit_run` would submit, or the error that it would raise; nothing is stored."""
+        """Return what :meth:`submit_run` would submit, or raise the error that it would raise; nothing is stored."""
         return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=_body(dataset_id, spec)))
 
     def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
@@ -126,7 +127,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Run, self._json("GET", _run(run_id)))
 
     def cancel(self, run_id: str) -> a.Run:
-        """Stop a run for good; what it has found so far stays."""
+        """Stop a run permanently; its results so far stay."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/cancel"))
 
     def pause(self, run_id: str) -> a.Run:
@@ -134,7 +135,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/pause"))
 
     def resume(self, run_id: str) -> a.Run:
-        """Go on with a paused run."""
+        """Continue a paused run."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/resume"))
 
     def delete_run(self, run_id: str) -> None:
@@ -223,10 +224,10 @@ class Client(DiagnosisCalls, KeyCalls):
         recording: str | None = None,
         genome: Literal["best", "nominal"] = "best",
         outputs: Sequence[str] | None = None,
-    ) -> a.Loads:
+    ) -> Loads:
         """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
-        return cast(a.Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+        return cast(Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
 
     def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
         return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
@@ -234,14 +235,13 @@ class Client(DiagnosisCalls, KeyCalls):
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
 
-        A broken connection is taken up again where it broke; :class:`ServerAwayError` after ``patience_s``
-        without a server.
+        A broken connection is resumed; :class:`ServerAwayError` after ``patience_s`` without a server.
         """
-        return self._events(_run(run_id), lambda: self.run(run_id), last_event_id, patience_s)
+        return self._events(_run(run_id), last_event_id, patience_s)
 
     def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
         """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
-        return self._wait(_run(run_id), lambda: self.run(run_id), on_progress, patience_s)
+        return self._wait(_run(run_id), on_progress, patience_s)
 
     def simulate(
         self,
@@ -309,7 +309,7 @@ class Client(DiagnosisCalls, KeyCalls):
         accuracy_mm: float | None = None,
         outputs: Sequence[str] | None = None,
         effects: Sequence[str] = (),
-    ) -> a.Loads:
+    ) -> Loads:
         """Simulate a genome for its loads, where ``condition`` may change the recording's.
 
         Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
@@ -323,7 +323,7 @@ class Client(DiagnosisCalls, KeyCalls):
             "outputs": True if outputs is None else list(outputs),
             "effects": list(effects),
         } | given(accuracy_mm=accuracy_mm)
-        return cast(a.Loads, self._simulated("/v1/loads", body))
+        return cast(Loads, self._simulated("/v1/loads", body))
 
 
 def _body(dataset_id: str, spec: Mapping[str, Any]) -> dict[str, Any]:

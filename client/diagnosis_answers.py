@@ -1,31 +1,58 @@
-"""Shapes of the server's answers about diagnoses (docs/api.md explains the fields)."""
+"""Answers about diagnoses."""
 
 from __future__ import annotations
 
-from typing import Any, TypedDict
+from typing import Literal
 
-from wingfit.client.answers import Kind, State
+from typing_extensions import TypedDict
+
+from wingfit.client.answers import Job
+
+Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 
 
-class Diagnosis(TypedDict):
-    """A diagnosis and its progress; ``verdict`` and ``summary`` when it has succeeded."""
+class DiagnosisSpec(TypedDict):
+    """The settings of a diagnosis; ``start`` is its initial genome, empty for the dataset's estimates."""
 
-    id: str
-    name: str
-    dataset_id: str
+    preset: str
+    without: list[str]
+    low_pass_hz: float | None
+    peel_width_beats: float
+    division: str
+    seed: int
+    bounds_factor: float
+    accuracy_mm: float
+    recordings: list[str]
+    genes: list[str]
+    fixed: dict[str, float]
+    effects: list[str]
+    suspects: list[str]
+    refine: bool
+    refits: int
+    axes: list[Literal["x", "z"]]
+    start: dict[str, float]
+
+
+class Diagnosis(Job):
+    """A diagnosis; ``pending_action`` is a cancellation that takes effect within seconds.
+
+    ``verdict`` and ``summary`` are null until it has succeeded.
+    """
+
     run_id: str | None
-    kind: Kind
-    spec: dict[str, Any]
-    state: State
-    wish: str | None
-    stage: str | None
-    progress: float
-    eta_seconds: float | None
-    created_at: str
-    started_at: str | None
-    finished_at: str | None
+    spec: DiagnosisSpec
+    pending_action: Literal["CANCEL"] | None
     steps: int
-    evaluations: int
-    verdict: str | None
+    verdict: Verdict | None
     summary: str | None
-    error: str | None
+
+
+class StepEvent(TypedDict):
+    """The data of a ``step`` event; ``elapsed_seconds`` counts from the last start."""
+
+    sequence: int
+    stage: str
+    progress: float
+    evaluations: int
+    elapsed_seconds: float
+    eta_seconds: float | None

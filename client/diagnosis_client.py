@@ -16,14 +16,14 @@ OnDiagnosis = Callable[[Diagnosis], None]
 
 
 class DiagnosisCalls(Watching):
-    """Submits and follows diagnoses, and fetches what they found."""
+    """Submits and follows diagnoses, and fetches their findings."""
 
     def submit_diagnosis(self, dataset_id: str | None = None, *, run_id: str | None = None, **spec: Any) -> Diagnosis:
         """Submit a diagnosis of a dataset, or of a run (from its best genome, with its settings).
 
         ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, name; of a wing also division,
-        bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz, peel_width_beats. What is left out
-        takes the run's setting, without a run the server's default.
+        bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz, peel_width_beats. Omitted
+        settings are those of the run, without a run the server's defaults.
         """
         body = given(dataset_id=dataset_id, run_id=run_id, **spec)
         return cast(Diagnosis, self._json("POST", "/v1/diagnoses", json=body, key=str(uuid.uuid4())))
@@ -40,7 +40,7 @@ class DiagnosisCalls(Watching):
         return cast(Diagnosis, self._json("GET", _path(diagnosis_id)))
 
     def finding(self, diagnosis_id: str) -> dict[str, Any]:
-        """Fetch what a diagnosis found; its schema is at /v1/schemas/finding."""
+        """Fetch the finding of a diagnosis; its schema is at /v1/schemas/finding."""
         return cast(dict[str, Any], self._json("GET", f"{_path(diagnosis_id)}/finding"))
 
     def export_diagnosis(
@@ -58,11 +58,11 @@ class DiagnosisCalls(Watching):
         return self._export(_path(diagnosis_id), format, Path(path), diagnosis_id, on_bytes)
 
     def report(self, diagnosis_id: str) -> str:
-        """Fetch the report: one HTML file that needs nothing else."""
+        """Fetch the report: one HTML file without external resources."""
         return self._call("GET", f"{_path(diagnosis_id)}/report").text
 
     def cancel_diagnosis(self, diagnosis_id: str) -> Diagnosis:
-        """Stop a diagnosis for good."""
+        """Stop a diagnosis permanently."""
         return cast(Diagnosis, self._json("POST", f"{_path(diagnosis_id)}/cancel"))
 
     def delete_diagnosis(self, diagnosis_id: str) -> None:
@@ -73,13 +73,13 @@ class DiagnosisCalls(Watching):
         self, diagnosis_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0
     ) -> Iterator[a.Event]:
         """Yield the server-sent events of a diagnosis until its final state, as :meth:`Client.events` of a run."""
-        return self._events(_path(diagnosis_id), lambda: self.diagnosis(diagnosis_id), last_event_id, patience_s)
+        return self._events(_path(diagnosis_id), last_event_id, patience_s)
 
     def wait_for_diagnosis(
         self, diagnosis_id: str, on_progress: OnDiagnosis | None = None, *, patience_s: float = 60.0
     ) -> Diagnosis:
         """Block until the diagnosis has ended and return it; ``on_progress`` gets it after each change."""
-        return self._wait(_path(diagnosis_id), lambda: self.diagnosis(diagnosis_id), on_progress, patience_s)
+        return self._wait(_path(diagnosis_id), on_progress, patience_s)
 
 
 def _path(diagnosis_id: str) -> str:

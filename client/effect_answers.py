@@ -1,33 +1,42 @@
-"""Shapes of the server's answers about effects, as the Python client hands them out (docs/api.md explains them)."""
+"""Answers about effects."""
 
 from __future__ import annotations
 
-from typing import Literal, TypedDict
+from typing import Literal
+
+from typing_extensions import TypedDict
 
 
 class EffectParameter(TypedDict):
-    """One gene of an effect; with ``of``, bounds and typical value are parts of that measure of what is calibrated."""
+    """One gene of an effect.
+
+    With ``relative_to``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its
+    mean chord, or the mass of its wing. The genes of a run have them in ``unit``.
+    """
 
     name: str
     unit: str
-    of: Literal["span", "chord", "mass"] | None
+    relative_to: Literal["span", "chord", "mass"] | None
     lower: float
     upper: float
     typical: float
     scale: Literal["log", "linear"]
-    size: bool
-    place: bool
+    is_size: bool
+    is_location: bool
     description: str
 
 
 class Effect(TypedDict):
-    """One piece of physics, or one fault of a measurement, that a model can contain."""
+    """One piece of physics, or one measurement error, that a model can contain.
+
+    The effect is off where all its parameters with ``is_size`` are zero, as in every nominal genome.
+    """
 
     name: str
     title: str
-    family: str
-    port: str
-    power: str
+    family: Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
+    port: Literal["inertia", "connector", "drive", "air", "observation"]
+    power: Literal["conservative", "dissipative", "any"]
     memory: str | None
     law: str
     source: str
@@ -35,3 +44,9 @@ class Effect(TypedDict):
     confused_with: list[str]
     applies_to: list[Literal["wing", "vehicle"]]
     parameters: list[EffectParameter]
+
+
+class Effects(TypedDict):
+    """All effects, in the order in which they act."""
+
+    effects: list[Effect]

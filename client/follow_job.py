@@ -14,18 +14,16 @@ from wingfit.client.transport import ServerAwayError, Transport, WingfitError, i
 
 JobT = TypeVar("JobT", a.Run, Diagnosis)
 
-# What a run counts its steps in, and a diagnosis.
+# By the event of a step: the field of a job that counts such steps.
 COUNTS = {"generation": "generations", "step": "steps"}
-KEPT = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
+UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
 
 
 class Watching(Transport):
-    """A server whose jobs can be followed."""
+    """A server whose jobs can be followed; a job is named by its path."""
 
-    def _events(
-        self, path: str, fetch: Callable[[], JobT], last_event_id: str | None, patience_s: float
-    ) -> Iterator[a.Event]:
-        """The events of the job at ``path`` until its final state."""
+    def _events(self, path: str, last_event_id: str | None, patience_s: float) -> Iterator[a.Event]:
+        """The events of the job until its final state."""
         away_since: float | None = None
         while True:
             try:
@@ -35,9 +33,9 @@ class Watching(Transport):
                     yield event
                     if _is_final(event):
                         return
-                job = fetch()  # the stream ended early, or resumed after the final state
+                job = self._json("GET", path)  # the stream ended early, or resumed after the final state
                 if job["state"] in a.FINAL:
-                    yield {"id": None, "event": "state", "data": dict(job)}
+                    yield {"id": None, "event": "state", "data": job}
                     return
             except (httpx.TransportError, WingfitError) as error:
                 if isinstance(error, WingfitError) and not is_passing(error):
@@ -47,32 +45,30 @@ class Watching(Transport):
                     raise ServerAwayError(self.base_url, error) from error
             time.sleep(self.retry_wait_s)
 
-    def _wait(
-        self, path: str, fetch: Callable[[], JobT], on_progress: Callable[[JobT], None] | None, patience_s: float
-    ) -> JobT:
+    def _wait(self, path: str, on_progress: Callable[[JobT], None] | None, patience_s: float) -> JobT:
         """The job when it has ended; ``on_progress`` gets it after each change."""
-        job = fetch()
+        job: JobT = self._json("GET", path)
         report = on_progress or (lambda _: None)
         report(job)
         if job["state"] in a.FINAL:
             return job
-        for event in self._events(path, fetch, None, patience_s):
+        for event in self._events(path, None, patience_s):
             job = merge(job, event)
             report(job)
         return job
 
 
 def merge(job: JobT, event: a.Event) -> JobT:
-    """Return the job as it stands after ``event``."""
+    """Return the job as it is after ``event``."""
     data = event["data"]
     if event["event"] == "state":
         return cast(JobT, dict(job) | data)
     count = COUNTS.get(event["event"])
     now: Mapping[str, Any] = job
-    # After a reconnection the server repeats what the job already counts.
+    # After a reconnection the server repeats steps that the job counts already.
     if count is None or data["sequence"] <= now[count]:
         return job
-    known = {key: data[key] for key in KEPT if key in data}
+    known = {key: data[key] for key in UPDATED if key in data}
     return cast(JobT, dict(job) | known | {count: data["sequence"]})
 
 

@@ -1,17 +1,29 @@
-"""Shapes of the server's answers about forces, as the Python client hands them out (docs/api.md)."""
+"""Answers about forces: forces in N, misfits in mN, angles in degrees."""
 
 from __future__ import annotations
 
-from typing import Literal, TypedDict
+from typing import Annotated, Literal
+
+from annotated_types import Len
+from typing_extensions import TypedDict
 
 from wingfit.client.answers import GeneInfo
 
 Source = Literal["nominal", "local", "joint", "global", "average"]
-ByQuantity = dict[str, list[float]]
+# Of the coefficients: those of a run, or the genome given in a request.
+SourceOrGiven = Literal["nominal", "local", "joint", "global", "average", "given"]
+Quantity = Literal["lift", "drag", "x", "z"]
+Series = list[float]
+Pair = Annotated[list[float], Len(2, 2)]
+# Lift and drag are present where both axes were recorded.
+ByQuantity = dict[Quantity, Series]
 
 
 class Coefficient(TypedDict):
-    """A coefficient with its standard error and an interval that holds it in about 90 of 100 cases."""
+    """A coefficient with its standard error (Cramer-Rao bound) and 90 % confidence interval.
+
+    The interval covers too little where a recording has fewer than 24 beats.
+    """
 
     name: str
     value: float
@@ -21,20 +33,24 @@ class Coefficient(TypedDict):
 
 
 class Estimate(TypedDict):
-    """Estimate on one recording, or on several together; ``noise_mn2`` per recording, of the fitted axes."""
+    """Maximum-likelihood estimate on one recording, or on several together.
+
+    ``correlation`` is in the order of the coefficients; ``noise_mn2`` is the covariance of the fitted outputs, one
+    matrix per recording. The log-likelihood lacks its constant term.
+    """
 
     name: str
     recordings: list[str]
     coefficients: list[Coefficient]
     correlation: list[list[float | None]]
     noise_mn2: list[list[list[float | None]]]
-    cost: float | None
+    negative_log_likelihood: float | None
     converged: bool
     remarks: list[str]
 
 
 class GlobalGene(TypedDict):
-    """constant + per_hz x flap frequency + per_deg x body pitch."""
+    """A coefficient over the conditions: constant + per_hz x flap frequency + per_deg x body pitch."""
 
     name: str
     constant: float
@@ -42,26 +58,29 @@ class GlobalGene(TypedDict):
     per_deg: float
     scatter: float | None
     largest_error_percent: float | None
-    left_out_error_percent: float | None
+    leave_one_out_error_percent: float | None
 
 
 class GlobalModel(TypedDict):
-    """Coefficients as functions of the condition, and where they were fitted."""
+    """Coefficients as functions of the condition, and the range of conditions to which they were fitted."""
 
     genes: list[GlobalGene]
     recordings: list[str]
-    frequency_range_hz: list[float]
-    pitch_range_deg: list[float]
-    airspeed_range_m_s: list[float]
+    frequency_range_hz: Pair
+    pitch_range_deg: Pair
+    airspeed_range_m_s: Pair
     remarks: list[str]
 
 
 class Agreement(TypedDict):
-    """How a model agrees with a recording in one quantity: lift, drag, x or z."""
+    """Agreement of a model with a recording in one quantity; per cent are of the range of the recorded mean beat.
+
+    Percentage and correlation are null for a constant force.
+    """
 
     recording: str
-    source: Literal["nominal", "local", "joint", "global", "average", "given"]
-    quantity: str
+    source: SourceOrGiven
+    quantity: Quantity
     rmse_n: float | None
     rmse_percent: float | None
     correlation: float | None
@@ -70,7 +89,11 @@ class Agreement(TypedDict):
 
 
 class ForceResult(TypedDict):
-    """Outcome of a finished run on forces."""
+    """Result of a calibration on forces; RMS differences of the fitted axes, nominal and calibrated.
+
+    ``agreements`` compare each recording with every model; for ``leave_one_out`` the global model was fitted without
+    the recording that it predicts.
+    """
 
     kind: Literal["forces"]
     before_mn: float | None
@@ -82,46 +105,50 @@ class ForceResult(TypedDict):
     estimates: list[Estimate]
     global_model: GlobalModel | None
     agreements: list[Agreement]
-    left_out: list[Agreement]
+    leave_one_out: list[Agreement]
     held_out: list[str]
 
 
 class Forces(TypedDict):
-    """Recorded and modelled forces over the beat, and their spectra, by quantity."""
+    """Forces over the beat and their spectra: recorded (mean beat, standard deviation between beats) and modelled.
+
+    ``phase`` is t*: 0 where the wings are closest. ``standard_deviation_n`` is empty with a single beat; the spectra
+    are empty where the recording has no piece without gaps.
+    """
 
     recording: str
-    source: str
-    phase: list[float]
+    source: SourceOrGiven
+    phase: Series
     recorded_n: ByQuantity
-    spread_n: ByQuantity
+    standard_deviation_n: ByQuantity
     modelled_n: ByQuantity
-    frequency_hz: list[float]
+    frequency_hz: Series
     recorded_spectrum_n2_hz: ByQuantity
     modelled_spectrum_n2_hz: ByQuantity
     remarks: list[str]
 
 
 class ForceSimulation(Forces):
-    """Forces of a genome of one's own, with their agreement in every quantity."""
+    """Forces over the beat with the genome of a request, and their agreement in every quantity."""
 
     agreements: list[Agreement]
 
 
 class Prediction(TypedDict):
-    """Forces over one beat that a global model predicts for a condition."""
+    """Unfiltered forces over one beat that a global model predicts; ``warnings`` say where it extrapolates."""
 
     coefficients: dict[str, float]
-    phase: list[float]
-    x_n: list[float]
-    z_n: list[float]
-    lift_n: list[float]
-    drag_n: list[float]
-    averages_n: dict[str, float]
+    phase: Series
+    x_n: Series
+    z_n: Series
+    lift_n: Series
+    drag_n: Series
+    averages_n: dict[Literal["lift", "drag"], float]
     warnings: list[str]
 
 
 class TermGene(TypedDict):
-    """A coefficient of a term."""
+    """A coefficient of a term, its range, and its value where it is not estimated."""
 
     name: str
     unit: str
@@ -132,7 +159,7 @@ class TermGene(TypedDict):
 
 
 class Term(TypedDict):
-    """One physical term of the quasi-steady force."""
+    """One physical term of the quasi-steady force, and its source."""
 
     name: str
     genes: list[TermGene]
@@ -151,7 +178,7 @@ class Preset(TypedDict):
 
 
 class Models(TypedDict):
-    """Models of vehicles: presets, and the terms that they are made of."""
+    """Models of vehicles: presets, and the terms of which they consist."""
 
     presets: list[Preset]
     terms: list[Term]

@@ -3,26 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypedDict, cast
+from typing import cast
 
+from wingfit.client.key_answers import Key, NewKey
 from wingfit.client.transport import Transport, given, part
-
-
-class Key(TypedDict):
-    """An API key, without its secret."""
-
-    id: str
-    name: str
-    owner: str
-    scopes: list[str]
-    created_at: str
-    revoked_at: str | None
-
-
-class NewKey(Key):
-    """A key that was made now, with its secret, which is told this once."""
-
-    secret: str
 
 
 class KeyCalls(Transport):
@@ -33,10 +17,10 @@ class KeyCalls(Transport):
         return cast(list[Key], self._json("GET", "/v1/keys")["items"])
 
     def create_key(self, name: str, *, owner: str | None = None, scopes: Sequence[str] = ("read", "write")) -> NewKey:
-        """Make a key; its secret is in the answer, and nowhere else."""
-        asked = given(name=name, owner=owner) | {"scopes": list(scopes)}
-        return cast(NewKey, self._json("POST", "/v1/keys", json=asked))
+        """Make a key; its secret is in the answer, which no other answer contains."""
+        body = given(name=name, owner=owner) | {"scopes": list(scopes)}
+        return cast(NewKey, self._json("POST", "/v1/keys", json=body))
 
     def revoke_key(self, key_id: str) -> Key:
-        """Make a key good for nothing."""
+        """Revoke a key: requests with it are refused from now on."""
         return cast(Key, self._json("DELETE", f"/v1/keys/{part(key_id)}"))

@@ -1,4 +1,4 @@
-"""The way to the server: retries, server-sent events, problem details as exceptions, folders as archives."""
+"""HTTP transport: retries, server-sent events, problem details as exceptions, folders as archives."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ ENDINGS: dict[Format, str] = {"json": ".json", "csv": ".csv", "netcdf": ".nc"}
 
 
 class WingfitError(Exception):
-    """What the server (or the way to it) answered instead of a result.
+    """An error that the server reported, or that occurred on the way to it.
 
     Attributes:
         status: HTTP status, or None when no answer came.
@@ -55,7 +55,7 @@ class WingfitError(Exception):
         super().__init__(title, detail)
 
     def __str__(self) -> str:
-        # The server's titles are the names of HTTP statuses; its details say all that they say.
+        # The server's titles are names of HTTP statuses, which its details make redundant.
         titled = self.status is None and self.detail
         head = f"{self.title}: {self.detail}" if titled else self.detail or self.title
         return "\n".join([head, *(f"  {_described(error)}" for error in self.errors)])
@@ -75,9 +75,9 @@ class ServerAwayError(WingfitError):
 class Transport:
     """Sends requests to one server.
 
-    ``retries`` is how often a call is repeated when the connection fails or the server says 502, 503 or 504.
+    ``retries`` is how often a call is repeated when the connection fails or the server answers 502, 503 or 504.
     A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
-    Answers that the server simulates for may take ``simulating_s``: one given up too early would be computed again.
+    Answers that require a simulation may take ``simulating_s``.
     ``api_key`` is by default that of the environment (``WINGFIT_API_KEY``).
     """
 
@@ -100,7 +100,7 @@ class Transport:
             raise WingfitError("bad server address", f"{base_url!r}: {error}") from error
         if url.scheme not in ("http", "https") or not url.host:
             raise WingfitError("bad server address", f"{base_url!r}; it must look like {DEFAULT_URL}")
-        # A proxy from the environment must not catch calls to a server on this machine.
+        # A proxy of the environment must not be used for a server on this machine.
         self._http = httpx.Client(
             base_url=self.base_url,
             timeout=timeout_s,
@@ -172,7 +172,7 @@ class Transport:
     def _file(
         self, path: str, target: Path, name: str, on_bytes: OnBytes | None, *, private: bool = False, **options: Any
     ) -> Path:
-        """What is at ``path``, whole, in the file ``target``, or in that folder under the server's name for it.
+        """Download ``path`` completely to the file ``target``, or into that folder under the server's name for it.
 
         Other users cannot read a ``private`` file.
         """
@@ -205,7 +205,7 @@ class Transport:
 
 
 def _refuse_not_finite(body: Any, where: str = "") -> None:
-    """JSON has no infinity and no NaN; say which value it was."""
+    """WingfitError for infinity and NaN, which JSON does not have."""
     if isinstance(body, dict):
         for name, value in body.items():
             _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
@@ -222,14 +222,14 @@ def _attachment_name(response: httpx.Response, fallback: str) -> str:
 
 
 class CountedFile(io.FileIO):
-    """A file that tells how much of it has been read."""
+    """A file that reports how much of it has been read."""
 
     def __init__(self, path: Path, on_bytes: OnBytes | None) -> None:
         super().__init__(path)
         self._on_bytes, self._total = on_bytes, path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Read, and report how far."""
+        """Read, and report the position."""
         block = super().read(-1 if size is None else size) or b""
         if self._on_bytes:
             self._on_bytes(self.tell(), self._total)

@@ -14,21 +14,22 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 
 from wingfit.service.auth.access import KeyRing
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses.diagnoser import Diagnoser, ModelDiagnoser
+from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.diagnosing import Diagnosing
 from wingfit.service.http import concurrency_limit, threads
 from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.events import Events
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import Work
-from wingfit.service.jobs.runner import Known, Runner
+from wingfit.service.jobs.job_kind import JobKind
+from wingfit.service.jobs.runner import JobRef, Runner
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
 from wingfit.service.operations.metrics_and_log import Metrics
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.runs.calibrating import Calibrating
-from wingfit.service.runs.engine import Engine, ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings
+from wingfit.service.storage import store
 from wingfit.service.storage.backup import forget_snapshots
 from wingfit.service.storage.database import FILE_NAME, Database
 from wingfit.service.storage.retention import Housekeeping
@@ -54,8 +55,8 @@ class Service:
         diagnoser: Diagnoser | None = None,
     ) -> None:
         self.settings, self.database = settings, database
-        self.engine: Engine = engine or ModelEngine()
-        self.diagnoser: Diagnoser = diagnoser or ModelDiagnoser()
+        self.engine: Engine = engine or Engine()
+        self.diagnoser: Diagnoser = diagnoser or Diagnoser()
         self.keys = KeyRing()
         # Requests being answered: method, path and start, by the id of their ASGI scope.
         self.open_requests: dict[int, tuple[str, str, float]] = {}
@@ -88,11 +89,11 @@ class Service:
         self._housekeeping.start()
         self._pool.start()
 
-    def enqueue(self, work: Work, job_id: str) -> None:
+    def enqueue(self, kind: JobKind, job_id: str) -> None:
         """Queue a stored job."""
         with self.database.read() as session:
-            owner = work.row(session, job_id).owner
-        self.runner.enqueue(work, job_id, owner)
+            owner = store.one(session, kind.table, job_id).owner
+        self.runner.enqueue(kind, job_id, owner)
 
     def load_keys(self) -> None:
         """Read the valid keys from the database; event streams that were opened with a revoked key end."""
@@ -132,10 +133,10 @@ class Service:
         for job in self.runner.under_way():
             yield f"{job} stays as stored ({self._last_step(job)}) and continues at the next start"
 
-    def _last_step(self, job: Known) -> str:
+    def _last_step(self, job: JobRef) -> str:
         def stored() -> str:
             with self.database.read() as session:
-                return f"after step {job.work.row(session, job.id).generations}"
+                return f"after step {store.one(session, job.kind.table, job.id).generations}"
 
         try:
             return threads.call("stop-look", stored).result(READ_SECONDS)

@@ -237,7 +237,7 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
                 now = fetch(f"/v1/runs/{run}")
                 if now is None:
                     ledger.lose(f"run {run} is unknown")
-                elif now["state"] == "PAUSED" or now["wish"] == "PAUSE":
+                elif now["state"] == "PAUSED" or now["pending_action"] == "PAUSE":
                     http.post(f"/v1/runs/{run}/resume")
                     continue
                 elif now["state"] in FINAL:

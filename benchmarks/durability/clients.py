@@ -116,7 +116,7 @@ class Client(threading.Thread):
         for _ in range(int(self._rng.integers(1, 20))):
             self._look(run)
         # The answer to a completed request may be lost, so the run's state decides whether to repeat it.
-        while (now := self._fetch(f"/v1/runs/{run}")) and (now["state"] == "PAUSED" or now["wish"] == "PAUSE"):
+        while (now := self._fetch(f"/v1/runs/{run}")) and "PAUSE" in (now["state"][:5], now["pending_action"]):
             if self._ask("POST", f"/v1/runs/{run}/resume").status_code == 202:
                 self._ledger.acknowledge()
 

@@ -51,7 +51,7 @@ def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
             original = session.scalars(select(RunRow).where(RunRow.state == State.SUCCEEDED.value)).first()
             if original is None:
                 raise RuntimeError(f"no run in {folder} has succeeded; let the server compute one first")
-            past = [columns(row) for row in store.history(session, original.id, 0)]
+            past = [columns(row) for row in store.steps(session, GenerationRow, original.id)]
             copies = _copies(columns(original), _datasets(session, original.dataset_id), runs - 1)
             first, last = copies[0], copies[-1]
             for copy in copies:
@@ -68,7 +68,7 @@ def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
 
 def _datasets(session: Session, dataset_id: str) -> list[str]:
     """The ids of the dataset and of its copies, which are stored."""
-    row, body = store.dataset(session, dataset_id), store.archive(session, dataset_id)
+    row, body = store.one(session, DatasetRow, dataset_id), store.archive(session, dataset_id)
     copies = [_unnumbered(row) | {"id": store.new_id("ds"), "name": f"{row.name} {n}"} for n in range(2, DATASETS + 1)]
     session.execute(insert(DatasetRow), copies)
     session.execute(insert(ArchiveRow), [{"dataset_id": copy["id"], "body": body} for copy in copies])
@@ -112,7 +112,7 @@ def _generations(past: list[Values], run: Values) -> list[Values]:
     return [
         past[(sequence - 1) % len(past)]
         | {
-            "run_id": run["id"],
+            "job_id": run["id"],
             "sequence": sequence,
             "generation": sequence - 1,
             "evaluations": after["evaluations"],
@@ -138,7 +138,7 @@ def _copy_generations(session: Session, model: str, have: list[str]) -> None:
     """Copy the generations of ``model`` to all runs not in ``have``, in one statement because there are a million."""
     names = [column.key for column in GenerationRow.__table__.columns]
     theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
-    rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.run_id == model, RunRow.id.not_in(have))
+    rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.job_id == model, RunRow.id.not_in(have))
     session.execute(insert(GenerationRow).from_select(names, rows))
 
 

@@ -75,7 +75,7 @@ def write_forces(answer: f.Forces, output: Path | None, plot: Path | None) -> No
     """Write the beat as CSV, and a page of plots."""
     if output:
         columns = {"phase": answer["phase"]}
-        for kind in ("recorded_n", "spread_n", "modelled_n"):
+        for kind in ("recorded_n", "standard_deviation_n", "modelled_n"):
             columns |= {f"{kind[:-2]}_{name}_n": series for name, series in answer[kind].items()}
         write_csv(output, columns, zip(*columns.values(), strict=True), "forces")
     if plot:
@@ -94,7 +94,7 @@ def charts(answer: f.Forces) -> list[Chart]:
     shown = []
     for name, recorded in answer["recorded_n"].items():
         curves = [Curve("recorded", phase, recorded), Curve("modelled", phase, answer["modelled_n"][name])]
-        if spread := answer["spread_n"].get(name):
+        if spread := answer["standard_deviation_n"].get(name):
             edges = ([r + sign * s for r, s in zip(recorded, spread, strict=True)] for sign in (-1, 1))
             curves.insert(0, Curve("1 standard deviation between beats", phase, recorded, band=(*edges,)))
         shown.append(Chart(QUANTITIES[name], "t*, beats", "N", curves))
@@ -124,10 +124,10 @@ def _agreements(answer: f.ForceResult) -> None:
     """Print, for every model, the RMS difference of each force, and mean and correlation of the first force."""
     there = {one["source"] for one in answer["agreements"]}
     shown = [source for source in PREFERENCE if source in there]
-    heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["left_out"] else [])
+    heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["leave_one_out"] else [])
     cells = {(a["recording"], a["quantity"], a["source"]): a for a in answer["agreements"]}
-    left_out = {(a["recording"], a["quantity"]): a for a in answer["left_out"]}
-    every = [*answer["agreements"], *answer["left_out"]]
+    left_out = {(a["recording"], a["quantity"]): a for a in answer["leave_one_out"]}
+    every = [*answer["agreements"], *answer["leave_one_out"]]
     quantity = answer["agreements"][0]["quantity"]
     of_rms = force_unit(a["rmse_n"] for a in every)
     of_means = force_unit(
@@ -161,7 +161,7 @@ def _global(law: f.GlobalModel) -> None:
             gene["per_hz"],
             gene["per_deg"],
             _percent(gene["largest_error_percent"]),
-            _percent(gene["left_out_error_percent"]),
+            _percent(gene["leave_one_out_error_percent"]),
         ]
         for gene in law["genes"]
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated, Literal, cast, get_args
 
 import typer
 
@@ -88,7 +88,7 @@ def models(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
 def _prediction(answer: f.Prediction) -> None:
     table(["coefficient", ">value"], list(answer["coefficients"].items()))
     say("")
-    forces = {"lift": answer["lift_n"], "drag": answer["drag_n"]}
+    forces: dict[Literal["lift", "drag"], list[float]] = {"lift": answer["lift_n"], "drag": answer["drag_n"]}
     unit = force_unit(value for series in forces.values() for value in series)
     rows = [
         [name, *map(unit.show, (answer["averages_n"][name], min(series), max(series)))]

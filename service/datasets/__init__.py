@@ -1,1 +1,1 @@
-"""Datasets of the server, parsed."""
+"""Parsed datasets."""

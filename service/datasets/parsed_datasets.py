@@ -1,7 +1,7 @@
-"""Parsed datasets, by id: parsing takes longer than most requests may.
+"""Cache of parsed datasets by id: parsing takes longer than most requests may.
 
-NetCDF files come from strangers, and a damaged one can hang whoever opens it. So each is opened once, in a process of
-its own, and stored in the project's own form beside the archive; later only this form is read.
+A damaged NetCDF file can hang the process that opens it. Therefore each is opened once, in a separate process, and its
+parsed form is stored beside the archive; later only this form is read.
 """
 
 from __future__ import annotations
@@ -21,36 +21,37 @@ from wingfit.records.files.storage import is_netcdf, label_of
 from wingfit.service.runs.engine import Engine
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, is_full
+from wingfit.service.storage.tables import DatasetRow
 
 LOG = logging.getLogger("wingfit")
 KEPT, KEPT_BYTES = 8, 2**28
 
 
 class Opened(NamedTuple):
-    """A dataset, and its own form where its archive must not be opened again."""
+    """A dataset, and its parsed form if its archive must not be opened again."""
 
     dataset: Dataset
     parsed: bytes | None
 
 
 class Datasets:
-    """The last few datasets used, of the largest only the last. They never change once uploaded."""
+    """Cache of the datasets used last, limited by number and bytes. A dataset never changes."""
 
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
         self._lock, self._loading, self._converting = threading.Lock(), threading.Lock(), threading.Lock()
         self._kept: OrderedDict[str, Dataset] = OrderedDict()
-        # Files of earlier versions that could not be read: found out once, it may have taken a quarter of an hour.
+        # Unreadable files of earlier versions: opening one again could take a quarter of an hour.
         self._damaged: dict[str, DatasetError] = {}
 
     def get(self, dataset_id: str) -> Dataset:
         """The dataset, or a 404."""
         with self._database.read() as session:
-            row = store.dataset(session, dataset_id)
+            row = store.one(session, DatasetRow, dataset_id)
         if (known := self._known(dataset_id)) is not None:
             return known
         old = self._is_old(dataset_id)
-        # One at a time, and once: a large one takes a minute, and gigabytes. A conversion holds up conversions alone.
+        # One at a time: a large one takes a minute and gigabytes. Conversions wait only for conversions.
         with self._converting if old else self._loading:
             if (known := self._known(dataset_id)) is not None:
                 return known
@@ -59,7 +60,7 @@ class Datasets:
         return loaded
 
     def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
-        """Read an archive; ValueError says what is wrong with it. ``limits`` are those of an upload, or others."""
+        """Read an archive; ValueError says what is wrong with it. ``limits`` default to those of an upload."""
         if not is_netcdf(archive):
             return Opened(self._engine.load(archive, filename), None)
         label = label_of(filename)
@@ -73,7 +74,7 @@ class Datasets:
         return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
 
     def _is_old(self, dataset_id: str) -> bool:
-        """Whether it is a NetCDF file that an earlier version stored, which is opened once more."""
+        """Whether it is a NetCDF file without parsed form, stored by an earlier version."""
         with self._database.look() as connection:
             return is_netcdf(store.archive_piece(connection, dataset_id, 0, 8)) and not store.has_parsed(
                 connection, dataset_id
@@ -94,7 +95,7 @@ class Datasets:
         return opened.dataset
 
     def _keep_parsed(self, dataset_id: str, parsed: bytes) -> None:
-        """Store what only saves time later, if there is room."""
+        """Store the parsed form, which only saves time, if there is disk space."""
         try:
             with self._database.write() as session:
                 store.keep_parsed(session, dataset_id, parsed)
@@ -110,7 +111,7 @@ class Datasets:
             return self._kept.get(dataset_id)
 
     def keep(self, dataset_id: str, loaded: Dataset) -> None:
-        """Remember a dataset that was just parsed."""
+        """Put a parsed dataset into the cache."""
         with self._lock:
             self._kept[dataset_id] = loaded
             while len(self._kept) > KEPT or (len(self._kept) > 1 and self._bytes > KEPT_BYTES):
@@ -121,7 +122,7 @@ class Datasets:
         return sum(recording.values.nbytes for one in self._kept.values() for recording in one.recordings)
 
     def delete(self, session: Session, dataset_id: str) -> None:
-        """Delete a dataset here and there."""
+        """Delete a dataset from the database and the cache."""
         store.delete_dataset(session, dataset_id)
         with self._lock:
             self._kept.pop(dataset_id, None)

@@ -1,4 +1,4 @@
-"""What is refused of a request for a diagnosis, with the place and the remedy."""
+"""Checks of requests for diagnoses."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.records import Dataset
 from wingfit.service.diagnoses import specs
 from wingfit.service.diagnoses.diagnoser import Diagnoser
-from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.runs import spec_views
 from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.request_checks import gene_names, unknown_recordings
-from wingfit.service.runs.spec_schemas import VehicleModel
+from wingfit.service.runs.requests import VehicleModel
 
 
 def checked(
@@ -25,12 +25,12 @@ def checked(
     of_run: CalibrationSpec | None = None,
     genome: Mapping[str, float] | None = None,
 ) -> DiagnosisSpec:
-    """What ``body`` asks for, from the settings and the ``genome`` of a run if there is one; else a 422.
+    """The specification that ``body`` gives, with the settings and the ``genome`` of a run if there is one; or a 422.
 
-    Of the genome those genes are taken that the model asked for has.
+    Genes of ``genome`` that the requested model does not have are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
-    calibration = specs.calibration(body, of_run)
+    calibration = specs.nominal_model(body, of_run)
     spec_views.refuse_cutoff(calibration.low_pass, dataset.recordings)
     vehicle = VehicleModel.model_validate({"preset": calibration.preset, "without": list(calibration.without)})
     spec_views.refuse_effects(calibration.effects, dataset, vehicle)
@@ -38,7 +38,7 @@ def checked(
     _refuse_unknown(calibration, dataset, known)
     _refuse_bounds(engine, calibration, dataset)
     start = {name: value for name, value in (genome or {}).items() if name in known}
-    spec = specs.asked(body, calibration, start)
+    spec = specs.diagnosis_spec(body, calibration, start)
     try:
         diagnoser.check(spec, dataset)
     except ValueError as error:

@@ -1,9 +1,9 @@
-"""What the service needs of diagnosis and report, behind one seam: `ModelDiagnoser` is the real one."""
+"""What the service needs of diagnosis and report; tests replace it by one that takes no time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Any
 
 from wingfit import report
 from wingfit.calibration.evaluator import Evaluator
@@ -11,35 +11,15 @@ from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, check, diagnose
 from wingfit.records import Dataset
 
 
-class Diagnoser(Protocol):
-    """Finds what a model left out, and says so; ValueError says what is wrong with a request."""
-
-    def check(self, spec: DiagnosisSpec, dataset: Dataset) -> None:
-        """ValueError when ``spec`` does not fit ``dataset``."""
-        ...
-
-    def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
-        """Diagnose; the last that comes has the finding."""
-        ...
-
-    def stored(self, finding: Finding) -> dict[str, Any]:
-        """``finding`` as JSON."""
-        ...
-
-    def html(self, stored: dict[str, Any]) -> str:
-        """The report of a stored finding: one HTML file that needs nothing else."""
-        ...
-
-
-class ModelDiagnoser:
+class Diagnoser:
     """Diagnoses the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
 
     def check(self, spec: DiagnosisSpec, dataset: Dataset) -> None:
-        """Plan without running anything."""
+        """ValueError when ``spec`` does not fit ``dataset``."""
         check(dataset, spec)
 
     def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
-        """Diagnose."""
+        """Diagnose; the last progress has the finding."""
         return diagnose(dataset, spec, evaluator)
 
     def stored(self, finding: Finding) -> dict[str, Any]:
@@ -47,5 +27,5 @@ class ModelDiagnoser:
         return report.finding_json(finding)
 
     def html(self, stored: dict[str, Any]) -> str:
-        """The report."""
+        """The report of a stored finding: one HTML file without external resources."""
         return report.html(report.finding_from_json(stored))

@@ -1,4 +1,4 @@
-"""Diagnoses: computed in one go; one that was interrupted starts again, and finds the same."""
+"""Diagnoses, which start again from the beginning after an interruption and give the same finding."""
 
 from __future__ import annotations
 
@@ -9,68 +9,68 @@ from typing import Any
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.spec import Progress
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses import specs
+from wingfit.service.diagnoses import specs, views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.jobs.job_kind import Points, Step
-from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
 from wingfit.workers import jobs
 
-# Progress in between is not stored: nobody reads so fast, and each store waits for the disk.
+# Progress is stored at most this often within a stage: each transaction waits for the disk.
 STORE_SECONDS = 0.5
 
 
 class Diagnosing:
     """How diagnoses are computed."""
 
-    what = "diagnosis"
-    table = DiagnosisRow
+    what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"
+    table, step_table, step_answer = DiagnosisRow, StepRow, StepEvent
 
     def __init__(self, database: Database, diagnoser: Diagnoser, datasets: Datasets) -> None:
         self._database, self._diagnoser, self._datasets = database, diagnoser, datasets
 
-    def row(self, session: Session, job_id: str) -> DiagnosisRow:
-        """The diagnosis, or a 404."""
-        return store.diagnosis(session, job_id)
+    def view(self, row: DiagnosisRow) -> Diagnosis:
+        """The answer that describes a diagnosis."""
+        return views.diagnosis(row)
 
     def begin(self, _session: Session, row: DiagnosisRow) -> Points:
-        """Start from nothing. Sequences of steps go on, so that whoever watches misses none."""
+        """Start from the beginning; the sequence numbers of steps continue, so that event streams miss none."""
         row.stage, row.progress, row.evaluations, row.elapsed_seconds = None, 0.0, 0, 0.0
         return []
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Diagnose; stages are told at once, progress within one from time to time."""
+        """Diagnose; a new stage is a step at once, progress within a stage after STORE_SECONDS."""
         spec, dataset = specs.stored(row.spec), self._datasets.get(row.dataset_id)
-        stage, told = "", 0.0
+        stage, stored_at = "", 0.0
         for progress in self._diagnoser.diagnose(spec, dataset, evaluator):
             if progress.finding is not None:
-                yield _found(progress, progress.finding, self._diagnoser.stored(progress.finding))
+                yield _finding(progress, progress.finding, self._diagnoser.stored(progress.finding))
                 return
-            if progress.stage != stage or time.monotonic() - told > STORE_SECONDS:
-                stage, told = progress.stage, time.monotonic()
+            if progress.stage != stage or time.monotonic() - stored_at > STORE_SECONDS:
+                stage, stored_at = progress.stage, time.monotonic()
                 yield _step(progress)
         raise RuntimeError("the diagnosis ended without a finding")
 
 
 def _step(progress: Progress) -> Step:
-    def keep(session: Session, row: DiagnosisRow, eta: float | None) -> None:
+    def store_step(session: Session, row: DiagnosisRow, eta: float | None) -> None:
         row.stage, row.evaluations = progress.stage, progress.evaluations
         row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
-        step = StepRow(diagnosis_id=row.id, sequence=row.generations, stage=row.stage, progress=row.progress)
+        step = StepRow(job_id=row.id, sequence=row.generations, stage=row.stage, progress=row.progress)
         step.evaluations, step.elapsed_seconds, step.eta_seconds = row.evaluations, row.elapsed_seconds, eta
         session.add(step)
 
-    return Step(min(max(progress.fraction, 0.0), 1.0), keep, lasting=False)
+    return Step(min(max(progress.fraction, 0.0), 1.0), store_step, resumable=False)
 
 
-def _found(progress: Progress, finding: Finding, stored: dict[str, Any]) -> Step:
-    def keep(session: Session, row: DiagnosisRow, _eta: float | None) -> None:
+def _finding(progress: Progress, finding: Finding, stored: dict[str, Any]) -> Step:
+    def store_step(session: Session, row: DiagnosisRow, _eta: float | None) -> None:
         row.stage, row.evaluations = progress.stage, progress.evaluations
         row.verdict, row.summary = finding.verdict, finding.summary
         session.merge(FindingRow(diagnosis_id=row.id, body=stored))
 
-    return Step(1.0, keep, last=True)
+    return Step(1.0, store_step, last=True)

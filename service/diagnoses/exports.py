@@ -1,7 +1,4 @@
-"""Exports of a diagnosis: its ranking as a table, all of it as a document, its maps and misfits as NetCDF.
-
-All are bound by the size of the finding, which they are made of.
-"""
+"""Exports of a diagnosis: its ranking as CSV, all of it as JSON, its maps and misfits as NetCDF."""
 
 from __future__ import annotations
 
@@ -10,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from wingfit.client.export_answers import DiagnosisExport
 from wingfit.service.container import Service
 from wingfit.service.diagnoses import views as diagnosis_views
 from wingfit.service.http import csv_text
 from wingfit.service.runs import netcdf_variables, views
-from wingfit.service.runs.export_schemas import DiagnosisExportOut
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, DiagnosisRow
 from wingfit.service.version import wingfit_version
@@ -32,7 +29,7 @@ RANKING = (
     "explained",
     "predicted",
 )
-# Of loads, as the conventions write units.
+# Units of loads as CF conventions write them.
 CF_UNITS = {"N/m": "N m-1"}
 CONDITION = (
     ("flap_frequency_hz", "Hz", "flap frequency"),
@@ -46,7 +43,7 @@ PHASE = "phase of the beat"
 
 @dataclass(frozen=True)
 class Exported:
-    """A diagnosis, what it found, and its dataset, as they were ``at`` a moment."""
+    """A diagnosis, its finding and its dataset, read ``at`` this time."""
 
     row: DiagnosisRow
     finding: Json
@@ -55,15 +52,16 @@ class Exported:
 
 
 def of(service: Service, diagnosis_id: str) -> Exported:
-    """The diagnosis as it is now; a 404, or a 409 where it has found nothing."""
+    """The diagnosis as it is now; a 404, or a 409 if it has no finding."""
     with service.database.read() as session:
-        row, found = store.diagnosis(session, diagnosis_id), store.finding(session, diagnosis_id)
-        return Exported(row, found, store.dataset(session, row.dataset_id), store.now())
+        row, found = store.one(session, DiagnosisRow, diagnosis_id), store.finding(session, diagnosis_id)
+        return Exported(row, found, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
-def document(exported: Exported) -> DiagnosisExportOut:
+def document(exported: Exported) -> DiagnosisExport:
     """All of a diagnosis."""
-    return DiagnosisExportOut(
+    return DiagnosisExport(
+        schema_id="urn:wingfit:schema:diagnosis-export:1",
         wingfit_version=wingfit_version(),
         exported_at=exported.at,
         dataset=views.dataset(exported.dataset),
@@ -73,7 +71,7 @@ def document(exported: Exported) -> DiagnosisExportOut:
 
 
 def table(found: Json) -> str:
-    """The ranking as CSV, an explanation a row, the most probable first; the nominal model names no effect."""
+    """The ranking as CSV, one hypothesis per row, the most probable first; the nominal model has no effects."""
     head = ["rank", "effects", *RANKING, f"misfit_{found['unit'].lower()}", "refitted"]
     rows = [
         [rank, " + ".join(one["effects"]), *(one[name] for name in RANKING), one["misfit"], one["refitted"]]
@@ -116,14 +114,14 @@ def _recordings(root: Any, found: Json) -> None:
     netcdf_variables.flags(
         group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items)
     )
-    for name, units, said in CONDITION:
-        netcdf_variables.numbers(group, name, along, units, said, _all(items, name))
-    for name, model in (("before", "nominal model, refitted"), ("after", "model with what was found")):
-        for end, said in (("value", ""), ("low", ", lower end of its 90 % interval"), ("high", ", upper end of it")):
+    for name, units, meaning in CONDITION:
+        netcdf_variables.numbers(group, name, along, units, meaning, _all(items, name))
+    for name, model in (("before", "nominal model, refitted"), ("after", "model with the named effects")):
+        for end, meaning in (("value", ""), ("low", ", lower end of its 90 % interval"), ("high", ", upper end of it")):
             values = netcdf_variables.or_nan(one[name][end] for one in items)
             label = name if end == "value" else f"{name}_{end}"
-            netcdf_variables.numbers(group, label, along, unit, f"misfit of the {model}{said}", values)
-    netcdf_variables.numbers(group, "floor", along, unit, "misfit that a right model would leave", _all(items, "floor"))
+            netcdf_variables.numbers(group, label, along, unit, f"misfit of the {model}{meaning}", values)
+    netcdf_variables.numbers(group, "floor", along, unit, "misfit expected of a correct model", _all(items, "floor"))
 
 
 def _markers(root: Any, found: Json) -> None:
@@ -141,14 +139,14 @@ def _markers(root: Any, found: Json) -> None:
         "x": ("m", "place on the wing, aft"),
         "y": ("m", "place on the wing, outboard"),
         "before": (unit, "misfit beyond the noise, nominal model"),
-        "after": (unit, "misfit beyond the noise, with what was found"),
+        "after": (unit, "misfit beyond the noise, with the named effects"),
         "worst": (netcdf_variables.NO_UNIT, f"{PHASE} where the misfit is largest"),
     }
-    for name, (units, said) in places.items():
-        netcdf_variables.numbers(group, name, along, units, said, _all(items, name))
+    for name, (units, meaning) in places.items():
+        netcdf_variables.numbers(group, name, along, units, meaning, _all(items, name))
     directions = np.array([one["direction"] for one in items])
-    said = "mean direction of the misfit at that phase"
-    netcdf_variables.numbers(group, "direction", ("marker", "axis"), netcdf_variables.NO_UNIT, said, directions)
+    meaning = "mean direction of the misfit at that phase"
+    netcdf_variables.numbers(group, "direction", ("marker", "axis"), netcdf_variables.NO_UNIT, meaning, directions)
 
 
 def _phase_map(root: Any, found: Json) -> None:
@@ -161,20 +159,22 @@ def _phase_map(root: Any, found: Json) -> None:
     netcdf_variables.numbers(group, "band", ("band",), netcdf_variables.NO_UNIT, SPAN, given["bands"])
     netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, given["phase"])
     netcdf_variables.numbers(group, "before", ("band", "phase"), unit, "misfit of the nominal model", given["before"])
-    netcdf_variables.numbers(group, "after", ("band", "phase"), unit, "misfit with what was found", given["after"])
-    netcdf_variables.numbers(group, "noise", (), unit, "what noise alone leaves in a cell", given["noise"])
+    netcdf_variables.numbers(
+        group, "after", ("band", "phase"), unit, "misfit of the model with the named effects", given["after"]
+    )
+    netcdf_variables.numbers(group, "noise", (), unit, "misfit from noise alone in a cell", given["noise"])
 
 
 def _load(group: Any, load: Json) -> None:
-    """What the nominal model lacks under one condition."""
+    """The load missing from the nominal model in one recording."""
     units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
-    said = f"turn that rod {load['rod']} lacks" if load["rod"] else "force that the nominal model lacks"
+    meaning = f"rotation missing at rod {load['rod']}" if load["rod"] else "force missing from the nominal model"
     netcdf_variables.describe(group, {"recording": load["recording"], "rod": load["rod"]})
     group.dimensions = {"station": len(load["stations"]), "phase": len(load["phase"])}
     netcdf_variables.numbers(group, "station", ("station",), netcdf_variables.NO_UNIT, SPAN, load["stations"])
     netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, load["phase"])
-    netcdf_variables.numbers(group, "value", along, units, said, load["values"])
-    netcdf_variables.numbers(group, "error", along, units, f"standard error of the {said}", load["errors"])
+    netcdf_variables.numbers(group, "value", along, units, meaning, load["values"])
+    netcdf_variables.numbers(group, "error", along, units, f"standard error of the {meaning}", load["errors"])
 
 
 def _all(items: list[Json], name: str) -> Any:

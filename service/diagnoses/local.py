@@ -1,4 +1,4 @@
-"""A diagnosis in this process, without a server: the same checks, the same tool, a pool of processes."""
+"""A diagnosis in this process, without a server: the same checks and computation, with a pool of processes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from wingfit.client.transport import WingfitError
 from wingfit.diagnosis.finding import Finding
 from wingfit.records import Dataset, load_dataset
 from wingfit.service.diagnoses.checks import checked
-from wingfit.service.diagnoses.diagnoser import ModelDiagnoser
-from wingfit.service.diagnoses.schemas import DiagnosisIn
+from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.workers import make_evaluator
 from wingfit.workers.jobs import eta_seconds
@@ -24,14 +24,14 @@ from wingfit.workers.jobs import eta_seconds
 OnProgress = Callable[[float, float | None, str], None]
 
 
-def diagnose(path: Path, asked: dict[str, Any], workers: int | None, on_progress: OnProgress) -> Finding:
-    """Diagnose the dataset at ``path``; ``asked`` as in the body of ``POST /v1/diagnoses``.
+def diagnose(path: Path, request: dict[str, Any], workers: int | None, on_progress: OnProgress) -> Finding:
+    """Diagnose the dataset at ``path``; ``request`` is a body of ``POST /v1/diagnoses``.
 
-    ``on_progress`` gets the part that is done, the seconds left, and the stage. WingfitError says what is wrong.
+    ``on_progress`` gets the fraction done, the remaining seconds, and the stage. WingfitError says what is wrong.
     """
-    dataset, diagnoser = _loaded(path), ModelDiagnoser()
+    dataset, diagnoser = _loaded(path), Diagnoser()
     try:
-        spec = checked(DiagnosisIn.model_validate(asked), dataset, ModelEngine(), diagnoser)
+        spec = checked(DiagnosisIn.model_validate(request), dataset, Engine(), diagnoser)
     except ValidationError as error:
         faults = [
             {"where": ".".join(map(str, one["loc"])), "value": one.get("input"), "message": one["msg"]}
@@ -40,10 +40,10 @@ def diagnose(path: Path, asked: dict[str, Any], workers: int | None, on_progress
         raise WingfitError("the request is invalid", errors=faults) from None
     except ProblemError as problem:
         raise WingfitError(problem.detail, errors=problem.errors) from None
-    evaluator, began, points = make_evaluator("processes", workers), time.monotonic(), [(0.0, 0.0)]
+    evaluator, started, points = make_evaluator("processes", workers), time.monotonic(), [(0.0, 0.0)]
     try:
         for progress in diagnoser.diagnose(spec, dataset, evaluator):
-            points.append((time.monotonic() - began, progress.fraction))
+            points.append((time.monotonic() - started, progress.fraction))
             on_progress(progress.fraction, eta_seconds(points[1:]), progress.stage)
             if progress.finding is not None:
                 return progress.finding

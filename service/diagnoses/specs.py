@@ -1,36 +1,32 @@
-"""What a diagnosis was asked for: from the wire, to and from the database, and back to the wire."""
+"""Specifications of diagnoses: from requests, from the database, and in answers."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.client import diagnosis_answers as answers
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.service.diagnoses.schemas import DiagnosisIn, DiagnosisSpecOut
-from wingfit.service.storage import store
-from wingfit.service.units import MM, tidy_mm
+from wingfit.service.answers import answer
+from wingfit.service.diagnoses.requests import DiagnosisIn
+from wingfit.service.runs.spec_views import calibration_spec
+from wingfit.service.units import tidy_mm
 
-# Settings of a request by their names inside, where these differ.
-INSIDE = {"accuracy_mm": "accuracy", "low_pass_hz": "low_pass", "peel_width_beats": "peel_width"}
-ALIKE = (
-    "division", "seed", "bounds_factor", "recordings", "genes", "fixed", "effects", "preset", "without",
-)  # fmt: skip
+_SPEC = TypeAdapter(DiagnosisSpec)
 
 
-def calibration(body: DiagnosisIn, of_run: CalibrationSpec | None) -> CalibrationSpec:
-    """The model that a request asks for: by its own settings, else those of the run, else the usual ones."""
-    given: dict[str, Any] = {name: getattr(body, name) for name in body.model_fields_set}
-    if "accuracy_mm" in given:
-        given["accuracy_mm"] /= MM
-    changes = {INSIDE.get(name, name): _frozen(given[name]) for name in (*ALIKE, *INSIDE) if name in given}
-    return replace(of_run or CalibrationSpec(), **changes)
+def nominal_model(body: DiagnosisIn, of_run: CalibrationSpec | None) -> CalibrationSpec:
+    """The model that a request gives: by its own settings, else those of the run, else the defaults."""
+    base = of_run or CalibrationSpec()
+    return replace(calibration_spec(body, base), axes=base.axes)
 
 
-def asked(body: DiagnosisIn, model: CalibrationSpec, start: Mapping[str, float]) -> DiagnosisSpec:
-    """The diagnosis that a request asks for."""
+def diagnosis_spec(body: DiagnosisIn, model: CalibrationSpec, start: Mapping[str, float]) -> DiagnosisSpec:
+    """The diagnosis that a request gives, of ``model``, from the genome ``start``."""
     return DiagnosisSpec(
         calibration=model,
         start=dict(start),
@@ -41,25 +37,20 @@ def asked(body: DiagnosisIn, model: CalibrationSpec, start: Mapping[str, float])
     )
 
 
-def plain(spec: DiagnosisSpec) -> dict[str, Any]:
-    """A specification as JSON."""
-    return dict(json.loads(json.dumps(asdict(spec))))
-
-
 def stored(values: dict[str, Any]) -> DiagnosisSpec:
     """A specification from its JSON form."""
-    tuples: dict[str, Any] = {name: tuple(values[name]) for name in ("suspects", "axes") if name in values}
-    return DiagnosisSpec(**(values | tuples | {"calibration": store.spec_from(values["calibration"])}))
+    return _SPEC.validate_python(values)
 
 
-def out(spec: DiagnosisSpec) -> DiagnosisSpecOut:
-    """A specification as it goes out."""
-    model = asdict(spec.calibration)
-    named = {name: model[inside] for name, inside in INSIDE.items()}
-    named["accuracy_mm"] = tidy_mm(spec.calibration.accuracy)
-    own = {name: getattr(spec, name) for name in ("start", "suspects", "refine", "refits", "axes")}
-    return DiagnosisSpecOut.model_validate({name: model[name] for name in ALIKE} | named | own)
-
-
-def _frozen(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
+    """The settings of a diagnosis as answers give them."""
+    return answer(
+        answers.DiagnosisSpec,
+        spec.calibration,
+        accuracy_mm=tidy_mm(spec.calibration.accuracy),
+        start=dict(spec.start),
+        suspects=list(spec.suspects),
+        refine=spec.refine,
+        refits=spec.refits,
+        axes=list(spec.axes),
+    )

@@ -1,21 +1,13 @@
-"""Diagnoses from rows to the wire."""
+"""Answers about diagnoses, from their rows."""
 
 from __future__ import annotations
 
+from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.service.diagnoses import specs
-from wingfit.service.diagnoses.schemas import DiagnosisOut, StepEvent
-from wingfit.service.runs.views import columns
-from wingfit.service.storage.tables import DiagnosisRow, StepRow
-from wingfit.workers.jobs import Wish
+from wingfit.service.runs.views import columns, job_of
+from wingfit.service.storage.tables import DiagnosisRow
 
 
-def diagnosis(row: DiagnosisRow) -> DiagnosisOut:
-    """A diagnosis."""
-    wish = None if row.wish == Wish.NONE else row.wish
-    spec = specs.out(specs.stored(row.spec))
-    return DiagnosisOut.model_validate(columns(row) | {"wish": wish, "spec": spec, "steps": row.generations})
-
-
-def step(row: StepRow) -> StepEvent:
-    """A step as an event."""
-    return StepEvent.model_validate(columns(row))
+def diagnosis(row: DiagnosisRow) -> Diagnosis:
+    """A diagnosis from its row."""
+    return job_of(Diagnosis, columns(row), specs.diagnosis_settings(specs.stored(row.spec)))

@@ -8,17 +8,19 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import Header
-from pydantic import BaseModel
+from pydantic_core import to_json
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import StreamingResponse
 
+from wingfit.client.answers import GenerationEvent, Run
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.service.answers import checked
 from wingfit.service.auth.access import CALLER, Caller, KeyRing
-from wingfit.service.diagnoses.schemas import DiagnosisOut, StepEvent
 from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.jobs.wakeups import Changes
-from wingfit.service.runs import views
-from wingfit.service.runs.schemas import GenerationEvent, RunOut
+from wingfit.service.runs.views import columns
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, DatabaseClosedError
 from wingfit.workers.jobs import State
@@ -36,7 +38,7 @@ LastEventId = Annotated[
 class JobState:
     """The present state of a job, and its steps after a sequence number, ascending."""
 
-    job: RunOut | DiagnosisOut
+    job: Run | Diagnosis
     steps: Sequence[GenerationEvent | StepEvent]
 
 
@@ -127,14 +129,15 @@ class Events:
         return await asyncio.shield(read)
 
 
-def of_run(run_id: str) -> Watched:
-    """A run to watch, whose steps are its generations."""
+def watched(kind: JobKind, job_id: str) -> Watched:
+    """A job to watch: of a run the generations, of a diagnosis the steps."""
 
     def read(session: Session, after: int, limit: int) -> JobState:
-        generations = store.history(session, run_id, after, limit)
-        return JobState(views.run(store.run(session, run_id)), [views.generation_event(one) for one in generations])
+        past = store.steps(session, kind.step_table, job_id, after, limit)
+        job = kind.view(store.one(session, kind.table, job_id))
+        return JobState(job, [checked(kind.step_answer, columns(one)) for one in past])
 
-    return Watched(run_id, "generation", read)
+    return Watched(job_id, kind.step_event, read)
 
 
 def described(step: str, example: str) -> dict[str, Any]:
@@ -152,17 +155,17 @@ def _read(database: Database, watched: Watched, after: int) -> News | None:
     except (ProblemError, DatabaseClosedError):
         return None
     job, steps = found.job, found.steps
-    last = steps[-1].sequence if steps else after
+    last = steps[-1]["sequence"] if steps else after
     return News(
-        steps=b"".join(_event(watched.step, step, step.sequence) for step in steps),
+        steps=b"".join(_event(watched.step, step, step["sequence"]) for step in steps),
         after=last,
         complete=len(steps) < STEPS_PER_READ,
-        status=(job.state, job.wish, job.error),
+        status=(job["state"], job["pending_action"], job["error"]),
         # A state has the id of the last step sent before it, so that a client that reconnects misses nothing.
         state=_event("state", job, last),
-        final=State(job.state).final,
+        final=State(job["state"]).final,
     )
 
 
-def _event(kind: str, data: BaseModel, sequence: int) -> bytes:
-    return f"id: {sequence}\nevent: {kind}\ndata: {data.model_dump_json()}\n\n".encode()
+def _event(kind: str, data: object, sequence: int) -> bytes:
+    return b"id: %d\nevent: %b\ndata: %b\n\n" % (sequence, kind.encode(), to_json(data))

@@ -15,15 +15,17 @@ from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
+from wingfit.client.answers import HistoryItem
 from wingfit.service.auth.access import visible_owner
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import not_found
 from wingfit.service.runs import views
-from wingfit.service.runs.schemas import HistoryItem, RunOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import RunRow
 
-RUN, ITEM = tuple(RunOut.model_fields), tuple(HistoryItem.model_fields)
+RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result"))
+ITEM = tuple(HistoryItem.__annotations__)
 RUNS_IN_CACHE = 2**14
 Arguments = ParamSpec("Arguments")
 
@@ -87,4 +89,4 @@ def _run_json(row: tuple[Any, ...]) -> bytes:
     """A run as JSON; equal rows give equal JSON."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
-    return views.run_of(values).model_dump_json().encode()
+    return to_json(views.run_of(values))

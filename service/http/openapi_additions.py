@@ -6,8 +6,10 @@ from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic import TypeAdapter
 
-from wingfit.service.runs.schemas import ProblemOut
+from wingfit.client.answers import Problem
+from wingfit.service.examples import EXAMPLES
 
 Json = dict[str, Any]
 # Path and status of each call that creates something, and the name of its id in other paths and bodies.
@@ -17,6 +19,8 @@ CREATING = (
     ("/v1/diagnoses", "202", "diagnosis_id"),
 )
 ID = "$response.body#/id"
+# Settings in answers, and the requests that set them.
+SETTINGS = {"RunSpec": "RunIn", "DiagnosisSpec": "DiagnosisIn"}
 FORM = "multipart/form-data"
 
 
@@ -29,6 +33,7 @@ def extend_openapi(app: FastAPI) -> None:
         specification = generate()
         if not cached:
             _problems(specification)
+            _examples(specification)
             _links(specification)
             _remove_null(specification)
             _not_modified(specification)
@@ -39,9 +44,20 @@ def extend_openapi(app: FastAPI) -> None:
 
 def _problems(specification: Json) -> None:
     schemas = specification.setdefault("components", {}).setdefault("schemas", {})
-    problem = ProblemOut.model_json_schema(ref_template="#/components/schemas/{model}")
+    problem = TypeAdapter(Problem).json_schema(ref_template="#/components/schemas/{model}")
     schemas.update(problem.pop("$defs", {}))
     schemas["Problem"] = problem
+
+
+def _examples(specification: Json) -> None:
+    """Give answers their examples, and their settings the descriptions that the requests give them."""
+    schemas = specification["components"]["schemas"]
+    for shape, example in EXAMPLES.items():
+        schemas[shape.__name__]["examples"] = [example]
+    for answer, request in SETTINGS.items():
+        for name, field in schemas[answer]["properties"].items():
+            if description := schemas[request]["properties"].get(name, {}).get("description"):
+                field["description"] = description
 
 
 def _links(specification: Json) -> None:

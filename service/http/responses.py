@@ -9,7 +9,7 @@ from http import HTTPStatus
 from typing import Annotated, Any
 
 from fastapi import Header, Query, Request
-from pydantic import BaseModel
+from pydantic_core import to_json
 from sqlalchemy.orm import Session
 from starlette.responses import JSONResponse, Response
 
@@ -106,9 +106,9 @@ def sent(answer: store.Answer) -> Response:
     return JSONResponse(answer.body, answer.status, {"Location": answer.location})
 
 
-def tagged(model: BaseModel, known: str | None) -> Response:
-    """``model`` as JSON with an ETag, or a 304 if the caller has it (``known``: its ``If-None-Match``)."""
-    return marked(model.model_dump_json().encode(), JSON, known)
+def tagged(answer: object, known: str | None) -> Response:
+    """``answer`` as JSON with an ETag, or a 304 if the caller has it (``known``: its ``If-None-Match``)."""
+    return marked(to_json(answer), JSON, known)
 
 
 def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:

@@ -1,1 +1,1 @@
-"""How jobs are computed: the runner, the evaluator, and those who wait for changes."""
+"""Computation of jobs: the runner, the start of the evaluator, and notification of changes."""

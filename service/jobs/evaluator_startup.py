@@ -1,4 +1,4 @@
-"""Starts the evaluator in the background, so that the API answers at once, and keeps trying when it fails."""
+"""Starts the evaluator in the background, so that the API answers at once; retries when that fails."""
 
 from __future__ import annotations
 
@@ -32,40 +32,40 @@ class Pool:
         self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
 
     def start(self) -> None:
-        """Begin to start the evaluator."""
+        """Start the evaluator in its thread."""
         self._thread.start()
 
     @property
     def status(self) -> Literal["starting", "ok", "degraded"]:
-        """Standing of the evaluator, in the words of the health call."""
+        """Status of the evaluator, as the health call reports it."""
         if self._evaluator:
             return "degraded" if self.workers == 0 else "ok"
         return "degraded" if self.error else "starting"
 
     @property
     def detail(self) -> str | None:
-        """Why jobs are not computed, where that is known."""
+        """Why jobs are not computed, if that is known."""
         return NO_WORKER if self._evaluator and self.workers == 0 else self.error
 
     @property
     def workers(self) -> int | None:
-        """Number of workers that live, where the evaluator knows it."""
+        """Number of live workers, if the evaluator knows it."""
         standing = self.standing
         return standing.workers if standing else None
 
     @property
     def standing(self) -> Standing | None:
-        """The workers that live, and what became of others; None before there are any."""
+        """Live, dead and restarted workers; None before the evaluator has started."""
         evaluator = self._evaluator
         return evaluator.standing if evaluator else None
 
     def close(self, seconds: float = CLOSE_SECONDS) -> bool:
-        """Close the evaluator, or abandon it after ``seconds``; whether it closed."""
+        """Close the evaluator, or abandon it after ``seconds``; returns whether it closed."""
         self._stop.set()
         with self._lock:
             evaluator, self._evaluator = self._evaluator, None
         if evaluator is None:
-            if self._thread.ident:  # it closes what it is starting
+            if self._thread.ident:  # the thread closes the evaluator that it is starting
                 self._thread.join(seconds)
             return not self._thread.is_alive()
         closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)

@@ -1,4 +1,4 @@
-"""An evaluator whose calls can be given up: a batch may take minutes, and a worker may hang."""
+"""An evaluator whose calls can be abandoned: a batch may take minutes, and a worker may hang."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ LOOK_SECONDS = 0.2
 
 
 class InterruptibleEvaluator:
-    """Evaluates in a thread of its own, and leaves that alone once ``interrupted`` says so.
+    """Evaluates in a separate thread, and abandons it once ``interrupted`` returns True.
 
-    The evaluator is told as well: it drops what no worker has begun. But it may hang itself, and is not waited for.
+    The evaluator is notified and drops what no worker has started. It is not waited for, because it may hang itself.
     """
 
     def __init__(self, evaluator: RunningEvaluator, interrupted: Callable[[], bool]) -> None:
@@ -27,7 +27,7 @@ class InterruptibleEvaluator:
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F]; InterruptedStepError once interrupted, whatever the evaluator does."""
         answers: queue.SimpleQueue[Evaluation | BaseException] = queue.SimpleQueue()
-        # Remembered for the thread that is left alone: whoever interrupts may forget it.
+        # Kept for the abandoned thread: ``interrupted`` may return False again later.
         left = threading.Event()
 
         def work() -> None:
@@ -53,4 +53,4 @@ class InterruptibleEvaluator:
             return answer
 
     def close(self) -> None:
-        """Leave the evaluator to whoever made it."""
+        """Do nothing: the caller that made the evaluator closes it."""

@@ -1,4 +1,4 @@
-"""What the runner computes: a kind of job (calibration, diagnosis), told in steps that are each stored."""
+"""Interface between the runner and the kinds of job (calibration, diagnosis), which compute in stored steps."""
 
 from __future__ import annotations
 
@@ -9,53 +9,67 @@ from typing import Any, Protocol
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.service.storage.tables import JobRow
+from wingfit.client.answers import GenerationEvent, Run
+from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.service.storage.tables import JobRow, StepOfJob
 
 Points = list[tuple[float, float]]
 
 
 class InterruptedStepError(Exception):
-    """A step was given up because the job is to be cancelled, or the service stops."""
+    """A step was abandoned because the job is to be cancelled or the service stops."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One piece of a job that is done.
+    """One finished step of a job.
 
     Attributes:
         progress: of the whole job, in [0, 1].
-        keep: writes what the step found: ``keep(session, row, eta_seconds)``, in one transaction with the job's state.
-        last: whether the job has ended; what it ``keep`` s is then kept only if the job was not cancelled meanwhile.
-        lasting: whether a job that is started again goes on after it.
+        store: ``store(session, row, eta_seconds)`` writes the results, in one transaction with the job's state.
+        last: whether the job has ended; its results are stored only if it was not cancelled meanwhile.
+        resumable: whether a restarted job continues after this step.
     """
 
     progress: float
-    keep: Callable[[Session, Any, float | None], None]
+    store: Callable[[Session, Any, float | None], None]
     last: bool = False
-    lasting: bool = True
+    resumable: bool = True
 
 
-class Work(Protocol):
-    """A kind of job: where its rows are, and how one is computed."""
+class JobKind(Protocol):
+    """A kind of job (run, diagnosis): its resource in the API, its tables, and how one is computed.
+
+    Attributes:
+        what: singular name of the resource, also for messages.
+        path: of the resource, e.g. "/v1/runs"; ids start with ``prefix``.
+        table: of the jobs.
+        step_table: of their steps.
+        step_event: name of the event that reports a step, whose data are a ``step_answer``.
+    """
+
+    what: str
+    path: str
+    prefix: str
+    step_event: str
 
     @property
-    def what(self) -> str:
-        """A job of this kind in words, for messages."""
-        ...
+    def table(self) -> type[JobRow]: ...  # noqa: D102
 
     @property
-    def table(self) -> type[JobRow]:
-        """Its rows."""
-        ...
+    def step_table(self) -> type[StepOfJob]: ...  # noqa: D102
 
-    def row(self, session: Session, job_id: str) -> JobRow:
-        """The job, or a 404."""
+    @property
+    def step_answer(self) -> type[GenerationEvent] | type[StepEvent]: ...  # noqa: D102
+
+    def view(self, row: Any) -> Run | Diagnosis:
+        """The answer that describes a job."""
         ...
 
     def begin(self, session: Session, row: Any) -> Points:
-        """Prepare ``row`` for a start or a restart; (elapsed s, progress) of the steps that it goes on from."""
+        """Prepare ``row`` for a start or restart; (elapsed s, progress) of the steps after which it continues."""
         ...
 
     def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
-        """Compute; the last step has ``last``."""
+        """Compute; only the last step has ``last``."""
         ...

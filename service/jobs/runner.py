@@ -1,8 +1,8 @@
-"""Computes jobs (calibrations, diagnoses): a few at a time, one thread each, every step stored before the next begins.
+"""Computes jobs (calibrations, diagnoses): a few at a time, one thread each, every step stored before the next starts.
 
-What a job may do next is decided by :mod:`wingfit.workers.jobs`; here its instructions are carried out. How a kind of
-job is computed is its :class:`wingfit.service.jobs.job_kind.Work`. A job is RUNNING only while its thread lives, so
-after any end of the process the database says what is left to do.
+:mod:`wingfit.workers.jobs` decides what a job may do next, and the runner carries out its instructions. A
+:class:`wingfit.service.jobs.job_kind.JobKind` computes the steps. A job is RUNNING only while its thread lives, so
+after any end of the process the database contains what remains to be done.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sqlalchemy.orm import Session
 
 from wingfit.service.http.problems import conflict
 from wingfit.service.jobs.interruptible import InterruptibleEvaluator
-from wingfit.service.jobs.job_kind import InterruptedStepError, Points, Step, Work
+from wingfit.service.jobs.job_kind import InterruptedStepError, JobKind, Points, Step
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
@@ -32,27 +32,27 @@ from wingfit.workers.jobs import Instruction
 
 LOG = logging.getLogger("wingfit.runs")
 LONGEST_ERROR = 1000
-# Calibrations yield to the API when both want a processor.
+# Calibrations yield to the API when both need a processor.
 NICENESS = 10
-# Between attempts to write on a full disk: the first, the longest.
-ROOM_SECONDS = (0.5, 15.0)
+# Pause between attempts to write to a full disk: the first and the longest.
+RETRY_SECONDS = (0.5, 15.0)
 
 Written = TypeVar("Written")
 
 
-class Known(NamedTuple):
-    """A job, its kind, and whose it is."""
+class JobRef(NamedTuple):
+    """A job, its kind and its owner."""
 
-    work: Work
+    kind: JobKind
     id: str
     owner: str | None
 
     def __str__(self) -> str:
-        return f"{self.work.what} {self.id}"
+        return f"{self.kind.what} {self.id}"
 
 
 class Pace(NamedTuple):
-    """How jobs get on: seconds since the last progress of the slowest that runs, and that the oldest has waited."""
+    """Seconds since the last progress of the slowest running job, and seconds that the oldest queued job has waited."""
 
     stalled_s: float
     waited_s: float
@@ -65,38 +65,38 @@ class Runner:
         self,
         database: Database,
         changes: Changes,
-        kinds: Sequence[Work],
+        kinds: Sequence[JobKind],
         at_once: int,
         of_one: int | None = None,
         most_starts: int = jobs.MOST_STARTS,
     ) -> None:
-        """``at_once`` jobs are computed at a time, of them ``of_one`` of one owner.
+        """Compute at most ``at_once`` jobs at a time, of them ``of_one`` of one owner.
 
-        A job during which the server ended ``most_starts`` times without progress is given up.
+        A job fails if the server ended ``most_starts`` times during it without progress.
         """
         self._database, self._changes, self._kinds = database, changes, kinds
         self._at_once, self._of_one, self._most_starts = at_once, of_one or at_once, most_starts
         self._lock = threading.RLock()
-        self._waiting: deque[Known] = deque()
-        self._waits_since: dict[Known, float] = {}
-        self._progressed: dict[Known, float] = {}
-        self._cancelled: set[Known] = set()
-        # Jobs that had better be alone, lest others are given up for what one of them does.
-        self._suspects: set[Known] = set()
-        self._threads: dict[Known, threading.Thread] = {}
+        self._waiting: deque[JobRef] = deque()
+        self._waits_since: dict[JobRef, float] = {}
+        self._progressed: dict[JobRef, float] = {}
+        self._cancelled: set[JobRef] = set()
+        # Jobs that may have ended the server: each runs alone, so that no other job is blamed for it.
+        self._suspects: set[JobRef] = set()
+        self._threads: dict[JobRef, threading.Thread] = {}
         self._evaluator: RunningEvaluator | None = None
         self._stopping = False
 
     # -- from outside ----------------------------------------------------------------------------------------
 
     def recover(self) -> None:
-        """Take up what an earlier process left: jobs under way first, then those that waited."""
+        """Continue what an earlier process left: first the running jobs, then the queued ones."""
         with self._lock:
             with self._database.write() as session:
                 left = [
-                    (row, Known(work, row.id, row.owner))
+                    (row, JobRef(kind, row.id, row.owner))
                     for state in (jobs.State.RUNNING, jobs.State.QUEUED)
-                    for row, work in self._unfinished(session, state)
+                    for row, kind in self._unfinished(session, state)
                 ]
                 todo = [(job, _step(row, jobs.Restart(self._most_starts))) for row, job in left]
                 self._suspects = {job for row, job in left if self._is_suspect(row)}
@@ -104,23 +104,23 @@ class Runner:
                 self._obey(job, instructions)
 
     def attach(self, evaluator: RunningEvaluator) -> None:
-        """Begin to compute with ``evaluator``."""
+        """Start to compute with ``evaluator``."""
         with self._lock:
             self._evaluator = evaluator
         self._dispatch()
 
-    def enqueue(self, work: Work, job_id: str, owner: str | None) -> None:
-        """A new job was stored as QUEUED."""
-        self._obey(Known(work, job_id, owner), (Instruction.ENQUEUE, Instruction.PUBLISH))
+    def enqueue(self, kind: JobKind, job_id: str, owner: str | None) -> None:
+        """Queue a job that was stored as QUEUED."""
+        self._obey(JobRef(kind, job_id, owner), (Instruction.ENQUEUE, Instruction.PUBLISH))
 
-    def control(self, work: Work, job_id: str, event: jobs.Event) -> JobRow:
+    def control(self, kind: JobKind, job_id: str, event: jobs.Event) -> JobRow:
         """Apply a user's event; a 409 with the state when the job does not admit it."""
         with self._lock:
             with self._database.write() as session:
-                row = work.row(session, job_id)
-                job = Known(work, job_id, row.owner)
+                row = store.one(session, kind.table, job_id)
+                job = JobRef(kind, job_id, row.owner)
                 if row.state == jobs.State.RUNNING and job not in self._threads and not self._stopping:
-                    _step(row, jobs.Restart(self._most_starts))  # its end could not be stored
+                    _step(row, jobs.Restart(self._most_starts))  # the end of its thread could not be stored
                 try:
                     instructions = _step(row, event)
                 except jobs.IllegalTransition as error:
@@ -133,11 +133,11 @@ class Runner:
         return row
 
     def begin_stop(self) -> None:
-        """Start nothing more, and let no failure from now on count as the job's. Safe in a signal handler."""
+        """Start no more jobs; failures from now on are not counted against jobs. Safe in a signal handler."""
         self._stopping = True
 
     def stop(self, timeout: float) -> bool:
-        """Wait for the steps under way, at most ``timeout`` s; whether all threads ended."""
+        """Wait at most ``timeout`` s for the current steps; returns whether all threads ended."""
         self.begin_stop()
         deadline = time.monotonic() + timeout
         self._leave()
@@ -148,7 +148,7 @@ class Runner:
         return not any(thread.is_alive() for thread in threads)
 
     def pace(self) -> Pace:
-        """How jobs get on now."""
+        """The pace of the jobs now."""
         with self._lock:
             now = time.monotonic()
             return Pace(
@@ -157,7 +157,7 @@ class Runner:
             )
 
     def _leave(self) -> None:
-        """A stop in good order says nothing against the jobs that ran."""
+        """Record that the server stops in an orderly way, so that the stop is not counted against running jobs."""
         try:
             with self._database.write() as session:
                 for row, _ in self._unfinished(session, jobs.State.RUNNING):
@@ -165,21 +165,21 @@ class Runner:
         except (DatabaseClosedError, OperationalError) as error:
             LOG.warning("the stop is not stored (%s); it counts as an end of the server", error)
 
-    def under_way(self) -> list[Known]:
-        """Jobs that are computed now; without the lock, which may be held by what hangs."""
+    def under_way(self) -> list[JobRef]:
+        """Jobs that are computed now; does not take the lock, which a hanging thread may hold."""
         return list(self._threads)
 
     # -- the waiting line ------------------------------------------------------------------------------------
 
     def _is_suspect(self, row: JobRow) -> bool:
-        """Whether one more end of the server would count as this job's fault."""
+        """Whether one more end of the server during this job would make it fail."""
         return row.starts >= max(1, self._most_starts - 1)
 
-    def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, Work]]:
-        found = [(row, work) for work in self._kinds for row in store.jobs_in(session, work.table, state)]
+    def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, JobKind]]:
+        found = [(row, kind) for kind in self._kinds for row in store.jobs_in(session, kind.table, state)]
         return sorted(found, key=lambda one: one[0].created_at)
 
-    def _obey(self, job: Known, instructions: tuple[Instruction, ...]) -> None:
+    def _obey(self, job: JobRef, instructions: tuple[Instruction, ...]) -> None:
         with self._lock:
             if Instruction.ENQUEUE in instructions and job not in self._waiting:
                 self._waiting.append(job)
@@ -202,12 +202,12 @@ class Runner:
                 self._threads[job] = thread
                 thread.start()
 
-    def _take(self, job: Known) -> None:
+    def _take(self, job: JobRef) -> None:
         self._waiting.remove(job)
         del self._waits_since[job]
 
-    def _next(self) -> Known | None:
-        """The first that may start now. One that had better be alone waits until it is, and those behind it as well."""
+    def _next(self) -> JobRef | None:
+        """The first job that may start now. A suspect waits until no other job runs, and so do the jobs behind it."""
         if self._suspects & self._threads.keys():
             return None
         for job in self._waiting:
@@ -217,8 +217,8 @@ class Runner:
                 return job
         return None
 
-    def _may_start(self, job: Known) -> bool:
-        """Whether no more than his share of its owner's jobs are computed, and none of this one's earlier threads.
+    def _may_start(self, job: JobRef) -> bool:
+        """Whether the owner's share is not used up, and the job has no thread.
 
         A job that was paused and resumed waits until its earlier thread has ended.
         """
@@ -227,7 +227,7 @@ class Runner:
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
-    def _work(self, job: Known, evaluator: RunningEvaluator) -> None:
+    def _work(self, job: JobRef, evaluator: RunningEvaluator) -> None:
         lower_priority()
         try:
             self._compute(job, evaluator)
@@ -235,7 +235,7 @@ class Runner:
             LOG.info("%s: left as stored (%s)", job, error)
         except InterruptedStepError:
             if not self._stopping:
-                self._end(job, jobs.Fail("interrupted"))  # the wish to cancel decides
+                self._end(job, jobs.Fail("interrupted"))  # becomes CANCELLED where that is pending
         except Exception as error:
             self._fail(job, error)
         finally:
@@ -247,25 +247,25 @@ class Runner:
                     self._suspects.discard(job)
             self._dispatch()
 
-    def _compute(self, job: Known, evaluator: RunningEvaluator) -> None:
+    def _compute(self, job: JobRef, evaluator: RunningEvaluator) -> None:
         row, points = self._start(job)
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("%s: starts after step %d", job, row.generations)
         interruptible = InterruptibleEvaluator(evaluator, lambda: self._stopping or job in self._cancelled)
 
-        def begun() -> Iterator[Step]:
-            steps = job.work.steps(row, interruptible)
+        def first_step() -> Iterator[Step]:
+            steps = job.kind.steps(row, interruptible)
             return chain([next(steps)], steps)
 
-        # What is prepared before the first step may need room, too.
-        for step in self._patiently(job, begun):
+        # The preparation of the first step may need disk space, too.
+        for step in self._patiently(job, first_step):
             points.append((earlier + time.monotonic() - began, step.progress))
             goes_on = self._store(job, step, points)
             if self._stopping or not goes_on:
                 return
 
-    def _patiently(self, job: Known, write: Callable[[], Written]) -> Written:
-        """Write, again and again while the disk takes nothing: a job waits for room, and loses nothing."""
+    def _patiently(self, job: JobRef, write: Callable[[], Written]) -> Written:
+        """Write, and retry while the disk is full: the job waits for space and loses nothing."""
         waited = 0.0
         while True:
             try:
@@ -274,18 +274,18 @@ class Runner:
                 if not is_full(error) or self._stopping:
                     raise
                 LOG.error("%s waits: the disk is full or fails (%s)", job, getattr(error, "orig", error))
-            pause = min(ROOM_SECONDS[0] + waited, ROOM_SECONDS[1])
+            pause = min(RETRY_SECONDS[0] + waited, RETRY_SECONDS[1])
             waited += pause
             time.sleep(pause)
 
-    def _start(self, job: Known) -> tuple[JobRow, Points]:
+    def _start(self, job: JobRef) -> tuple[JobRow, Points]:
         def write() -> tuple[JobRow, Points, tuple[Instruction, ...]]:
             with self._database.write() as session:
-                if self._stopping:  # what starts after the stop has taken note of what runs would count as a death
+                if self._stopping:  # a start after _leave() would count as an unexpected end of the server
                     raise InterruptedStepError
-                row = job.work.row(session, job.id)
+                row = store.one(session, job.kind.table, job.id)
                 instructions = _step(row, jobs.Start())
-                return row, job.work.begin(session, row), instructions
+                return row, job.kind.begin(session, row), instructions
 
         row, points, instructions = self._patiently(job, write)
         with self._lock:
@@ -294,38 +294,40 @@ class Runner:
         self._obey(job, instructions)
         return row, points
 
-    def _store(self, job: Known, step: Step, points: Points) -> bool:
-        """One step with all that it found, in one transaction; whether the job goes on."""
+    def _store(self, job: JobRef, step: Step, points: Points) -> bool:
+        """Store one step with its results in one transaction; returns whether the job continues."""
         eta = jobs.eta_seconds(points)
 
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
-                row = job.work.row(session, job.id)
-                instructions = _step(row, jobs.Finish() if step.last else jobs.Generation(step.progress, step.lasting))
+                row = store.one(session, job.kind.table, job.id)
+                instructions = _step(
+                    row, jobs.Finish() if step.last else jobs.Generation(step.progress, step.resumable)
+                )
                 row.elapsed_seconds = points[-1][0]
                 if not step.last or row.state == jobs.State.SUCCEEDED:
-                    step.keep(session, row, eta)
+                    step.store(session, row, eta)
             return instructions
 
         instructions = self._patiently(job, write)
         with self._lock:
             self._progressed[job] = time.monotonic()
-            if step.lasting:
+            if step.resumable:
                 self._suspects.discard(job)
         self._obey(job, (*instructions, Instruction.PUBLISH))
         return Instruction.STOP not in instructions
 
-    def _fail(self, job: Known, error: Exception) -> None:
+    def _fail(self, job: JobRef, error: Exception) -> None:
         if self._stopping:
             LOG.info("%s: interrupted by the stop of the service (%s)", job, error)
             return
         LOG.error("%s failed", job, exc_info=error)
         self._end(job, jobs.Fail(_failure(job, error)))
 
-    def _end(self, job: Known, event: jobs.Fail) -> None:
+    def _end(self, job: JobRef, event: jobs.Fail) -> None:
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
-                return _step(job.work.row(session, job.id), event)
+                return _step(store.one(session, job.kind.table, job.id), event)
 
         try:
             self._obey(job, self._patiently(job, write))
@@ -335,21 +337,21 @@ class Runner:
 
 
 def message(error: Exception) -> str:
-    """``error`` for the user: what the domain says as it stands, a surprise with its kind; no stack trace."""
-    text = with_remedy(str(error)) if _told(error) else f"{type(error).__name__}: {error}"
+    """``error`` for the user, without stack trace; unexpected errors with the name of the exception."""
+    text = with_remedy(str(error)) if _is_for_user(error) else f"{type(error).__name__}: {error}"
     return text[:LONGEST_ERROR]
 
 
-def _told(error: Exception) -> bool:
-    """Whether ``error`` is the domain's own word to the user."""
+def _is_for_user(error: Exception) -> bool:
+    """Whether ``error`` has a message that the domain wrote for the user."""
     return isinstance(error, ValueError) and bool(str(error))
 
 
-def _failure(job: Known, error: Exception) -> str:
-    """Why a job failed; a surprise is the server's fault, and said to be."""
-    if _told(error):
+def _failure(job: JobRef, error: Exception) -> str:
+    """Why a job failed; an unexpected error is reported as a fault of the server."""
+    if _is_for_user(error):
         return message(error)
-    return f"the server made a mistake ({message(error)}); the {job.work.what}'s data are kept; please report it"
+    return f"the server made a mistake ({message(error)}); the {job.kind.what}'s data are kept; please report it"
 
 
 def lower_priority() -> None:

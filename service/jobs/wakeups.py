@@ -1,4 +1,4 @@
-"""Wakes whoever watches a run. Carries no data: the database says what changed, so nothing can be missed."""
+"""Wakes event streams when a job changes. Carries no data: watchers read the database, so they miss nothing."""
 
 from __future__ import annotations
 
@@ -17,39 +17,39 @@ class Changes:
         self.closed = False
 
     @contextmanager
-    def watch(self, run_id: str) -> Iterator[asyncio.Event]:
-        """An event that is set at every change of the run, at every change of keys, and when the service stops."""
+    def watch(self, job_id: str) -> Iterator[asyncio.Event]:
+        """An event that is set when the job or the API keys change, and when the service stops."""
         watcher = (asyncio.get_running_loop(), asyncio.Event())
         with self._lock:
-            self._watchers.setdefault(run_id, set()).add(watcher)
+            self._watchers.setdefault(job_id, set()).add(watcher)
         try:
             yield watcher[1]
         finally:
             with self._lock:
-                watchers = self._watchers[run_id]
+                watchers = self._watchers[job_id]
                 watchers.discard(watcher)
                 if not watchers:
-                    del self._watchers[run_id]
+                    del self._watchers[job_id]
 
     @property
     def watchers(self) -> int:
-        """How many watch."""
+        """Number of watchers."""
         with self._lock:
             return sum(len(group) for group in self._watchers.values())
 
-    def publish(self, run_id: str) -> None:
-        """The run changed."""
+    def publish(self, job_id: str) -> None:
+        """Wake the watchers of a job that has changed."""
         with self._lock:
-            watchers = list(self._watchers.get(run_id, ()))
+            watchers = list(self._watchers.get(job_id, ()))
         _wake(watchers)
 
     def close(self) -> None:
-        """Let all watchers go, so that open streams do not hold up the end of the process."""
+        """End all watchers, so that open streams do not delay the end of the process."""
         self.closed = True
         self.wake_all()
 
     def wake_all(self) -> None:
-        """Wake every watcher, whatever it watches."""
+        """Wake all watchers."""
         with self._lock:
             watchers = [watcher for group in self._watchers.values() for watcher in group]
         _wake(watchers)
@@ -58,7 +58,7 @@ class Changes:
 def _wake(watchers: list[tuple[asyncio.AbstractEventLoop, asyncio.Event]]) -> None:
     for loop in {loop for loop, _ in watchers}:
         if not loop.is_closed():
-            # All at once: each call from another thread wakes the loop anew.
+            # In one call: each call from another thread wakes the loop again.
             loop.call_soon_threadsafe(_set, [event for one, event in watchers if one is loop])
 
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from sqlalchemy import inspect
 
+from wingfit.client.answers import Health as HealthAnswer
 from wingfit.service.http import threads
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import Work
-from wingfit.service.runs.schemas import HealthOut
+from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.settings import Settings
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -27,7 +27,7 @@ Jobs = dict[str, dict[str, int]]
 class Health:
     """Counts jobs in a thread of its own; concurrent callers share the count."""
 
-    def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[Work]) -> None:
+    def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[JobKind]) -> None:
         self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
         self._counting = threads.SharedCall("health", self._count)
         self.jobs: Jobs | None = None
@@ -45,11 +45,11 @@ class Health:
             return f"the database cannot be read: {error}"
         return None
 
-    async def now(self) -> HealthOut:
+    async def now(self) -> HealthAnswer:
         """The health of the service; counts are over all owners, for every caller."""
         silent = await self.look()
-        run, diagnosis = (None if self.jobs is None else _active(self.jobs[work.what]) for work in self._kinds)
-        return HealthOut(
+        run, diagnosis = (None if self.jobs is None else _active(self.jobs[kind.what]) for kind in self._kinds)
+        return HealthAnswer(
             status="degraded" if silent else self._pool.status,
             version=wingfit_version(),
             sqlite_version=sqlite3.sqlite_version,
@@ -63,7 +63,7 @@ class Health:
     def _count(self) -> Jobs:
         with self._database.look() as look:
             return {
-                work.what: dict(look.execute(_COUNT.format(inspect(work.table).local_table))) for work in self._kinds
+                kind.what: dict(look.execute(_COUNT.format(inspect(kind.table).local_table))) for kind in self._kinds
             }
 
 

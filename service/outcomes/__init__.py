@@ -1,1 +1,1 @@
-"""Results of runs on the wire: loads, forces, coefficients, effects."""
+"""Answers about results of runs and simulations: loads, forces, coefficients."""

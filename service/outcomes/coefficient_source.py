@@ -1,4 +1,4 @@
-"""Which coefficients a run on forces offers for a recording: those found on it, on all, or by a law."""
+"""Coefficients that a run on forces has for a recording: local, joint, average, or from the global model."""
 
 from __future__ import annotations
 
@@ -15,43 +15,40 @@ from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
 from wingfit.workers.jobs import State
 
-# What stands for a run where nothing is asked for: what was fitted to the recording first, then what predicts it.
+# Default source: the first of these that the run has.
 PREFERENCE: tuple[Source, ...] = ("local", "joint", "global", "average", "nominal")
 
 
-# Coefficients by the stage that found them.
+# Estimated coefficients by stage.
 Estimates = Mapping[str, Mapping[str, float]]
-# Coefficients and what must be known about them.
+# Returns coefficients, and remarks on them.
 Give = Callable[[], tuple[Mapping[str, float], tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
 class Chosen:
-    """A source, its full genome by name, and what must be known about it."""
+    """A source, its full genome by name, and remarks on it."""
 
     source: Source
     genome: Mapping[str, float]
     remarks: tuple[str, ...] = ()
 
 
-def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, asked: Source | None) -> Chosen:
-    """The genome of the source that is ``asked`` for, or of the best one; a 409 where the run does not have it."""
-    there = offered(service, row, dataset, recording, estimates(service, row, dataset))
-    source = asked or next(iter(there))
-    if source not in there:
-        there_are = ", ".join(there)
+def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, requested: Source | None) -> Chosen:
+    """The genome of the ``requested`` source, by default of the best; a 409 if the run does not have it."""
+    available = offered(service, row, dataset, recording, estimates(service, row, dataset))
+    source = requested or next(iter(available))
+    if source not in available:
         later = "" if row.result else "; more when the run has SUCCEEDED"
-        raise conflict(
-            f"run {row.id} has no {source} coefficients for recording {recording!r}; it has: {there_are}{later}",
-            state=row.state,
-        )
-    return there[source]()
+        message = f"run {row.id} has no {source} coefficients for recording {recording!r}"
+        raise conflict(f"{message}; it has: {', '.join(available)}{later}", state=row.state)
+    return available[source]()
 
 
 def offered(
     service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates
 ) -> dict[Source, Callable[[], Chosen]]:
-    """What makes the genome of each source that the run has for a recording, the best first."""
+    """Functions that return the genome of each source that the run has for a recording, the best source first."""
     nominal = service.engine.genome(store.spec(row), dataset, {})
     given = _given(service, row, dataset, recording, found)
 
@@ -63,14 +60,14 @@ def offered(
 
 
 def estimates(service: Service, row: RunRow, dataset: Dataset) -> Estimates:
-    """What each stage of the run has found so far."""
+    """The coefficients of each stage of the run so far."""
     with service.database.read() as session:
         checkpoint = store.checkpoint(session, row.id)
     return service.engine.found(store.spec(row), dataset, checkpoint) if checkpoint else {}
 
 
 def law(row: RunRow, dataset: Dataset) -> GlobalModel:
-    """The run's global model; a 409 that says why there is none."""
+    """The run's global model; a 409 with the reason if there is none."""
     if row.kind != "forces":
         raise conflict(f"run {row.id} is on tracks; only runs on forces predict")
     if row.result is None:
@@ -87,7 +84,7 @@ def law(row: RunRow, dataset: Dataset) -> GlobalModel:
 
 
 def _given(service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates) -> dict[Source, Give]:
-    """What gives the coefficients of each source that there is, with remarks."""
+    """Functions that return the coefficients of each available source, with remarks."""
     spec = store.spec(row)
 
     def by_law() -> tuple[Mapping[str, float], tuple[str, ...]]:
@@ -100,7 +97,7 @@ def _given(service: Service, row: RunRow, dataset: Dataset, recording: str, foun
     if stage in found:
         given[fitted] = lambda: (found[stage], ())
     if row.result is not None and spec.mode == "local":
-        # The average of the estimates is what the result calls best.
+        # In the result, the average of the estimates is ``best``.
         average = {gene["name"]: gene["best"] for gene in row.result["genes"]}
         given["average"] = lambda: (average, ())
         if row.result["global_model"] is not None:

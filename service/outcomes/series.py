@@ -1,4 +1,4 @@
-"""Series on the wire: as many digits as mean something."""
+"""Series in answers, rounded to significant digits."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-DIGITS = 7  # beyond, there is only noise; and a wing of many bodies has megabytes of numbers
-MOST_PLACES = 300  # 10 to the power of more is no number
+DIGITS = 7  # later digits are noise, and a wing of many bodies has megabytes of numbers
+MOST_PLACES = 300  # a larger power of 10 is not a float
 
 
 def rounded(series: npt.NDArray[np.float64]) -> list[Any]:

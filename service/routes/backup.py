@@ -1,4 +1,4 @@
-"""A copy of everything, while the service works."""
+"""Download of a backup while the service runs."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ PIECE = 2**20
 
 
 async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
-    """A copy of the database, one at a time, which goes with the request, however that ends."""
+    """A copy of the database, one at a time, which is removed when the request ends."""
     async with service.backups.slot():
         if await request.is_disconnected():
-            raise ProblemError(503, "busy", "nobody waits for this backup any more")
+            raise ProblemError(503, "busy", "the client of this backup is gone")
         opened = await run_in_threadpool(_opened, service)
         try:
             yield opened
@@ -57,7 +57,7 @@ def _opened(service: Service) -> BinaryIO:
     try:
         return path.open("rb")
     finally:
-        path.unlink()  # the open file lasts as long as it is open
+        path.unlink()  # the open file stays readable until it is closed
 
 
 async def _pieces(opened: BinaryIO) -> AsyncIterator[bytes]:

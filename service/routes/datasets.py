@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
+from wingfit.client import answers as a
 from wingfit.records import Dataset
 from wingfit.records.files.confined import ReaderError
 from wingfit.service.auth.access import owner_of_new
@@ -21,7 +22,6 @@ from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
 from wingfit.service.runs import views
-from wingfit.service.runs.schemas import DatasetOut, Page
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import ArchiveRow, DatasetRow
@@ -36,7 +36,7 @@ ARCHIVE_TYPES = (*MEDIA_TYPES.values(), OTHER_TYPE)
 @router.post(
     "",
     status_code=201,
-    response_model=DatasetOut,
+    response_model=a.Dataset,
     responses={201: {"headers": http.LOCATION}, **http.errors(400, 409, 413, 429)},
     summary="Upload a dataset",
     dependencies=[UPLOAD_SLOT],
@@ -69,8 +69,7 @@ def upload(
         session.add(ArchiveRow(dataset_id=row.id, body=data))
         if parsed is not None:
             store.keep_parsed(session, row.id, parsed)
-        body = views.dataset(row).model_dump(mode="json")
-        return store.Answer(201, f"/v1/datasets/{row.id}", body)
+        return store.Answer(201, f"/v1/datasets/{row.id}", views.dataset(row))
 
     answer, new = http.created(service.database, again, create)
     if new:
@@ -78,19 +77,19 @@ def upload(
     return http.sent(answer)
 
 
-@router.get("", response_model=Page[DatasetOut], responses=http.errors(), summary="List datasets")
-def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Cursor = None) -> Page[DatasetOut]:
+@router.get("", response_model=a.Page[a.Dataset], responses=http.errors(), summary="List datasets")
+def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Cursor = None) -> a.Page[a.Dataset]:
     """List datasets, newest first."""
     with service.database.read() as session:
         rows, following = store.page(session, DatasetRow, limit, cursor)
-    return Page(items=[views.dataset(row) for row in rows], next_cursor=following)
+    return {"items": [views.dataset(row) for row in rows], "next_cursor": following}
 
 
-@router.get("/{dataset_id}", response_model=DatasetOut, responses=http.errors(404), summary="Fetch a dataset")
+@router.get("/{dataset_id}", response_model=a.Dataset, responses=http.errors(404), summary="Fetch a dataset")
 def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Describe one dataset."""
     with service.database.read() as session:
-        row = store.dataset(session, dataset_id)
+        row = store.one(session, DatasetRow, dataset_id)
     return http.tagged(views.dataset(row), if_none_match)
 
 
@@ -107,7 +106,7 @@ def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch 
 def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the bytes that were uploaded."""
     with service.database.read() as session:
-        row = store.dataset(session, dataset_id)
+        row = store.one(session, DatasetRow, dataset_id)
         tag = f'"{row.sha256}"'
         if http.matches(if_none_match, tag):
             return Response(status_code=304, headers={"ETag": tag})
@@ -120,7 +119,7 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
 
 
 async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterator[bytes]:
-    """The archive, each piece a reading of its own: a long one would let the database's log grow."""
+    """The archive; each piece is a separate read, because a long one would let the log of the database grow."""
 
     def piece(start: int) -> bytes:
         with database.look() as connection:

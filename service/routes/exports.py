@@ -1,4 +1,4 @@
-"""Runs and diagnoses as files: to archive, for a spreadsheet, for a program that reads NetCDF."""
+"""Runs and diagnoses as files: JSON, CSV, NetCDF."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
+from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
+from wingfit.client.export_answers import DiagnosisExport, RunExport
+from wingfit.client.transport import Format
 from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, ServiceDep
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
 from wingfit.service.runs import best_genome, netcdf_variables, run_netcdf
 from wingfit.service.runs import exports as run_exports
-from wingfit.service.runs.export_schemas import DiagnosisExportOut, Format, RunExportOut
 
 router = APIRouter(prefix="/v1", tags=["exports"])
 JSON = "application/json"
@@ -34,7 +36,7 @@ _RANKING = (
 
 
 def _described(example: str) -> dict[str, Any]:
-    """The answers besides JSON, which the models describe."""
+    """The description of the CSV and NetCDF answers."""
     saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
     return {
         "headers": saved,
@@ -47,7 +49,7 @@ def _described(example: str) -> dict[str, Any]:
 
 @router.get(
     "/runs/{run_id}/export",
-    response_model=RunExportOut,
+    response_model=RunExport,
     responses={200: _described(_HISTORY), **http.errors(404, 409)},
     summary="Export a run",
 )
@@ -58,7 +60,7 @@ async def export_run(
     run_id: str,
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
-    """Return a run as it is now as a file; as NetCDF every recording is simulated, so that takes its turn."""
+    """Return a run as a file; NetCDF requires a simulation of every recording, and may wait for other exports."""
     if format != "netcdf":
         await held.enter_async_context(service.downloads.slot())
         return await run_in_threadpool(_run, service, run_id, format)
@@ -71,7 +73,7 @@ async def export_run(
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """What ``make`` makes in a thread; it is told, by what it is given, whether nobody waits for it any more."""
+    """The result of ``make`` in a thread; the function that it gets returns whether the client is gone."""
     gone = threading.Event()
     making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
     while not making.done():
@@ -93,7 +95,7 @@ def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A0
 
 @router.get(
     "/diagnoses/{diagnosis_id}/export",
-    response_model=DiagnosisExportOut,
+    response_model=DiagnosisExport,
     responses={200: _described(_RANKING), **http.errors(404, 409)},
     summary="Export a diagnosis",
     dependencies=[DOWNLOAD_SLOT],
@@ -111,5 +113,5 @@ def export_diagnosis(
     elif format == "netcdf":
         body, media_type, name = diagnosis_exports.file(exported), netcdf_variables.MEDIA_TYPE, ".nc"
     else:
-        body, media_type, name = diagnosis_exports.document(exported).model_dump_json(), JSON, ".json"
+        body, media_type, name = to_json(diagnosis_exports.document(exported)), JSON, ".json"
     return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))

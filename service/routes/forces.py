@@ -1,4 +1,4 @@
-"""What a run on forces has found: forces over the beat, and predictions; the models that there are."""
+"""Results of a run on forces: forces over the beat and predictions; the available models."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query
 from starlette.responses import JSONResponse, Response
 
+from wingfit.client.force_answers import Forces, Models, Prediction, Source
 from wingfit.service.container import SIMULATION_SLOT, ServiceDep
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import conflict
 from wingfit.service.outcomes import coefficient_source, force_views
-from wingfit.service.outcomes.force_schemas import ForcesOut, ModelsOut, PredictionIn, PredictionOut, Source
+from wingfit.service.outcomes.requests import PredictionIn
 from wingfit.service.routes.outcomes import check_recording, failed, run_row
 from wingfit.service.storage import store
 
@@ -19,14 +20,14 @@ router = APIRouter(prefix="/v1", tags=["forces"])
 
 
 @router.get("/models", responses=http.errors(), summary="Models of vehicles")
-def models() -> ModelsOut:
-    """List the blade-element models that there are, and the terms they are made of, with their sources."""
+def models() -> Models:
+    """List the blade-element models and their terms, with sources."""
     return force_views.models()
 
 
 @router.get(
     "/runs/{run_id}/forces",
-    response_model=ForcesOut,
+    response_model=Forces,
     responses=http.errors(404, 409),
     summary="Forces over the beat",
     dependencies=[SIMULATION_SLOT],
@@ -52,12 +53,13 @@ def forces(
     except ValueError as error:
         raise failed(error) from None
     answer = force_views.forces(found)
-    return JSONResponse(answer | {"remarks": [*chosen.remarks, *answer["remarks"]]})
+    answer["remarks"] = [*chosen.remarks, *answer["remarks"]]
+    return JSONResponse(answer)
 
 
 @router.post(
     "/runs/{run_id}/predictions",
-    response_model=PredictionOut,
+    response_model=Prediction,
     responses=http.errors(404, 409),
     summary="Predict forces under any condition",
     dependencies=[SIMULATION_SLOT],

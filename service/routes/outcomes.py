@@ -1,58 +1,41 @@
-"""What a run has found: history, genome, result, tracks, events; and simulations of a given genome."""
+"""Results of a run: history, genome, result, tracks, loads; and simulations of a given genome."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, cast
 
 from fastapi import APIRouter, Query
-from starlette.responses import JSONResponse, Response, StreamingResponse
+from pydantic import Field
+from starlette.responses import JSONResponse, Response
 
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client import answers as a
+from wingfit.client.force_answers import ForceResult, ForceSimulation
+from wingfit.client.load_answers import Loads
 from wingfit.records import Dataset, Recording
 from wingfit.service.container import DOWNLOAD_SLOT, SIMULATION_SLOT, Service, ServiceDep
 from wingfit.service.http import json_reads
 from wingfit.service.http import responses as http
-from wingfit.service.http.events import LastEventId, described, of_run
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.outcomes import force_views, load_views
-from wingfit.service.outcomes.force_schemas import AnyResult, ForceSimulationOut
-from wingfit.service.outcomes.load_schemas import LoadsOut, OutputName
-from wingfit.service.routes.runs import load
+from wingfit.service.outcomes.requests import LoadsIn, OutputName, SimulationIn, WingIn
+from wingfit.service.routes.jobs import load
 from wingfit.service.runs import best_genome, spec_views, views
 from wingfit.service.runs.request_checks import gene_names
-from wingfit.service.runs.schemas import (
-    ComparisonOut,
-    GenomeOut,
-    HistoryItem,
-    LoadsIn,
-    Page,
-    SimulationIn,
-    SimulationOut,
-    WingIn,
-)
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
 from wingfit.sim.wing.outputs import Outputs
 from wingfit.workers.jobs import State
 
+AnyResult = Annotated[a.Result | ForceResult, Field(discriminator="kind")]
 router = APIRouter(prefix="/v1", tags=["outcomes"])
-
-_EVENTS = """id: 12
-event: generation
-data: {"sequence": 12, "stage": "structural", "generation": 11, "best_mm": 1.84, "progress": 0.31}
-
-id: 12
-event: state
-data: {"id": "run_5c1e07a94bd83f26", "state": "SUCCEEDED"}
-
-"""
 
 
 @router.get(
     "/runs/{run_id}/history",
-    response_model=Page[HistoryItem],
+    response_model=a.Page[a.HistoryItem],
     responses=http.errors(404),
     summary="Fetch the history",
     dependencies=[DOWNLOAD_SLOT],
@@ -68,7 +51,9 @@ async def history(
     return await json_reads.answer(short, json_reads.history, service.database, run_id, after, limit)
 
 
-@router.get("/runs/{run_id}/genome", response_model=GenomeOut, responses=http.errors(404, 409), summary="Best genome")
+@router.get(
+    "/runs/{run_id}/genome", response_model=a.GenomeInfo, responses=http.errors(404, 409), summary="Best genome"
+)
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the best genome so far, beside the nominal one."""
     return http.tagged(best_genome.standing(service, run_row(service, run_id)), if_none_match)
@@ -85,7 +70,7 @@ def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = N
 
 @router.get(
     "/runs/{run_id}/comparison",
-    response_model=ComparisonOut,
+    response_model=a.Comparison,
     responses=http.errors(404, 409),
     summary="Tracks",
     dependencies=[SIMULATION_SLOT],
@@ -107,7 +92,7 @@ def comparison(
 
 @router.get(
     "/runs/{run_id}/loads",
-    response_model=LoadsOut,
+    response_model=Loads,
     responses=http.errors(404, 409),
     summary="Loads",
     dependencies=[SIMULATION_SLOT],
@@ -127,34 +112,22 @@ def loads(
     return JSONResponse({"recording": wanted, "outputs": load_views.outputs(found, load_views.wanted(outputs or True))})
 
 
-@router.get(
-    "/runs/{run_id}/events",
-    response_class=StreamingResponse,
-    responses={200: described("generation", _EVENTS), **http.errors(404)},
-    summary="Watch a run",
-)
-async def events(service: ServiceDep, run_id: str, last_event_id: LastEventId = None) -> StreamingResponse:
-    """Send generations and states as they happen; ends after the final state."""
-    json_reads.run(service.database, run_id)  # or a 404
-    return service.events.answer(of_run(run_id), last_event_id)
-
-
 @router.post(
     "/simulations",
-    response_model=SimulationOut | ForceSimulationOut,
+    response_model=a.Simulation | ForceSimulation,
     responses=http.errors(409),
     summary="Simulate one recording's condition",
     dependencies=[SIMULATION_SLOT],
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
-    """Simulate a recording's condition with a genome of the caller's; nothing is stored."""
+    """Simulate a recording's condition with the genome of the request; nothing is stored."""
     dataset = load(service, body.dataset_id)
     check_recording(dataset, body.recording, "body.recording")
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, [dataset.recording(body.recording)])
     spec_views.refuse_effects(body.effects, dataset, body)
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects, body)
-    values = _asked(service, dataset, spec, body)
+    spec = spec_views.simulation_spec(body)
+    values = _genome_of(service, dataset, spec, body)
     try:
         simulated = _tracks if dataset.kind == "tracks" else _forces
         return JSONResponse(simulated(service, spec, dataset, values, body))
@@ -164,7 +137,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
 
 @router.post(
     "/loads",
-    response_model=LoadsOut,
+    response_model=Loads,
     responses=http.errors(409),
     summary="Simulate any condition's loads",
     dependencies=[SIMULATION_SLOT],
@@ -177,8 +150,8 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
         item = error_item("body.dataset_id", body.dataset_id, "describes a vehicle; loads inside the wing need a wing")
         raise invalid("there are no such loads", [item])
     spec_views.refuse_effects(body.effects, dataset)
-    spec = spec_views.of_simulation(body.division, body.accuracy_mm, body.effects)
-    values = _asked(service, dataset, spec, body)
+    spec = spec_views.simulation_spec(body)
+    values = _genome_of(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))
     found = _loads(service, spec, dataset, values, changed)
@@ -189,9 +162,9 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
 
 def _tracks(
     service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
-) -> dict[str, Any]:
+) -> a.Simulation:
     tracks = service.engine.compare(spec, dataset, genome, body.recording)
-    answer = views.comparison(tracks) | {"mean_distance_mm": views.mean_distance_mm(tracks)}
+    answer = cast(a.Simulation, {**views.comparison(tracks), "mean_distance_mm": views.mean_distance_mm(tracks)})
     names = load_views.wanted(body.outputs)
     if names:
         found = _loads(service, spec, dataset, genome, dataset.recording(body.recording))
@@ -201,14 +174,15 @@ def _tracks(
 
 def _forces(
     service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
-) -> dict[str, Any]:
+) -> ForceSimulation:
     found = service.engine.forces(spec, dataset, genome, body.recording, "nominal")
-    agreements = service.engine.agreements(spec, dataset, genome, body.recording)
-    return force_views.forces(found, "given") | {"agreements": [force_views.agreement(a, "given") for a in agreements]}
+    agreed = service.engine.agreements(spec, dataset, genome, body.recording)
+    agreements = [force_views.agreement(one, "given") for one in agreed]
+    return {**force_views.forces(found, "given"), "agreements": agreements}
 
 
-def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
-    """Full genome of a simulation; a 422 where it cannot be."""
+def _genome_of(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
+    """The full genome of a simulation, or a 422."""
     known = gene_names(service.engine, spec, dataset)
     faults = spec_views.unknown_genes((("body.genome", name) for name in body.genome), known)
     if faults:
@@ -222,7 +196,7 @@ def _asked(service: Service, dataset: Dataset, spec: CalibrationSpec, body: Wing
 def _chosen(
     service: Service, run_id: str, recording: str | None, genome: Literal["best", "nominal"]
 ) -> tuple[Dataset, CalibrationSpec, str, dict[str, float]]:
-    """What a simulation of a run is of: its dataset and spec, the name of a recording, and a genome."""
+    """The dataset, specification, recording and genome of a simulation of a run."""
     row = run_row(service, run_id)
     if row.kind != "tracks":
         raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")
@@ -249,7 +223,7 @@ def _loads(
 def run_row(service: Service, run_id: str) -> RunRow:
     """The run, or a 404."""
     with service.database.read() as session:
-        return store.run(session, run_id)
+        return store.one(session, RunRow, run_id)
 
 
 def _no_result(row: RunRow) -> str:

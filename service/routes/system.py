@@ -9,26 +9,26 @@ from fastapi import APIRouter, Request
 from prometheus_client import CONTENT_TYPE_LATEST
 from starlette.responses import HTMLResponse, PlainTextResponse
 
+from wingfit.client.answers import Health
 from wingfit.service.container import ServiceDep
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.runs.schemas import HealthOut
 
 router = APIRouter(tags=["service"])
 
 
 @router.get("/v1/health", responses=http.errors(), summary="Health")
-async def health(service: ServiceDep) -> HealthOut:
+async def health(service: ServiceDep) -> Health:
     """Say whether the service is up, and whether it can compute."""
     return await service.health.now()
 
 
 @router.get("/v1/ready", responses=http.errors(503), summary="Readiness")
-async def ready(service: ServiceDep) -> HealthOut:
+async def ready(service: ServiceDep) -> Health:
     """Say whether jobs are computed: 200 once the evaluator is ready and the database answers, else 503."""
     health = await service.health.now()
-    if health.status != "ok":
-        detail = health.detail or "the evaluator is starting; jobs are accepted, and wait"
+    if health["status"] != "ok":
+        detail = health["detail"] or "the evaluator is starting; jobs are accepted, and wait"
         raise ProblemError(503, "not-ready", detail)
     return health
 

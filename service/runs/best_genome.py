@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from wingfit.client.answers import GenomeInfo
 from wingfit.service.container import Service
 from wingfit.service.http.problems import conflict
 from wingfit.service.runs import views
-from wingfit.service.runs.schemas import GenomeOut
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
 
@@ -17,9 +17,9 @@ def best(row: RunRow) -> dict[str, float]:
     return row.genome
 
 
-def standing(service: Service, row: RunRow) -> GenomeOut:
-    """The best genome so far beside the nominal one, or a 409."""
+def standing(service: Service, row: RunRow) -> GenomeInfo:
+    """The best and the nominal genome, or a 409."""
     if row.result is not None:
-        return GenomeOut(genes=row.result["genes"], final=True)
+        return GenomeInfo(genes=row.result["genes"], final=True)
     genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))
-    return GenomeOut(genes=[views.gene(gene) for gene in genes], final=False)
+    return GenomeInfo(genes=[views.gene(gene) for gene in genes], final=False)

@@ -1,8 +1,8 @@
-"""Runs: calibrations that go on from their last stored generation."""
+"""Runs: calibrations, which continue after their last stored generation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.search import Generation
+from wingfit.client.answers import GenerationEvent, Run
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.jobs.job_kind import Points, Step
 from wingfit.service.outcomes import force_views
@@ -25,22 +26,22 @@ from wingfit.workers import jobs
 class Calibrating:
     """How runs are computed."""
 
-    what = "run"
-    table = RunRow
+    what, path, prefix, step_event = "run", "/v1/runs", "run", "generation"
+    table, step_table, step_answer = RunRow, GenerationRow, GenerationEvent
 
     def __init__(self, database: Database, engine: Engine, datasets: Datasets) -> None:
         self._database, self._engine, self._datasets = database, engine, datasets
 
-    def row(self, session: Session, job_id: str) -> RunRow:
-        """The run, or a 404."""
-        return store.run(session, job_id)
+    def view(self, row: RunRow) -> Run:
+        """The answer that describes a run."""
+        return views.run(row)
 
     def begin(self, session: Session, row: RunRow) -> Points:
-        """Go on where the run was: its generations so far."""
-        return [(g.elapsed_seconds, g.progress) for g in store.history(session, row.id, 0)]
+        """Continue after the generations so far."""
+        return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Search generation by generation, then judge what was found."""
+        """Search generation by generation, then evaluate the result on every recording."""
         spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, row.id)
@@ -49,18 +50,17 @@ class Calibrating:
             yield _step(generation)
         if checkpoint is None:
             raise ValueError("the search ended without a generation")
-        judged = self._engine.summarise(spec, dataset, evaluator, checkpoint)
-        if isinstance(judged, ForceResult):
-            outcome = force_views.result(judged, spec, dataset).model_dump(mode="json")
+        summary = self._engine.summarise(spec, dataset, evaluator, checkpoint)
+        if isinstance(summary, ForceResult):
+            yield _result(force_views.result(summary, spec, dataset))
         else:
-            outcome = views.result(judged).model_dump(mode="json")
-        yield _judged(outcome)
+            yield _result(views.result(summary))
 
 
 def _step(generation: Generation) -> Step:
     """One generation with its checkpoint and genome."""
 
-    def keep(session: Session, row: RunRow, eta: float | None) -> None:
+    def store_step(session: Session, row: RunRow, eta: float | None) -> None:
         row.stage, row.genome = generation.stage, generation.genome
         misfit = views.misfit(row.kind, generation.distance)
         row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
@@ -69,21 +69,21 @@ def _step(generation: Generation) -> Step:
         session.add(_generation_row(row, generation, eta))
         session.merge(CheckpointRow(run_id=row.id, body=generation.checkpoint))
 
-    return Step(generation.progress, keep)
+    return Step(generation.progress, store_step)
 
 
-def _judged(outcome: dict[str, Any]) -> Step:
-    def keep(_session: Session, row: RunRow, _eta: float | None) -> None:
-        row.result = outcome
-        # while it runs, the best of the present stage; in the end, over all that was fitted
+def _result(outcome: Mapping[str, Any]) -> Step:
+    def store_step(_session: Session, row: RunRow, _eta: float | None) -> None:
+        row.result = dict(outcome)
+        # While the run is running, the best of the current stage; in the end, the misfit to all fitted recordings.
         row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
 
-    return Step(1.0, keep, last=True)
+    return Step(1.0, store_step, last=True)
 
 
 def _generation_row(row: RunRow, generation: Generation, eta: float | None) -> GenerationRow:
     return GenerationRow(
-        run_id=row.id,
+        job_id=row.id,
         sequence=row.generations,
         stage=generation.stage,
         generation=generation.index,

@@ -1,9 +1,9 @@
-"""What the service needs of calibration, behind one seam: `ModelEngine` is the real one."""
+"""What the service needs of calibration; tests replace it by a search that takes no time."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from wingfit.calibration import result, search, summary
 from wingfit.calibration.evaluator import Evaluator
@@ -21,91 +21,26 @@ from wingfit.sim.wing.loads import simulate_outputs
 from wingfit.sim.wing.outputs import Outputs
 
 
-class Engine(Protocol):
-    """Reads datasets, checks specifications, calibrates, judges; ValueError says what is wrong."""
+class Engine:
+    """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces.
 
-    def load(self, data: bytes, filename: str) -> Dataset:
-        """Parse an uploaded zip."""
-        ...
-
-    def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-        """``spec`` with everything decided; ValueError when it does not fit ``dataset``."""
-        ...
-
-    def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Genes of the model; ValueError for an impossible division or an unknown term."""
-        ...
-
-    def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
-        """The nominal genome with ``values`` changed; ValueError for a value out of bounds."""
-        ...
-
-    def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
-        """Standing of the genes while the search runs."""
-        ...
-
-    def calibrate(
-        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
-    ) -> Iterator[Generation]:
-        """Search, or go on from ``checkpoint``."""
-        ...
-
-    def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
-        """The best genome of each stage so far, by the stage's name."""
-        ...
-
-    def summarise(
-        self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
-    ) -> Result | ForceResult:
-        """Judge what the search found, by its last checkpoint, on every recording."""
-        ...
-
-    def compare(
-        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
-    ) -> Comparison:
-        """Tracks of a genome over a recording."""
-        ...
-
-    def loads(
-        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
-    ) -> Outputs:
-        """Loads, powers and energies of a genome under a recording's condition."""
-        ...
-
-    def forces(
-        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
-    ) -> ForceComparison:
-        """Forces of a genome, which comes from ``source``, over a recording."""
-        ...
-
-    def agreements(
-        self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
-    ) -> tuple[Agreement, ...]:
-        """How the forces of a genome agree with a recording."""
-        ...
-
-    def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
-        """Forces under any condition from a global model."""
-        ...
-
-
-class ModelEngine:
-    """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
+    ValueError says what is wrong with a request.
+    """
 
     def load(self, data: bytes, filename: str) -> Dataset:
         """Parse an uploaded zip; DatasetError says where it is malformed."""
         return load_archive(data, filename)
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-        """Plan the calibration without running it."""
+        """``spec`` with every default filled in; ValueError when it does not fit ``dataset``."""
         return search.prepare(spec, dataset).spec
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Genes of the model with this division, or these terms."""
+        """Genes of the model; ValueError for an impossible division or an unknown term."""
         return tuple(gene.name for gene in search.model_for(dataset, spec).genes)
 
     def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
-        """The nominal genome with ``values`` changed."""
+        """The nominal genome with ``values`` changed; ValueError for a value out of bounds."""
         return base_genome(search.model_for(dataset, spec), values).as_dict()
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
@@ -132,17 +67,17 @@ class ModelEngine:
     def calibrate(
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
     ) -> Iterator[Generation]:
-        """Search, stage by stage."""
+        """Search stage by stage, from ``checkpoint`` if there is one."""
         return search.calibrate(spec, dataset, evaluator, checkpoint)
 
     def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
-        """The best genome of each stage so far."""
+        """The best genome of each stage so far, by the stage's name."""
         return search.found(spec, dataset, checkpoint)
 
     def summarise(
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
     ) -> Result | ForceResult:
-        """Judge what the search found on every recording."""
+        """The result of the search with this last ``checkpoint``, on every recording."""
         return summary.summarise(spec, dataset, evaluator, checkpoint)
 
     def compare(

@@ -1,6 +1,6 @@
 """Exports of a run: its history as a table, or all of it as one document.
 
-Both are made while they are sent, ``BLOCK`` generations at a time, however long the history is.
+Both are computed while they are sent, ``BLOCK`` generations at a time.
 """
 
 from __future__ import annotations
@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from pydantic_core import to_json
+
+from wingfit.client.answers import HistoryItem, Run
+from wingfit.client.export_answers import RunExport
+from wingfit.service.answers import checked
 from wingfit.service.container import Service
 from wingfit.service.http import csv_text
 from wingfit.service.outcomes import force_views
 from wingfit.service.runs import best_genome, views
-from wingfit.service.runs.export_schemas import RunExportOut
-from wingfit.service.runs.schemas import RunOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DatasetRow, GenerationRow, RunRow
@@ -28,7 +31,7 @@ MORE_COLUMNS = ("evaluations", "failed", "reasons", "elapsed_seconds")
 
 @dataclass(frozen=True)
 class Exported:
-    """A run and its dataset as they were ``at`` a moment."""
+    """A run and its dataset, read ``at`` this time."""
 
     row: RunRow
     dataset: DatasetRow
@@ -38,24 +41,24 @@ class Exported:
 def of(service: Service, run_id: str) -> Exported:
     """The run as it is now, or a 404."""
     with service.database.read() as session:
-        row = store.run(session, run_id)
-        return Exported(row, store.dataset(session, row.dataset_id), store.now())
+        row = store.one(session, RunRow, run_id)
+        return Exported(row, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
 def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
-    """The generations that ``row`` counts, ascending; each block is a reading of its own, so that none lasts long.
+    """The generations of ``row``, ascending; each block is a separate short read.
 
-    A 404 where the run is deleted meanwhile: what was sent is then seen not to be whole.
+    A 404 if the run is deleted meanwhile; the client then sees that the answer is incomplete.
     """
     for after in range(0, row.generations, BLOCK):
         with database.read() as session:
-            store.run(session, row.id)
-            found = store.history(session, row.id, after, min(BLOCK, row.generations - after))
+            store.one(session, RunRow, row.id)
+            found = store.steps(session, GenerationRow, row.id, after, min(BLOCK, row.generations - after))
         yield found
 
 
 def table(database: Database, row: RunRow) -> Iterator[str]:
-    """The history as CSV, a generation a row; units are in the names of the columns."""
+    """The history as CSV, one generation per row; the names of columns end in units."""
     square, misfit = ("m2", "best_mm") if row.kind == "tracks" else ("n2", "best_mn")
     fields = (*COLUMNS, misfit, *MORE_COLUMNS)
     yield csv_text.lines([[f"{name}_{square}" if name in SQUARES else name for name in fields]])
@@ -64,22 +67,23 @@ def table(database: Database, row: RunRow) -> Iterator[str]:
 
 
 def document(service: Service, exported: Exported) -> Iterator[str]:
-    """All of a run as JSON (`export_schemas.RunExportOut`); a part that needs the dataset is made at once."""
-    empty = _without_history(service, exported).model_dump_json()
+    """A RunExport as JSON; the part that needs the dataset is computed at once, the history while it is sent."""
+    empty = to_json(_without_history(service, exported)).decode()
     return _filled(service.database, exported.row, empty.removesuffix("]}"))
 
 
 def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
     yield head
     for number, block in enumerate(blocks(database, row)):
-        items = ",\n".join(views.history_item(one).model_dump_json() for one in block)
+        items = ",\n".join(to_json(checked(HistoryItem, views.columns(one))).decode() for one in block)
         yield f",\n{items}" if number else items
     yield "]}\n"
 
 
-def _without_history(service: Service, exported: Exported) -> RunExportOut:
+def _without_history(service: Service, exported: Exported) -> RunExport:
     row, run = exported.row, views.run(exported.row)
-    return RunExportOut(
+    return RunExport(
+        schema_id="urn:wingfit:schema:run-export:1",
         wingfit_version=wingfit_version(),
         exported_at=exported.at,
         run=run,
@@ -91,9 +95,9 @@ def _without_history(service: Service, exported: Exported) -> RunExportOut:
     )
 
 
-def request(run: RunOut) -> dict[str, object]:
+def request(run: Run) -> dict[str, object]:
     """The body of POST /v1/runs that repeats a run."""
-    return {"dataset_id": run.dataset_id, "name": run.name, **run.spec.model_dump(mode="json")}
+    return {"dataset_id": run["dataset_id"], "name": run["name"], **run["spec"]}
 
 
 def _cell(generation: GenerationRow, name: str) -> csv_text.Cell:

@@ -1,6 +1,6 @@
-"""NetCDF-4 after the CF conventions: every variable says its unit and what it is.
+"""NetCDF-4 with CF conventions: every variable has its unit and a description.
 
-Files are made in memory: HDF5 ends the whole process where a disk takes no more of a file that it writes.
+Files are written in memory: HDF5 aborts the process if a disk is full while it writes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Dimensions = tuple[str, ...]
 
 
 def made(write: Callable[[Any], None], attributes: dict[str, Any]) -> bytes:
-    """The file that ``write`` fills, with ``attributes`` of its root."""
+    """The file that ``write`` fills, with global ``attributes``."""
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         describe(file, {"Conventions": CONVENTIONS, **attributes})
@@ -35,7 +35,7 @@ def made(write: Callable[[Any], None], attributes: dict[str, Any]) -> bytes:
 
 
 def provenance(row: RunRow | DiagnosisRow, dataset: DatasetRow, model: str, exported_at: str) -> dict[str, Any]:
-    """Attributes that say what a file is from."""
+    """Attributes that document the origin of a file."""
     version = wingfit_version()
     ended = [f"{row.finished_at} {row.state}"] if row.finished_at else []
     return {
@@ -50,7 +50,7 @@ def provenance(row: RunRow | DiagnosisRow, dataset: DatasetRow, model: str, expo
 
 
 def describe(what: Any, attributes: dict[str, Any]) -> None:
-    """Give a group or a variable its attributes."""
+    """Set attributes of a group or a variable."""
     for name, value in attributes.items():
         what.attrs[name] = _storable(value) if isinstance(value, str) else value
 
@@ -66,7 +66,7 @@ def numbers(
     kind: str = "f8",
     **attributes: Any,
 ) -> Any:
-    """A variable of numbers; of floating-point ones NaN is missing. Without ``data`` it is filled later."""
+    """A numeric variable; NaN is the fill value of floats. Without ``data`` it is filled later."""
     options: dict[str, Any] = {"fillvalue": np.nan} if kind.startswith("f") else {}
     if dimensions:
         options |= {"compression": "gzip", "shuffle": True}
@@ -77,7 +77,7 @@ def numbers(
 
 
 def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bool | None]) -> None:
-    """A variable of what is so, or not, or not known."""
+    """A variable of flags: yes, no, or unknown."""
     values = [FLAGS["unknown"] if one is None else int(one) for one in data]
     variable = numbers(group, name, (dimension,), NO_UNIT, meaning, values, kind="i1")
     stated = {"flag_values": np.array(list(FLAGS.values()), dtype=np.int8), "flag_meanings": " ".join(FLAGS)}
@@ -85,7 +85,7 @@ def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bo
 
 
 def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[str] | None = None) -> Any:
-    """A variable of texts."""
+    """A variable of strings."""
     given = None if data is None else text_array(data)
     variable = group.create_variable(name, (dimension,), dtype=h5py.string_dtype(), data=given)
     describe(variable, {"units": NO_UNIT, "long_name": meaning})
@@ -93,12 +93,12 @@ def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[st
 
 
 def text_array(data: Iterable[str]) -> npt.NDArray[np.object_]:
-    """Texts as variables take them."""
+    """Strings as variables store them."""
     return np.array([_storable(text) for text in data], dtype=object)
 
 
 def or_nan(values: Iterable[float | None]) -> npt.NDArray[np.float64]:
-    """Numbers, NaN where there is none."""
+    """Numbers, NaN for None."""
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 

@@ -1,4 +1,4 @@
-"""Refusals that requests for runs, simulations and diagnoses share."""
+"""Checks that requests for runs, simulations and diagnoses share."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wingfit.service.runs.engine import Engine
 
 
 def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-    """Genes of the model that a body asks for, or a 422."""
+    """Genes of the requested model, or a 422."""
     try:
         return engine.gene_names(spec, dataset)
     except EstimateError as error:
@@ -22,7 +22,7 @@ def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple
 
 
 def unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
-    """Faults for the recordings of a body that its dataset does not have; what it has is listed once."""
+    """Faults for requested recordings that the dataset does not have; only the first fault lists those that it has."""
     unknown = [(place, name) for place, name in enumerate(names) if name not in known]
     remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]
     return [

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.client.answers import CONDITION
+from wingfit.client.answers import CONDITION, GenomeInfo
+from wingfit.client.force_answers import ByQuantity, Forces
 from wingfit.records import Dataset, Recording
 from wingfit.records.files.folder import RECORDINGS
 from wingfit.service.container import Service
@@ -22,7 +23,6 @@ from wingfit.service.http.problems import ProblemError
 from wingfit.service.outcomes import coefficient_source, force_views
 from wingfit.service.runs import best_genome, netcdf_variables, views
 from wingfit.service.runs.exports import Exported, blocks, request
-from wingfit.service.runs.schemas import GeneOut, GenomeOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import RunRow
@@ -41,14 +41,14 @@ GENE_NUMBERS = (
 )
 
 
-def file(service: Service, exported: Exported, genome: GenomeOut, gone: Callable[[], bool]) -> bytes:
-    """The file; once ``gone``, for whom it is, a 503 before the next recording."""
+def file(service: Service, exported: Exported, genome: GenomeInfo, gone: Callable[[], bool]) -> bytes:
+    """The file; a 503 before the next recording once the client is ``gone``."""
     dataset = service.datasets.get(exported.row.dataset_id)
 
     def write(root: Any) -> None:
-        root.dimensions = {"generation": exported.row.generations, "gene": len(genome.genes)}
+        root.dimensions = {"generation": exported.row.generations, "gene": len(genome["genes"])}
         _history(root, service.database, exported.row)
-        _genes(root, genome.genes)
+        _genes(root, genome["genes"])
         _recordings(root, service, exported.row, dataset, gone)
 
     row, model = exported.row, "flexible wing" if exported.row.kind == "tracks" else "blade-element model"
@@ -94,16 +94,20 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
         reasons[here] = netcdf_variables.text_array("; ".join(one.reasons) for one in block)
 
 
-def _genes(root: Any, genes: list[GeneOut]) -> None:
-    netcdf_variables.texts(root, "gene", "gene", "gene", (gene.name for gene in genes))
-    netcdf_variables.texts(root, "gene_unit", "gene", "unit of the gene's values", (gene.unit for gene in genes))
-    netcdf_variables.texts(root, "gene_description", "gene", "what the gene is", (gene.description for gene in genes))
+def _genes(root: Any, genes: Any) -> None:
+    netcdf_variables.texts(root, "gene", "gene", "gene", (gene["name"] for gene in genes))
+    netcdf_variables.texts(root, "gene_unit", "gene", "unit of the gene's values", (gene["unit"] for gene in genes))
+    netcdf_variables.texts(
+        root, "gene_description", "gene", "what the gene is", (gene["description"] for gene in genes)
+    )
     for name, units, said in GENE_NUMBERS:
-        values = netcdf_variables.or_nan(getattr(gene, name) for gene in genes)
+        values = netcdf_variables.or_nan(gene.get(name) for gene in genes)
         netcdf_variables.numbers(root, f"gene_{name}", ("gene",), units, said, values)
-    netcdf_variables.flags(root, "gene_searched", "gene", "whether it was searched", (gene.searched for gene in genes))
     netcdf_variables.flags(
-        root, "gene_identifiable", "gene", "whether the data tell it", (gene.identifiable for gene in genes)
+        root, "gene_searched", "gene", "whether it was searched", (gene["searched"] for gene in genes)
+    )
+    netcdf_variables.flags(
+        root, "gene_identifiable", "gene", "whether the data determine it", (gene["identifiable"] for gene in genes)
     )
 
 
@@ -113,9 +117,11 @@ def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone
         if gone():
             raise ProblemError(503, "unavailable", "the caller has hung up; ask again")
         group = root.create_group(f"{RECORDINGS}/{recording.name}")
-        described = views.recording(recording, recording.name in dataset.held_out).model_dump()
+        described: Any = views.recording(recording, recording.name in dataset.held_out)
         held_out = {"held_out": "yes" if described["held_out"] else "no"}
-        netcdf_variables.describe(group, held_out | {name: described[name] for name in ("rig", *CONDITION)})
+        netcdf_variables.describe(
+            group, held_out | {"rig": described["rig"]} | {name: described[name] for name in CONDITION}
+        )
         if row.kind == "tracks":
             _tracks(group, service, row, dataset, recording)
         else:
@@ -154,7 +160,7 @@ def _forces(
     recording: Recording,
     found: coefficient_source.Estimates,
 ) -> None:
-    beats: dict[str, Json] = {}
+    beats: dict[str, Forces] = {}
     comments = []
     for source, make in coefficient_source.offered(service, row, dataset, recording.name, found).items():
         try:
@@ -171,8 +177,8 @@ def _forces(
         netcdf_variables.describe(group, {"comment": "\n".join(comments)})
 
 
-def _beats(group: Any, beats: dict[str, Json]) -> None:
-    """Recorded forces, which are the same beside every source, and modelled ones."""
+def _beats(group: Any, beats: dict[str, Forces]) -> None:
+    """Recorded forces, which are the same for every source, and modelled forces."""
     first = next(iter(beats.values()))
     quantities, phase = tuple(first["recorded_n"]), first["phase"]
     group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}
@@ -182,14 +188,19 @@ def _beats(group: Any, beats: dict[str, Json]) -> None:
     )
     netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, FORCE_PHASE, phase)
 
-    def series(named: dict[str, list[float]]) -> list[list[float]]:
+    def series(named: ByQuantity) -> list[list[float]]:
         missing = [np.nan] * len(phase)
         return [named.get(quantity, missing) for quantity in quantities]
 
     along = ("quantity", "phase")
     netcdf_variables.numbers(group, "recorded_n", along, "N", "recorded force, mean beat", series(first["recorded_n"]))
     netcdf_variables.numbers(
-        group, "spread_n", along, "N", "standard deviation between beats", series(first["spread_n"])
+        group,
+        "standard_deviation_n",
+        along,
+        "N",
+        "standard deviation between beats",
+        series(first["standard_deviation_n"]),
     )
     modelled = [series(beat["modelled_n"]) for beat in beats.values()]
     netcdf_variables.numbers(group, "modelled_n", ("source", *along), "N", "modelled force", modelled)

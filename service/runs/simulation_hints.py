@@ -1,4 +1,4 @@
-"""What a user can do about a simulation that failed; the simulator's own words say why it did."""
+"""Remedies for failed simulations, added to the messages of the simulator."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ FLUTTER = (
     "frequency"
 )
 
-# What a reason says, and the remedy that goes with it.
+# Part of a message of the simulator, and the remedy.
 REMEDIES = (
     ("not accurate enough", "state a larger accuracy_mm (at most 1), or a lower flap frequency"),
     ("not periodic", f"{FLUTTER}; one that only settles slowly needs a larger accuracy_mm (at most 1)"),
@@ -22,6 +22,6 @@ REMEDIES = (
 
 
 def with_remedy(reason: str) -> str:
-    """``reason`` followed by what to do about it, where that is known."""
+    """``reason`` followed by its remedy, if there is one."""
     remedy = next((remedy for words, remedy in REMEDIES if words in reason), None)
     return f"{reason}. Remedy: {remedy}" if remedy else reason

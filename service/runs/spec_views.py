@@ -1,72 +1,57 @@
-"""Specifications between the wire and the inside: SI, tuples, and what belongs to the other kind of dataset."""
+"""Specifications of calibrations from requests and in answers; refusal of settings that do not fit the dataset."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 from pydantic import BaseModel
 
 from wingfit.calibration.effects import effect_of
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client.answers import RunSpec
 from wingfit.records import Dataset, Recording
+from wingfit.service.answers import answer, in_si
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
+from wingfit.service.outcomes.requests import WingIn
+from wingfit.service.runs.requests import RunIn, VehicleModel
 from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
-from wingfit.service.runs.spec_schemas import RunIn, SpecOut, VehicleModel
-from wingfit.service.units import MM, tidy_mm
+from wingfit.service.units import tidy_mm
 from wingfit.sim.effects.registry import chosen
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.terms import PRESETS
 from wingfit.sim.vehicle.terms import chosen as terms_of
 
-# A simulation of a wing may leave the box of a search; how far is the limit of `bounds_factor` itself.
+SPEC_FIELDS = {field.name for field in fields(CalibrationSpec)}
+# Genes of a simulated wing may lie outside the bounds of a search, up to the limit of `bounds_factor`.
 WIDEST_BOUNDS = 100.0
 METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
 USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
 LONGEST_NAME = 200
 
 
-def spec_out(given: CalibrationSpec) -> SpecOut:
-    """How a run calibrates, as it goes out."""
-    named = {
-        "accuracy_mm": tidy_mm(given.accuracy),
-        "low_pass_hz": given.low_pass,
-        "peel_width_beats": given.peel_width,
+def run_settings(spec: CalibrationSpec) -> RunSpec:
+    """The settings of a run as answers give them."""
+    return answer(RunSpec, spec, accuracy_mm=tidy_mm(spec.accuracy))
+
+
+def calibration_spec(body: BaseModel, base: CalibrationSpec | None = None) -> CalibrationSpec:
+    """The specification that a request gives; fields that it does not give are those of ``base``, or the defaults."""
+    given = in_si({name: getattr(body, name) for name in body.model_fields_set})
+    changes: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in given.items() if name in SPEC_FIELDS
     }
-    return SpecOut.model_validate(vars(given) | named)
+    return replace(base or CalibrationSpec(), **changes)
 
 
-def of_run(body: RunIn) -> CalibrationSpec:
-    """What a request for a run asks for."""
-    alike = ("division", "mode", "method", "population", "stall", "tolerance", "max_generations", "seed")
-    return CalibrationSpec(
-        **{name: getattr(body, name) for name in alike},
-        bounds_factor=body.bounds_factor,
-        accuracy=body.accuracy_mm / MM,
-        recordings=tuple(body.recordings),
-        genes=tuple(body.genes),
-        effects=tuple(body.effects),
-        finish=body.finish,
-        axes=tuple(body.axes),
-        **_vehicle(body),
-    )
-
-
-def of_simulation(
-    division: str, accuracy_mm: float, effects: Iterable[str], vehicle: VehicleModel | None = None
-) -> CalibrationSpec:
-    """The model that a request for a simulation asks for."""
-    return CalibrationSpec(
-        division=division,
-        bounds_factor=WIDEST_BOUNDS,
-        accuracy=accuracy_mm / MM,
-        effects=tuple(effects),
-        **(_vehicle(vehicle) if vehicle else {}),
-    )
+def simulation_spec(body: WingIn) -> CalibrationSpec:
+    """The model that a request for a simulation gives."""
+    return replace(calibration_spec(body), bounds_factor=WIDEST_BOUNDS)
 
 
 def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) -> None:
-    """A 422 for a low-pass that takes away the beat itself."""
+    """A 422 for a low-pass below the flap frequency."""
     for recording in recordings:
         flap = recording.condition.flap_frequency
         if low_pass_hz and low_pass_hz < flap:
@@ -78,9 +63,9 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
 
 
 def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel | None = None) -> None:
-    """A 422 for effects that are unknown, named twice, of no use to what the dataset describes, or terms already.
+    """A 422 for effects that are unknown, named twice, not applicable to the dataset, or already terms of the model.
 
-    What is known is listed with the first that is not.
+    Only the first fault lists the known effects.
     """
     faults, listed = [], set[str]()
     for place, name in enumerate(names):
@@ -97,7 +82,7 @@ def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel
 
 
 def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
-    """Faults for the genes among ``named`` (place in the request, name) that are not ``known``: listed once."""
+    """Faults for those of ``named`` (place in the request, name) that are not ``known``; the first lists the known."""
     faults, remedy = [], f"known are {', '.join(known)}"
     for where, name in named:
         if name in known:
@@ -115,7 +100,7 @@ def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> lis
 
 
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
-    """A 422 for settings of a wing in a request about a vehicle, or the reverse; defaults do no harm."""
+    """A 422 for settings of a wing in a request about a vehicle, or the reverse, unless they have their default."""
     what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
     message = f"means nothing for a {what}, which the dataset describes; leave it out"
     if faults := _given(body, names, message):
@@ -123,7 +108,7 @@ def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
 
 
 def refuse_idle(body: RunIn, method: str | None) -> None:
-    """A 422 for settings of a search in a request for Gauss-Newton alone; defaults do no harm."""
+    """A 422 for settings of a search in a request for Gauss-Newton, unless they have their default."""
     if method != "gauss_newton":
         return
     message = (
@@ -134,7 +119,7 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
 
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """A name for a run that was given none: what tells it from the other runs on its dataset."""
+    """Default name of a run: its settings that other runs on the dataset may not have."""
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:
@@ -144,7 +129,7 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """The model in words that tell it from others."""
+    """The model, for names of runs and diagnoses."""
     model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
@@ -154,9 +139,9 @@ def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:
-    """ValueError where the model of a vehicle has the effect as a term already, or its wings do not meet."""
+    """ValueError if the model of a vehicle already has the effect as a term, or the effect does not apply to it."""
     if vehicle is None or dataset.kind != "forces" or set(vehicle.without) - set(PRESETS[vehicle.preset].terms):
-        return  # what is wrong with the terms is said of them
+        return  # unknown terms are reported by another check
     terms = terms_of(vehicle.preset, tuple(vehicle.without))
     if name in terms:
         raise ValueError(
@@ -171,12 +156,3 @@ def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorIte
     fields = type(body).model_fields
     given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
     return [error_item(f"body.{name}", getattr(body, name), message) for name in given]
-
-
-def _vehicle(body: VehicleModel) -> dict[str, Any]:
-    return {
-        "preset": body.preset,
-        "without": tuple(body.without),
-        "low_pass": body.low_pass_hz,
-        "peel_width": body.peel_width_beats,
-    }

@@ -1,4 +1,4 @@
-"""Copies of the database: taken while the service works, checked, and put back."""
+"""Backup and restore: copies of the database, taken while the service runs, and checked."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ STAGING = "restore-"
 
 
 class BackupError(RuntimeError):
-    """A copy that cannot be taken or put back; the message says why and what to do."""
+    """A backup that cannot be made or restored; the message says why and what to do."""
 
 
 def snapshot(folder: Path) -> Path:
-    """A copy of the database in ``folder`` as it is now, in a file of its own there, checked; the caller removes it.
+    """Copy the database in ``folder`` to a new file there, and check it; the caller removes the file.
 
-    One reading transaction: what is written meanwhile goes on, and is not in the copy.
+    The copy is one read transaction: later writes are not delayed, and are not in the copy.
     """
     try:
         handle, name = mkstemp(SUFFIX, "copy-", folder)
@@ -54,13 +54,13 @@ def snapshot(folder: Path) -> Path:
 
 
 def forget_snapshots(folder: Path) -> None:
-    """Remove copies that a process left when it was killed."""
+    """Remove copies that a killed process left."""
     for left in folder.glob(f"copy-*{SUFFIX}"):
         left.unlink(missing_ok=True)
 
 
 def check(path: Path) -> None:
-    """BackupError unless ``path`` is a whole database of this service."""
+    """BackupError unless ``path`` is a complete database of this service."""
     with _opened(path, path) as copy:
         versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
         if len(versions) != 1:
@@ -69,11 +69,11 @@ def check(path: Path) -> None:
 
 
 def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
-    """Put a copy into a data folder that has no database; BackupError says why not.
+    """Restore a backup into a data folder that has no database; BackupError if that is not possible.
 
-    The copy may come from a stranger: it is put back only if it is whole and its schema is exactly ours. Its API keys
-    are revoked unless ``keep_keys``: whoever made the copy may have them. Returns the keys that are good in the copy
-    and the owners of its data. Jobs that were under way go on from their last stored step when a server starts there.
+    The backup is not trusted: it must be undamaged, and its schema must be exactly that of wingfit. Its API keys are
+    revoked unless ``keep_keys``, because others may have them. Returns the keys that were valid in the backup and the
+    owners of its data. Jobs continue after their last stored step when a server starts in the folder.
     """
     if not backup.is_file():
         raise BackupError(f"{backup} is no file; name what 'wingfit backup' wrote")
@@ -98,7 +98,7 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
 
 
 def _check_opens(folder: Path) -> None:
-    """Bring the database to the newest schema, and read every row; DataFolderError or RowError where that fails."""
+    """Migrate the database to the newest schema and read every row; DataFolderError or RowError if that fails."""
     database = Database(folder)
     try:
         check_rows(database)
@@ -107,10 +107,10 @@ def _check_opens(folder: Path) -> None:
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
-    """Copy ``backup`` to ``target`` if the copy passes all checks; others may change the original.
+    """Copy ``backup`` to ``target`` if the copy passes all checks.
 
-    It is checked in a folder of its own: whatever ends this process, no copy that was not checked lies where a server
-    would open it.
+    The copy is checked, not the original, which others may change; and in a separate folder, so that an interrupted
+    process leaves no unchecked database where a server would open it.
     """
     for left in target.parent.glob(f"{STAGING}*"):  # by a process that was killed
         shutil.rmtree(left, ignore_errors=True)
@@ -133,7 +133,7 @@ def _examined(copy: Path, name: Path) -> Contents:
     """Check a ``copy`` of the file ``name`` and return its keys and owners; BackupError if it is not ours."""
     with _opened(copy, name) as opened:
         try:
-            check_schema(opened)  # before anything is read that could be made to run
+            check_schema(opened)  # first: reading a table could run SQL of the schema
             _check_pages(opened, name)
             return contents(opened)
         except (SchemaError, ContentsError) as error:
@@ -142,7 +142,7 @@ def _examined(copy: Path, name: Path) -> Contents:
 
 @contextmanager
 def _opened(path: Path, name: Path, mode: str = "ro&immutable=1") -> Iterator[sqlite3.Connection]:
-    """Open a database that is not trusted; SQLite's errors become a BackupError that calls the file ``name``."""
+    """Open a database that is not trusted; errors of SQLite become a BackupError about the file ``name``."""
     try:
         with closing(sqlite3.connect(f"file:{quote(str(path))}?mode={mode}", uri=True)) as copy:
             copy.text_factory = lambda text: text.decode(errors="replace")
@@ -160,7 +160,7 @@ def _check_pages(copy: sqlite3.Connection, name: Path) -> None:
 
 
 def move(copy: Path, target: Path) -> None:
-    """Move ``copy`` to ``target``, also into another file system; only its owner can read it there either."""
+    """Move ``copy`` to ``target``, also to another file system; only its owner can read it."""
     try:
         copy.replace(target)
     except OSError as error:
@@ -172,7 +172,7 @@ def move(copy: Path, target: Path) -> None:
 
 
 def _copied(backup: Path, target: Path) -> None:
-    """Copy to a new file, whole or not at all."""
+    """Copy to a new file completely, or not at all."""
     try:
         with backup.open("rb") as source, open_new(target) as into:
             shutil.copyfileobj(source, into)

@@ -1,4 +1,4 @@
-"""What a backup would bring with it: the API keys that are good in it, and whose data it holds."""
+"""The valid API keys in a backup, and the owners of its data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ContentsError(ValueError):
 
 @dataclass(frozen=True)
 class BackupKey:
-    """An API key that is good in a backup."""
+    """An API key that is valid in a backup."""
 
     id: str
     name: str
@@ -32,7 +32,7 @@ class BackupKey:
 
 @dataclass(frozen=True)
 class BackupOwner:
-    """How much belongs to ``owner`` in a backup; None: what was made without keys."""
+    """Numbers of datasets and jobs of ``owner`` in a backup; None owns what was made without keys."""
 
     owner: str | None
     datasets: int
@@ -49,19 +49,19 @@ class Contents:
 
 
 def contents(database: sqlite3.Connection) -> Contents:
-    """Read them from a database whose schema was checked; ContentsError for a key that cannot be."""
+    """Read a database whose schema was checked; ContentsError for a key that wingfit cannot have made."""
     return Contents(tuple(_keys(database)), tuple(_owners(database)))
 
 
 def revoke_keys(database: sqlite3.Connection) -> None:
-    """Make all keys good for nothing."""
+    """Revoke all keys."""
     if _columns(database, "key"):
         database.execute("UPDATE key SET revoked_at = ? WHERE revoked_at IS NULL", (now(),))
 
 
 def _keys(database: sqlite3.Connection) -> Iterator[BackupKey]:
     if not _columns(database, "key"):
-        return  # of a version that had none
+        return  # a version of wingfit without keys
     rows = database.execute(
         "SELECT id, name, owner, scopes, created_at, sha256, revoked_at FROM key ORDER BY number"
     ).fetchall()
@@ -104,5 +104,5 @@ def _owners(database: sqlite3.Connection) -> Iterator[BackupOwner]:
 
 
 def _columns(database: sqlite3.Connection, table: str) -> set[str]:
-    """The names of its columns; none where the version of the database has no such table."""
+    """Names of the columns of ``table``; none if the database has no such table."""
     return {str(name) for (name,) in database.execute("SELECT name FROM pragma_table_info(?)", (table,))}

@@ -1,4 +1,4 @@
-"""Whether the server can read every dataset, run and diagnosis of a database that may come from a stranger."""
+"""Checks that the server can read every dataset, run and diagnosis of a database that is not trusted."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class RowError(ValueError):
 
 
 def check_rows(database: Database) -> None:
-    """Read each row as the server reads it for a list and at its start; RowError for the first that cannot be."""
+    """Read each row as the server does for lists and at its start; RowError for the first unreadable row."""
     with database.read() as session:
         for table, read in _READERS.items():
             for number in session.scalars(select(table.number).order_by(table.number)).all():
@@ -37,7 +37,7 @@ def check_rows(database: Database) -> None:
 def _check(session: Session, table: Table, number: int, read: Callable[[Any], object]) -> None:
     try:
         read(session.get_one(table, number))
-    except Exception as error:  # whatever it is that a stranger wrote
+    except Exception as error:  # the values may be anything
         cause = " ".join(str(error).split())[:LONGEST_CAUSE]
         raise RowError(
             f"row {number} of its table {table.__tablename__!r} cannot be read ({type(error).__name__}: {cause!a})"

@@ -1,7 +1,7 @@
-"""Whether a database that may come from a stranger has exactly the schema that its version of wingfit makes.
+"""Checks that a database that is not trusted has exactly the schema of its version of wingfit.
 
-SQL that a schema may hold (triggers, views, virtual tables, checks, defaults) would run in the server as soon as it
-uses the tables. So every object is compared with those of an empty database that is made here, at the same version.
+SQL in a schema (triggers, views, virtual tables, checks, defaults) would run in the server when it uses the tables.
+Therefore every object is compared with that of an empty database of the same version.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from wingfit.service.storage.database import migrate, revisions
 
 OBJECTS = "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY type, name LIMIT 1000"
 VERSION = ("table", "alembic_version")
-# Texts of SQL in quotes, names in quotes, words, and every other character by itself.
+# Tokens of SQL: quoted strings, quoted names, words, and every other character.
 TOKENS = re.compile(r"""'(?:[^']|'')*'|"\w+"|`\w+`|\[\w+\]|\w+|\S""", re.ASCII)
 
 Objects = dict[tuple[str, str], tuple[str, tuple[str, ...]]]
 
 
 class SchemaError(ValueError):
-    """A schema that is not ours; the message says what it has."""
+    """A schema that wingfit does not make; the message names the difference."""
 
 
 def check_schema(database: sqlite3.Connection) -> None:
     """SchemaError unless the schema is exactly that of the version that the database states."""
     rows = database.execute(OBJECTS).fetchall()
     present = _objects(rows)
-    if len(present) != len(rows):  # SQLite goes by the text of each, whatever name stands beside it
+    if len(present) != len(rows):  # SQLite uses the SQL of each, whatever its name
         raise SchemaError("it lists an object of its schema twice")
     expected = _expected("head")
     if present.get(VERSION) != expected[VERSION]:  # before it is read: it could be a view
@@ -62,7 +62,7 @@ def _version(database: sqlite3.Connection) -> str:
 
 @lru_cache
 def _expected(revision: str) -> Objects:
-    """What an empty database of ``revision`` holds."""
+    """The schema of an empty database of ``revision``."""
     engine = create_engine("sqlite://", poolclass=StaticPool)
     try:
         migrate(engine, revision)

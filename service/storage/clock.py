@@ -1,9 +1,8 @@
-"""The service's own clock, by which retention counts.
+"""The service clock, which measures how long ago jobs ended.
 
-The wall clock of a machine may be wrong for a while, and may jump by years in either direction: a dead battery, a
-virtual machine that is put back, a date set by hand. What was deleted by it is lost. So the service counts the seconds
-itself. While a process runs, a clock that nobody can set counts them. From the end of one process to the start of the
-next only the wall clock can, and it counts for a day at most.
+A wall clock may be wrong and may jump by years: a dead battery, a restored virtual machine, a date set by hand. Data
+deleted by a wrong clock are lost. Therefore the service counts seconds itself: by the monotonic clock while a process
+runs, and by the wall clock between two processes, at most one day each time.
 """
 
 from __future__ import annotations
@@ -28,15 +27,16 @@ def _wall() -> datetime:
 
 
 def _steady() -> float:
-    """Seconds on a clock that nobody can set; where the system has one, a clock that goes on while it is suspended."""
+    """Seconds of the monotonic clock; of one that counts while the system is suspended, if there is one."""
     boot = getattr(time, "CLOCK_BOOTTIME", None)
     return time.monotonic() if boot is None else time.clock_gettime(boot)
 
 
 class ServiceClock:
-    """Seconds of one service over all its processes; it never goes back, and is never ahead of the true time.
+    """Seconds that one service has run over all its processes; never decreases.
 
-    The exception are starts of a process: each may count up to one day too much, where the wall clock jumped ahead.
+    It is never ahead of true time, except that each start of a process may add up to one day too much if the wall clock
+    jumped ahead.
     """
 
     def __init__(self, wall: Callable[[], datetime] = _wall, steady: Callable[[], float] = _steady) -> None:
@@ -44,7 +44,7 @@ class ServiceClock:
         self._last: tuple[datetime, float] | None = None
 
     def advance(self, session: Session) -> float:
-        """The seconds until now, which are stored."""
+        """Store and return the seconds until now."""
         wall, steady = self._wall(), self._steady()
         row = session.get(ClockRow, ROW)
         if row is None:
@@ -60,7 +60,7 @@ class ServiceClock:
 
 
 def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> float:
-    """Seconds between two moments of one process, by the steady clock; a wall clock that disagrees is logged."""
+    """Seconds between two moments of one process by the steady clock; logs a jump of the wall clock."""
     elapsed = max(now[1] - before[1], 0.0)
     jumped = (now[0] - before[0]).total_seconds() - elapsed
     if abs(jumped) > DAY:
@@ -73,7 +73,7 @@ def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> flo
 
 
 def _stopped(stored: str, wall: datetime) -> float:
-    """Seconds that count, in [0, 1 day], of the time since an earlier process ``stored`` the wall time."""
+    """Seconds, in [0, 1 day], since an earlier process ``stored`` the wall time."""
     try:
         gap = (wall - datetime.fromisoformat(stored)).total_seconds()
     except (TypeError, ValueError):  # no time, or one without a zone

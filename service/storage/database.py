@@ -1,4 +1,4 @@
-"""The database: one process owns the data folder, one connection does all writing, reads go beside it.
+"""The database: one process owns the data folder, one connection writes, others only read.
 
 SQLite before 3.51.3 can corrupt a database in WAL mode when two connections write or checkpoint at the same
 time. Therefore readers are opened read-only, and the folder is locked against a second server.
@@ -43,11 +43,11 @@ class DataFolderError(RuntimeError):
 
 
 class DatabaseClosedError(RuntimeError):
-    """The service is stopping; what was not yet stored is computed again after the next start."""
+    """The service is stopping; unstored steps are computed again after the next start."""
 
 
 def is_full(error: Exception) -> bool:
-    """Whether a write failed for lack of space, or because the disk does not take it: later it may."""
+    """Whether a write failed because the disk is full or fails, so that it may succeed later."""
     if isinstance(error, OSError):
         return error.errno in FULL
     text = str(getattr(error, "orig", error))
@@ -57,7 +57,7 @@ def is_full(error: Exception) -> bool:
 
 
 class FolderLock:
-    """Holds a data folder for this process.
+    """Locks a data folder for this process.
 
     A POSIX record lock, because it dies with the process and is not inherited by worker processes; it does
     not guard against the same process, hence the set.
@@ -99,18 +99,18 @@ class FolderLock:
         self._held.add(self.path)
 
     def release(self) -> None:
-        """Give the folder free."""
+        """Unlock the folder."""
         self._held.discard(self.path)
         self._file.close()
 
 
 class Database:
-    """Sessions that read and the one that writes."""
+    """Read sessions, and the one write session."""
 
     def __init__(self, folder: Path) -> None:
         """Lock ``folder`` (created if missing), bring its database to the newest schema and open it.
 
-        Only the user who runs the process can read either.
+        Only the user who runs the process can read the folder and the database.
         """
         try:
             make_folder(folder)
@@ -135,11 +135,11 @@ class Database:
         self._path = path
         self._bare: deque[sqlite3.Connection] = deque()
         self.version = 0
-        """Another one after every write."""
+        """Changes with every write."""
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """One transaction, the only one that writes at this time; durable when the block has ended. As :meth:`read`."""
+        """One write transaction at a time; durable when the block has ended. Filtered by owner like :meth:`read`."""
         with self._guard:
             if self._closed:
                 raise DatabaseClosedError("the service is stopping")
@@ -153,7 +153,7 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """One consistent snapshot, of what :data:`wingfit.service.auth.access.CALLER` may see."""
+        """One consistent snapshot of the rows that :data:`wingfit.service.auth.access.CALLER` may see."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
         with OwnSession(self._readers, expire_on_commit=False) as session:
@@ -161,7 +161,7 @@ class Database:
 
     @contextmanager
     def look(self) -> Iterator[sqlite3.Connection]:
-        """One consistent snapshot, of everything, through a bare connection: for reads that must be quick."""
+        """One consistent snapshot of all rows through a plain connection: for reads that must be fast."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
         try:
@@ -183,9 +183,9 @@ class Database:
                 self._bare.pop().close()
 
     def close(self, seconds: float = -1) -> bool:
-        """Refuse further reads and writes, finish the write under way, give the folder free.
+        """Refuse further reads and writes, finish the current write, unlock the folder.
 
-        Whether the write under way has ended within ``seconds`` (negative: however long it takes); else all stays open.
+        Returns whether the current write ended within ``seconds`` (negative: no limit); if not, all stays open.
         """
         self._closed = True
         if not self._guard.acquire(timeout=seconds):
@@ -203,14 +203,14 @@ class Database:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a data folder, or close one to other users."""
+    """Create a data folder, or make it private."""
     private_files.make_folder(folder, FILE_NAME, LOCK_NAME)
 
 
 def _close_to_others(path: Path) -> None:
     """Let only the owner read the database at ``path`` (created if missing) and its log."""
     private_files.make_file(path)
-    for name in (f"{path}-wal", f"{path}-shm"):  # new ones get the rights of the database
+    for name in (f"{path}-wal", f"{path}-shm"):  # SQLite creates them with the permissions of the database
         with suppress(FileNotFoundError):
             private_files.tighten(Path(name))
 
@@ -227,7 +227,7 @@ def _migrations() -> Config:
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:
-    """Bring the schema to ``revision``, the newest."""
+    """Migrate the schema to ``revision``."""
     config = _migrations()
     script = ScriptDirectory.from_config(config)
     with engine.connect() as connection:
@@ -277,7 +277,7 @@ def _read_only(path: Path) -> str:
 
 
 def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:
-    # The driver must not begin transactions by itself: schema changes and reads belong to ours.
+    # The driver must not begin transactions itself: schema changes and reads are part of ours.
     connection.isolation_level = None
     connection.execute("PRAGMA journal_mode=WAL")
     connection.execute("PRAGMA synchronous=FULL")

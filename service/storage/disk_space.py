@@ -1,4 +1,4 @@
-"""Errors of the operating system that mean: no room to write; in words, with the folder and the remedy."""
+"""Messages for operating system errors that mean a full disk: the folder and the remedy."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import tempfile
 from pathlib import Path
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
-# Of a folder in which no file can be made.
+# A folder in which no file can be created.
 UNUSABLE = frozenset({errno.ENOENT, errno.ENOTDIR, errno.EACCES, errno.EPERM, errno.EROFS})
 REMEDY = "make room there, or set TMPDIR to a folder with room and restart the server; then repeat the request"
 
 
 def while_spooling(error: BaseException | None) -> str | None:
-    """Detail of the answer to an error while a request was read; None for errors of another kind.
+    """Message for an error while a request was read; None for errors of another kind.
 
     The framework writes the large parts of a request to temporary files.
     """
@@ -28,7 +28,7 @@ def while_spooling(error: BaseException | None) -> str | None:
 
 
 def anywhere(error: BaseException) -> str | None:
-    """Detail of the answer to an error from anywhere in a request; None unless room is missing."""
+    """Message for an error anywhere in a request; None unless the disk is full."""
     if not isinstance(error, OSError):
         return None
     if _is_without_folder(error):

@@ -1,6 +1,6 @@
-"""Places where a process can be made to die, for tests: WINGFIT_FAIL_POINT=committed:17 after the 17th commit.
+"""Points at which tests can kill the process: WINGFIT_FAIL_POINT=committed:17 kills it after the 17th commit.
 
-Without the variable a place costs one comparison.
+Without the variable a point costs one comparison.
 """
 
 from __future__ import annotations
@@ -31,6 +31,6 @@ _ARMED = _Armed(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None
 
 
 def passing(place: Place) -> None:
-    """Die here, if that is what was asked for."""
+    """Kill the process if WINGFIT_FAIL_POINT names this point."""
     if _ARMED is not None and _ARMED.place == place:
         _ARMED.passing()

@@ -1,4 +1,4 @@
-"""What is forgotten by itself: answers that nobody repeats, and, where it is asked for, jobs that ended long ago."""
+"""Retention: deletes old answers to repeated requests and, if WINGFIT_KEEP_DAYS is set, jobs that ended long ago."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
 
 
 class Housekeeping:
-    """Tidies at the start and every hour; datasets are never forgotten.
+    """Deletes at the start and every hour; datasets are never deleted.
 
-    The service's own clock counts how long ago a job ended, from the first tidying that saw it ended. The wall time
-    of the end is not used: nobody knows whether the wall clock was right then.
+    The service clock measures how long ago a job ended, from the first pass that found it ended. The wall time of the
+    end is not used, because the wall clock may have been wrong.
     """
 
     def __init__(
@@ -41,28 +41,28 @@ class Housekeeping:
         self._thread = threading.Thread(target=self._go, name="housekeeping", daemon=True)
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Do nothing more."""
+        """Delete nothing more."""
         self._stop.set()
 
     def tidy(self) -> int:
-        """Tidy once; the number of jobs forgotten."""
+        """Delete once; returns the number of deleted jobs."""
         with self._database.write() as session:
             store.forget_answers(session)
             now = self._clock.advance(session)
-            _note_ends(session, now)  # also where nothing is deleted: later that may be asked for
+            _note_ends(session, now)  # even without a limit, which may be set later
         if self._keep_days is None:
             return 0
         ended = self._ended_before(now - self._keep_days * DAY)
-        for table, job_id in ended:  # one transaction each: nobody waits long for the one that writes
+        for table, job_id in ended:  # one transaction each, so that other writes wait only shortly
             if self._stop.is_set():
                 break
             with self._database.write() as session:
                 row = session.scalar(select(table).where(table.id == job_id))
-                if row is not None:  # somebody else may have deleted it
+                if row is not None:  # it may have been deleted meanwhile
                     session.delete(row)
             self._on_deleted(job_id)
         if ended:
@@ -90,7 +90,7 @@ class Housekeeping:
 
 
 def _note_ends(session: Session, now: float) -> None:
-    """Store the service's time with the jobs that have ended since the last tidying."""
+    """Store the time of the service clock with the jobs that have ended since the last pass."""
     for table in TABLES:
         new = table.finished_at.is_not(None), table.ended_at_service_seconds.is_(None)
         session.execute(update(table).where(*new).values(ended_at_service_seconds=now))

@@ -1,4 +1,4 @@
-"""What the database is asked and told. Every function works in a session: callers decide what is atomic."""
+"""Queries and changes of the database. Every function works in a session, so that callers decide what is atomic."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ import json
 import logging
 import secrets
 import sqlite3
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any, TypeVar
 
+from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, delete, func, select
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid, not_found
 from wingfit.service.storage.database import is_full
 from wingfit.service.storage.tables import (
@@ -25,38 +28,50 @@ from wingfit.service.storage.tables import (
     DatasetRow,
     DiagnosisRow,
     FindingRow,
-    GenerationRow,
     JobRow,
     OwnedRow,
     ParsedRow,
     RunRow,
-    StepRow,
+    StepOfJob,
 )
 from wingfit.workers.jobs import Job, State, Wish
 
 LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
-# What specifications meant that were stored before there was a choice.
+# Value of fields that the first version did not store.
+_SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
-Row = TypeVar("Row", DatasetRow, RunRow, DiagnosisRow)
+Row = TypeVar("Row", bound=OwnedRow)
+Step = TypeVar("Step", bound=StepOfJob)
 
 
 def now() -> str:
-    """Give the time, RFC 3339 in UTC."""
+    """The present time, RFC 3339 in UTC."""
     return timestamp(datetime.now(UTC))
 
 
 def timestamp(moment: datetime) -> str:
-    """A time in UTC as it is stored: RFC 3339, so that texts are in the order of the times."""
+    """A time in UTC as it is stored: RFC 3339, which sorts by time."""
     return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def new_id(prefix: str) -> str:
-    """An id that nobody can guess."""
+    """A random id that cannot be guessed."""
     return f"{prefix}_{secrets.token_hex(8)}"
+
+
+# -- rows of any kind ------------------------------------------------------------------------------------
+
+
+def one(session: Session, table: type[Row], row_id: str) -> Row:
+    """The row with the id, or a 404."""
+    found = session.scalar(select(table).where(table.id == row_id))
+    if found is None:
+        raise not_found(table.__tablename__, row_id)
+    return found
 
 
 # -- lists -----------------------------------------------------------------------------------------------
@@ -83,7 +98,7 @@ def cursor_before(number: int) -> str:
 
 
 def number(cursor: str) -> int:
-    """The number before which a cursor leads, or a 422."""
+    """The number that a cursor stands for, or a 422."""
     try:
         text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
         if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
@@ -99,14 +114,6 @@ def number(cursor: str) -> int:
 # -- datasets --------------------------------------------------------------------------------------------
 
 
-def dataset(session: Session, dataset_id: str) -> DatasetRow:
-    """The dataset's row, or a 404."""
-    row = session.scalar(select(DatasetRow).where(DatasetRow.id == dataset_id))
-    if row is None:
-        raise not_found("dataset", dataset_id)
-    return row
-
-
 def archive(session: Session, dataset_id: str) -> bytes:
     """The dataset's bytes as uploaded, or a 404."""
     body = session.scalar(select(ArchiveRow.body).where(ArchiveRow.dataset_id == dataset_id))
@@ -116,23 +123,23 @@ def archive(session: Session, dataset_id: str) -> bytes:
 
 
 def parsed(session: Session, dataset_id: str) -> bytes | None:
-    """The dataset in the project's own form, where it is stored so."""
+    """The dataset in the parsed form, if that is stored."""
     return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
 
 
 def has_parsed(connection: sqlite3.Connection, dataset_id: str) -> bool:
-    """Whether the dataset is stored in the project's own form."""
+    """Whether the parsed form of the dataset is stored."""
     return connection.execute("SELECT 1 FROM parsed WHERE dataset_id = ?", (dataset_id,)).fetchone() is not None
 
 
 def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
-    """Store a dataset in the project's own form, unless it was deleted meanwhile."""
+    """Store the parsed form of a dataset, unless it was deleted meanwhile."""
     if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):
         session.merge(ParsedRow(dataset_id=dataset_id, body=body))
 
 
 def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
-    """``size`` bytes of the dataset's archive from ``start``, without reading the others; a 404 where it is gone."""
+    """``size`` bytes of the dataset's archive from ``start``, without reading the rest; a 404 if it is deleted."""
     row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
     if row is None:
         raise not_found("dataset", dataset_id)
@@ -142,7 +149,7 @@ def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, s
 
 
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
-    """A 429 where the archives of an owner, with what is stored beside them, would take more than ``most_mb``."""
+    """A 429 if the archives of an owner and their parsed forms would take more than ``most_mb``."""
     held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
     beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
     held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
@@ -157,7 +164,7 @@ def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> N
 
 def delete_dataset(session: Session, dataset_id: str) -> None:
     """Delete a dataset that no run or diagnosis refers to."""
-    row = dataset(session, dataset_id)
+    row = one(session, DatasetRow, dataset_id)
     for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
         count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
         if count:
@@ -165,52 +172,31 @@ def delete_dataset(session: Session, dataset_id: str) -> None:
     session.delete(row)
 
 
-# -- runs ------------------------------------------------------------------------------------------------
+# -- jobs ------------------------------------------------------------------------------------------------
 
 
-def run(session: Session, run_id: str) -> RunRow:
-    """The run's row, or a 404."""
-    row = session.scalar(select(RunRow).where(RunRow.id == run_id))
-    if row is None:
-        raise not_found("run", run_id)
-    return row
+def delete_job(session: Session, table: type[JobRow], job_id: str) -> None:
+    """Delete a job that has ended, with its steps and results; a 409 for one that has not."""
+    row = one(session, table, job_id)
+    if row.state in ACTIVE:
+        raise conflict(f"{table.__tablename__} {row.id} is {row.state}; cancel it first", state=row.state)
+    session.delete(row)
 
 
-def delete_run(session: Session, run_id: str) -> None:
-    """Delete a run that has ended, with its history."""
-    _delete_ended(session, run(session, run_id), "run")
-
-
-def history(session: Session, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
-    """Generations of a run after sequence ``after``, ascending."""
-    query = select(GenerationRow).where(GenerationRow.run_id == run_id, GenerationRow.sequence > after)
-    return list(session.scalars(query.order_by(GenerationRow.sequence).limit(limit)))
+def steps(session: Session, table: type[Step], job_id: str, after: int = 0, limit: int | None = None) -> list[Step]:
+    """Generations of a run, or steps of a diagnosis, after sequence ``after``, ascending."""
+    query = select(table).where(table.job_id == job_id, table.sequence > after)
+    return list(session.scalars(query.order_by(table.sequence).limit(limit)))
 
 
 def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
-    """Where the run goes on, or None at its start."""
+    """The checkpoint from which the run continues, or None at its start."""
     return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
 
 
-# -- diagnoses ---------------------------------------------------------------------------------------------
-
-
-def diagnosis(session: Session, diagnosis_id: str) -> DiagnosisRow:
-    """The diagnosis's row, or a 404."""
-    row = session.scalar(select(DiagnosisRow).where(DiagnosisRow.id == diagnosis_id))
-    if row is None:
-        raise not_found("diagnosis", diagnosis_id)
-    return row
-
-
-def delete_diagnosis(session: Session, diagnosis_id: str) -> None:
-    """Delete a diagnosis that has ended, with its finding."""
-    _delete_ended(session, diagnosis(session, diagnosis_id), "diagnosis")
-
-
 def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
-    """What a diagnosis found, as JSON; a 404, or a 409 before it has succeeded."""
-    row = diagnosis(session, diagnosis_id)
+    """The finding of a diagnosis as JSON; a 404, or a 409 before it has succeeded."""
+    row = one(session, DiagnosisRow, diagnosis_id)
     body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
     if body is None:
         raise conflict(
@@ -219,18 +205,9 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     return body
 
 
-def past_steps(session: Session, diagnosis_id: str, after: int, limit: int | None = None) -> list[StepRow]:
-    """Steps of a diagnosis after sequence ``after``, ascending."""
-    query = select(StepRow).where(StepRow.diagnosis_id == diagnosis_id, StepRow.sequence > after)
-    return list(session.scalars(query.order_by(StepRow.sequence).limit(limit)))
-
-
-# -- jobs of any kind ------------------------------------------------------------------------------------
-
-
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
-    """The owner of a dataset, to whom a job on it will belong; a 429 where ``most`` of his have not ended."""
-    owner = dataset(session, dataset_id).owner
+    """The owner of a dataset, who will own a job on it; a 429 if ``most`` jobs of that owner have not ended."""
+    owner = one(session, DatasetRow, dataset_id).owner
     count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
     if count >= most:
         raise ProblemError(
@@ -242,8 +219,8 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
 
 
 def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
-    his = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
-    return session.scalar(his) or 0
+    active = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+    return session.scalar(active) or 0
 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
@@ -251,7 +228,7 @@ def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> list[JobRow]:
-    """Jobs in ``state``, oldest first; one whose row cannot be read is logged and passed over."""
+    """Jobs in ``state``, oldest first; unreadable rows are logged and skipped."""
     numbers = session.scalars(select(table.number).where(table.state == state.value).order_by(table.number)).all()
     return [row for number in numbers if (row := _readable(session, table, number))]
 
@@ -260,22 +237,16 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
     try:
         row = session.get_one(table, number)
         job(row)
-    except Exception as error:  # whatever it is that stands there
-        if is_full(error):  # the disk fails, and not the row
+    except Exception as error:  # the stored values may be anything
+        if is_full(error):  # the disk fails, the row may be readable
             raise
         LOG.error("row %d of %s cannot be read and is left alone (%s)", number, table.__name__, error)
         return None
     return row
 
 
-def _delete_ended(session: Session, row: JobRow, what: str) -> None:
-    if row.state in ACTIVE:
-        raise conflict(f"{what} {row.id} is {row.state}; cancel it first", state=row.state)
-    session.delete(row)
-
-
 def job(row: JobRow) -> Job:
-    """The row's job; ValueError or TypeError for values that no server stored."""
+    """The job of a row; ValueError or TypeError for values that a server cannot have stored."""
     starts = row.starts or 0
     numbers: tuple[object, ...] = (row.generations, starts, row.progress)
     times: tuple[object, ...] = (row.created_at, row.started_at, row.finished_at)
@@ -288,7 +259,7 @@ def job(row: JobRow) -> Job:
 
 
 def put_job(row: JobRow, after: Job) -> None:
-    """Store a job in its row; the times follow from the states."""
+    """Store a job in its row, and the times that follow from its state."""
     row.state, row.wish = after.state.value, after.wish.value
     row.generations, row.progress, row.error, row.starts = after.generations, after.progress, after.error, after.starts
     if after.state is State.RUNNING and row.started_at is None:
@@ -306,14 +277,11 @@ def spec(row: RunRow) -> CalibrationSpec:
 
 def spec_from(values: dict[str, Any]) -> CalibrationSpec:
     """A specification from its JSON form."""
-    tuples: dict[str, Any] = {
-        name: tuple(values[name]) for name in ("recordings", "genes", "without", "axes", "effects") if name in values
-    }
-    return CalibrationSpec(**(BEFORE_METHODS | values | tuples))
+    return _SPEC.validate_python(BEFORE_METHODS | values)
 
 
-def spec_json(given: CalibrationSpec) -> dict[str, Any]:
-    """A specification as JSON."""
+def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
+    """The specification of a run or diagnosis as JSON."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
     return plain
 
@@ -321,8 +289,8 @@ def spec_json(given: CalibrationSpec) -> dict[str, Any]:
 # -- answers to repeated requests ------------------------------------------------------------------------
 
 
-# By the part of a location that says what is there.
-_MADE: dict[str, type[DatasetRow | RunRow | DiagnosisRow]] = {
+# By the part of a location that names the resource.
+_MADE: dict[str, type[OwnedRow]] = {
     "datasets": DatasetRow,
     "runs": RunRow,
     "diagnoses": DiagnosisRow,
@@ -331,7 +299,7 @@ _MADE: dict[str, type[DatasetRow | RunRow | DiagnosisRow]] = {
 
 @dataclass(frozen=True)
 class Repeat:
-    """The key of a request that may be repeated, and what must be equal for it to be the same request."""
+    """The Idempotency-Key of a request, and a fingerprint that is equal for the same request."""
 
     path: str
     key: str
@@ -340,17 +308,17 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer that created something."""
+    """The answer to a request that created a resource."""
 
     status: int
     location: str
-    body: dict[str, Any]
+    body: Mapping[str, Any]
 
 
 def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
-    """What the same request was answered before; a 422 when the key was used for another one.
+    """The earlier answer to the same request; a 422 if the key was used for another request.
 
-    A 409 when what it made was deleted since: to tell of it would be wrong, and to make it again unasked.
+    A 409 if the resource was deleted since: it neither exists nor should a repetition create it again.
     """
     row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
     if row is None or repeat is None:
@@ -367,7 +335,7 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
 
 
 def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
-    """Remember an answer together with what it created."""
+    """Store an answer in the transaction that creates its resource."""
     if repeat:
         session.add(
             AnswerRow(
@@ -376,12 +344,12 @@ def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None
                 fingerprint=repeat.fingerprint,
                 status=answer.status,
                 location=answer.location,
-                body=answer.body,
+                body=dict(answer.body),
                 created_at=now(),
             )
         )
 
 
 def forget_answers(session: Session) -> None:
-    """Drop answers that nobody will ask for again."""
+    """Delete answers that are older than ANSWERS_KEPT."""
     session.execute(delete(AnswerRow).where(AnswerRow.created_at < timestamp(datetime.now(UTC) - ANSWERS_KEPT)))

@@ -23,16 +23,22 @@ class Table(DeclarativeBase):
 
 
 class OwnedRow:
-    """What belongs to someone: the owner of the key that made it; None where no key was asked for.
+    """The columns that datasets and jobs share.
 
-    A job belongs to whom its dataset belongs to.
+    ``owner`` is that of the key that made a dataset, None where no key was required; a job has that of its dataset.
     """
 
+    __tablename__: Any
+    number: Mapped[int] = mapped_column(primary_key=True)
+    id: Mapped[str] = mapped_column(unique=True)
     owner: Mapped[str | None] = mapped_column(index=True)
+    name: Mapped[str]
+    kind: Mapped[str] = mapped_column(server_default="tracks")
+    created_at: Mapped[str]
 
 
 class KeyRow(Table):
-    """An API key. ``sha256`` is of its secret, which is stored nowhere; a key that was revoked stays, to be told of."""
+    """An API key. Of its secret only ``sha256`` is stored; revoked keys stay listed."""
 
     __tablename__ = "key"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
@@ -48,18 +54,13 @@ class KeyRow(Table):
 
 
 class DatasetRow(OwnedRow, Table):
-    """An uploaded dataset: what lists show; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
+    """An uploaded dataset, described; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
 
-    number: Mapped[int] = mapped_column(primary_key=True)
-    id: Mapped[str] = mapped_column(unique=True)
-    name: Mapped[str]
-    kind: Mapped[str] = mapped_column(server_default="tracks")
     description: Mapped[str]
     filename: Mapped[str]
-    created_at: Mapped[str]
     sha256: Mapped[str]
     size_bytes: Mapped[int]
     markers: Mapped[int]
@@ -76,7 +77,7 @@ class ArchiveRow(Table):
 
 
 class ParsedRow(Table):
-    """A dataset in the project's own form (`records/files/parsed.py`), where its archive must not be opened again."""
+    """A dataset in the parsed form (`records/files/parsed.py`), if its archive must not be opened again."""
 
     __tablename__ = "parsed"
 
@@ -85,7 +86,7 @@ class ParsedRow(Table):
 
 
 class ClockRow(Table):
-    """The service's own clock, one row: seconds that the service has run, and the wall time when they were stored."""
+    """The service clock, one row: seconds that the service has run, and the wall time when they were stored."""
 
     __tablename__ = "clock"
 
@@ -95,23 +96,18 @@ class ClockRow(Table):
 
 
 class JobRow(OwnedRow):
-    """What every job has; state, wish, generations, progress, error and starts are those of `wingfit.workers.jobs.Job`.
+    """The columns of every job: state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
 
     ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
     """
 
-    number: Mapped[int] = mapped_column(primary_key=True)
-    id: Mapped[str] = mapped_column(unique=True)
-    name: Mapped[str]
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
-    kind: Mapped[str] = mapped_column(server_default="tracks")
     spec: Mapped[dict[str, Any]]
     state: Mapped[str] = mapped_column(index=True)
     wish: Mapped[str]
     stage: Mapped[str | None]
     progress: Mapped[float] = mapped_column(default=0.0)
     eta_seconds: Mapped[float | None]
-    created_at: Mapped[str]
     started_at: Mapped[str | None]
     finished_at: Mapped[str | None]
     generations: Mapped[int] = mapped_column(default=0)
@@ -146,7 +142,7 @@ class DiagnosisRow(JobRow, Table):
 
 
 class FindingRow(Table):
-    """The Finding of a diagnosis that has succeeded; apart, because lists need no maps and overlays."""
+    """The finding of a diagnosis that has succeeded; in its own table, because lists do not need it."""
 
     __tablename__ = "finding"
 
@@ -154,12 +150,10 @@ class FindingRow(Table):
     body: Mapped[dict[str, Any]]
 
 
-class StepRow(Table):
-    """How far a diagnosis was at some time; ``sequence`` counts from 1, also over starts."""
+class StepOfJob:
+    """The columns that generations and steps share; ``sequence`` counts from 1 over all stages and restarts."""
 
-    __tablename__ = "step"
-
-    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    job_id: Mapped[str]
     sequence: Mapped[int] = mapped_column(primary_key=True)
     stage: Mapped[str]
     progress: Mapped[float]
@@ -168,8 +162,18 @@ class StepRow(Table):
     eta_seconds: Mapped[float | None]
 
 
+class StepRow(StepOfJob, Table):
+    """The progress of a diagnosis at some time."""
+
+    __tablename__ = "step"
+
+    job_id: Mapped[str] = mapped_column(
+        "diagnosis_id", ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True
+    )
+
+
 class CheckpointRow(Table):
-    """All that a run needs to go on after its last stored generation."""
+    """The state of the search after the last stored generation of a run."""
 
     __tablename__ = "checkpoint"
 
@@ -177,26 +181,20 @@ class CheckpointRow(Table):
     body: Mapped[dict[str, Any]]
 
 
-class GenerationRow(Table):
-    """One finished generation of a run; ``sequence`` counts from 1 over all stages."""
+class GenerationRow(StepOfJob, Table):
+    """One finished generation of a run."""
 
     __tablename__ = "generation"
 
-    run_id: Mapped[str] = mapped_column(ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
-    sequence: Mapped[int] = mapped_column(primary_key=True)
-    stage: Mapped[str]
+    job_id: Mapped[str] = mapped_column("run_id", ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
     generation: Mapped[int]
     best: Mapped[float | None]
     mean: Mapped[float | None]
     diversity: Mapped[float | None]
     best_mm: Mapped[float | None]
     best_mn: Mapped[float | None]
-    evaluations: Mapped[int]
     failed: Mapped[int]
     reasons: Mapped[list[str]] = mapped_column(JSON)
-    elapsed_seconds: Mapped[float]
-    progress: Mapped[float]
-    eta_seconds: Mapped[float | None]
 
 
 class AnswerRow(Table):

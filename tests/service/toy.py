@@ -25,6 +25,7 @@ from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.calibration.result import Comparison, GeneResult, RecordingResult, Result
 from wingfit.calibration.search import CalibrationSpec, Generation, resolved
 from wingfit.records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
+from wingfit.service.runs.engine import Engine
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
 from wingfit.workers.watch import Standing, never
@@ -77,8 +78,8 @@ class ArchiveError(ValueError):
         self.errors = list(errors)
 
 
-class ToyEngine:
-    """Meets the service's Engine; ``seconds`` per generation, ``gate`` called before each."""
+class ToyEngine(Engine):
+    """A search that takes no time; ``seconds`` per generation, ``gate`` called before each."""
 
     def __init__(self, seconds: float = 0.0, gate: Callable[[int], None] | None = None) -> None:
         self.seconds, self.gate = seconds, gate

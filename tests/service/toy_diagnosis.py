@@ -33,6 +33,7 @@ from wingfit.diagnosis.finding import (
 )
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.records import Dataset
+from wingfit.service.diagnoses.diagnoser import Diagnoser
 
 KNOWN = ("hinge_offset", "camera_shift", "added_mass")
 STAGES = (
@@ -44,8 +45,8 @@ STAGES = (
 STEPS = 3  # of each stage
 
 
-class ToyDiagnoser:
-    """Meets the service's Diagnoser."""
+class ToyDiagnoser(Diagnoser):
+    """A diagnosis that takes no time."""
 
     def __init__(self, seconds: float = 0.0, gate: Callable[[int], None] | None = None) -> None:
         self.seconds, self.gate = seconds, gate

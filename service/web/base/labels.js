@@ -13,7 +13,7 @@ const SHORT = { proposed: "proposed model", berman_wang: "Berman-Wang model", di
 
 // In the order of the tables; "left out": the global model fitted without the recording.
 export const SOURCES = {
-  local: "Local", joint: "Joint", global: "Global", left_out: "Left out", average: "Average", nominal: "Nominal",
+  local: "Local", joint: "Joint", global: "Global", leave_one_out: "Left out", average: "Average", nominal: "Nominal",
 };
 export const QUANTITIES = { lift: "Lift", drag: "Drag", x: "Force along x", z: "Force along z" };
 

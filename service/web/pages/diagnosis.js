@@ -87,7 +87,7 @@ function update() {
   if (done && !fetched) fetchReport();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
     button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");
-    button.disabled = Boolean(diagnosis.wish);
+    button.disabled = Boolean(diagnosis.pending_action);
   }
 }
 

@@ -49,7 +49,7 @@ function card(effect, titles) {
 }
 
 function genes(effect) {
-  const unit = ({ of, unit: plain }) => (of ? PARTS[of] : plain === "1" ? "" : plain);
+  const unit = ({ relative_to: of, unit: plain }) => (of ? PARTS[of] : plain === "1" ? "" : plain);
   const number = (value) => el("td", { className: "n" }, significant(value));
   return el("table", {}, el("thead", {}, el("tr", {}, ...["Gene", "Lowest", "Typical", "Highest", "Unit", "Meaning"].map((head, i) =>
     el("th", { scope: "col", className: i > 0 && i < 4 ? "n" : "" }, head)))),

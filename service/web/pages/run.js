@@ -159,7 +159,7 @@ function drawHead() {
   for (const format of ["csv", "netcdf", "json"]) $(`export-${format}`).href = `v1/runs/${part(run.id)}/export?format=${format}`;
   for (const button of $("actions").querySelectorAll("[data-action]")) {
     button.hidden = !ALLOWED[button.dataset.action].includes(run.state);
-    button.disabled = Boolean(run.wish);
+    button.disabled = Boolean(run.pending_action);
   }
   drawNumbers(run, result);
 }

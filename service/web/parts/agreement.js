@@ -17,7 +17,7 @@ export function fillQuantities(result) {
 
 // Agreements of a quantity as recording -> model -> agreement; the global model fitted without the recording is a model too.
 function byRecording(result, quantity) {
-  const all = [...result.agreements, ...result.left_out.map((agreement) => ({ ...agreement, source: "left_out" }))];
+  const all = [...result.agreements, ...result.leave_one_out.map((agreement) => ({ ...agreement, source: "leave_one_out" }))];
   const found = new Map();
   for (const agreement of all.filter((one) => one.quantity === quantity)) {
     if (!found.has(agreement.recording)) found.set(agreement.recording, {});
@@ -36,7 +36,7 @@ export function drawAgreement(result, dataset, quantity) {
   drawAverages(rows, models);
   $("agreement-note").textContent = "RMS difference over all samples of the whole beats, in the unit of force and in per cent of the range of the recorded mean beat; "
     + "r: correlation."
-    + (models.includes("left_out") ? " Left out: the global model fitted without the recording." : "");
+    + (models.includes("leave_one_out") ? " Left out: the global model fitted without the recording." : "");
 }
 
 function use(recording, fitted) {

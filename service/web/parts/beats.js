@@ -24,7 +24,7 @@ export async function drawBeats(forces, names, about) {
   const differences = names.map((name) => meanBeatDifference(forces, name));
   const { unit, show } = forceUnit(differences);
   const off = names.map((name, k) => `${name} ${show(differences[k])} ${unit}`).join(", ");
-  const wide = forces.spread_n[names[0]] ? " The band is one standard deviation between beats." : "";
+  const wide = forces.standard_deviation_n[names[0]] ? " The band is one standard deviation between beats." : "";
   return [
     `${forces.recording}: ${significant(about.flap_frequency_hz)} Hz, body pitch ${significant(about.angle_of_attack_deg)}°, `
       + `${significant(about.airspeed_m_s)} m/s. RMS difference of the mean beats with the ${SOURCES[forces.source].toLowerCase()} model: ${off}.${wide}`,
@@ -43,7 +43,7 @@ const closed = (values) => [...values, values[0]];
 function beat(look, forces, name) {
   const x = [...forces.phase, forces.phase[0] + 1];
   const recorded = closed(forces.recorded_n[name]);
-  const spread = forces.spread_n[name] && closed(forces.spread_n[name]);
+  const spread = forces.standard_deviation_n[name] && closed(forces.standard_deviation_n[name]);
   const edge = (sign, extra) => ({
     x, y: recorded.map((value, i) => value + sign * spread[i]), type: "scatter", mode: "lines", line: { width: 0 },
     hoverinfo: "skip", showlegend: false, ...extra,

@@ -55,7 +55,7 @@ function drawLaw(law) {
   const error = (value) => (value === null ? "–" : `${rounded(value, 2)} %`);
   $("law").tBodies[0].replaceChildren(...law.genes.map((gene) => el("tr", {}, el("td", {}, gene.name),
     ...[gene.constant, gene.per_hz, gene.per_deg].map((value) => el("td", { className: "n" }, value === 0 ? "–" : significant(value, 3))),
-    el("td", { className: "n" }, error(gene.largest_error_percent)), el("td", { className: "n" }, error(gene.left_out_error_percent)))));
+    el("td", { className: "n" }, error(gene.largest_error_percent)), el("td", { className: "n" }, error(gene.leave_one_out_error_percent)))));
   const range = ([low, high], unit) => `${significant(low)} to ${significant(high)} ${unit}`;
   $("law-note").textContent = `Fitted to ${plural(law.recordings.length, "recording")}, ${range(law.frequency_range_hz, "Hz")} and `
     + `${range(law.pitch_range_deg, "deg")}. Largest error: largest difference from a local estimate. Error when left out: the same for estimates left out of the fit.`;

@@ -12,7 +12,7 @@ const WISHES = { PAUSE: "pausing", CANCEL: "cancelling" };
 
 export const stateWord = (state) => WORDS[state];
 
-export const badge = (run) => el("span", { className: `badge ${LOOKS[run.state] ?? ""}` }, WISHES[run.wish] ?? WORDS[run.state]);
+export const badge = (run) => el("span", { className: `badge ${LOOKS[run.state] ?? ""}` }, WISHES[run.pending_action] ?? WORDS[run.state]);
 
 export const runName = (run) => run.name || `${modelOf(run)}, ${run.spec.mode}`;
 

@@ -80,7 +80,7 @@ async function load({ quiet = false } = {}) {
   slider.max = tracks.phase.length - 1;
   const which = genome() === "best" ? (run.state === "SUCCEEDED" ? "best genome" : "best genome so far") : "nominal genome";
   $("wing-note").textContent = `Mean distance ${mm(meanDistance(tracks))} mm per marker on ${tracks.recording} with the ${which}. `
-    + (tracks.every > 1 ? `Shown is, and the mean is over, one instant in ${tracks.every}. ` : "")
+    + (tracks.stride > 1 ? `Shown is, and the mean is over, one instant in ${tracks.stride}. ` : "")
     + `Solved with ${tracks.numerics.steps_per_beat} steps per beat, estimated error ${significant(tracks.numerics.estimated_error_mm, 2)} mm.`;
   draw();
   showLoads(run, tracks.recording, genome(), genome() === "best" ? run.generations : 0);

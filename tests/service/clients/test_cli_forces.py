@@ -124,7 +124,7 @@ def test_forces_as_table_csv_and_page(wingfit: Wingfit, client: Client, run_id: 
     rows = list(csv.DictReader(beat.open()))
     assert [float(row["modelled_lift_n"]) for row in rows] == answer["modelled_n"]["lift"]
     assert [float(row["phase"]) for row in rows] == answer["phase"]
-    assert {"recorded_x_n", "spread_z_n"} <= set(rows[0])
+    assert {"recorded_x_n", "standard_deviation_z_n"} <= set(rows[0])
     text = page.read_text()
     assert "lift, spectrum" in text
     assert "<script" not in text
@@ -217,7 +217,13 @@ def test_forces_of_any_size_keep_three_digits() -> None:
 def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(tmp_path: Path) -> None:
     phase, recorded, spread = [0.0, 0.5], {"x": [1.0, 3.0]}, {"x": [0.1, 0.2]}
     spectra = {"frequency_hz": [0.0, 1.0, 2.0], "recorded_spectrum_n2_hz": {"x": [9.0, 1e-2, 1e-5]}}
-    answer: Any = {"recording": "r", "source": "local", "phase": phase, "recorded_n": recorded, "spread_n": spread}
+    answer: Any = {
+        "recording": "r",
+        "source": "local",
+        "phase": phase,
+        "recorded_n": recorded,
+        "standard_deviation_n": spread,
+    }
     answer |= {"modelled_n": {"x": [1.0, 2.0]}, "modelled_spectrum_n2_hz": {"x": [9.0, 1e-3, 1e-36]}, **spectra}
     beat, spectrum = charts(answer)
     assert [list(edge) for edge in beat.curves[0].band] == [pytest.approx([0.9, 2.8]), pytest.approx([1.1, 3.2])]

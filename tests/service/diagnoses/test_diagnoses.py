@@ -169,7 +169,7 @@ def test_cancel_and_delete(api: Api, gate: Gate) -> None:
     api.until_diagnosis(diagnosis, lambda one: one["steps"] == 1)
     path = f"/v1/diagnoses/{diagnosis}"
     assert api.client.delete(path).status_code == 409
-    assert api.client.post(f"{path}/cancel").json()["wish"] == "CANCEL"
+    assert api.client.post(f"{path}/cancel").json()["pending_action"] == "CANCEL"
     gate.let(1)
     done = api.diagnosed(diagnosis)
     assert (done["state"], done["steps"], done["verdict"]) == ("CANCELLED", 2, None)

@@ -61,7 +61,7 @@ def test_a_diagnosis_is_cancelled_in_the_middle_of_a_step(tmp_path: Path) -> Non
         ]
         one = api.diagnose(uploaded, **ASKED)["id"]
         assert slow.asked.wait(30)
-        assert client.post(f"/v1/diagnoses/{one}/cancel").json()["wish"] == "CANCEL"
+        assert client.post(f"/v1/diagnoses/{one}/cancel").json()["pending_action"] == "CANCEL"
         before = api.diagnosis(one)["steps"]
         slow.go_on.set()
         done = api.diagnosed(one, 30.0)

@@ -86,7 +86,7 @@ def test_a_state_does_not_skip_generations(api: Api, gate: Gate) -> None:
     assert [(event[0], event[1]) for event in told] == [("2", "generation"), ("2", "state")]
     assert told[1][2]["state"] == "RUNNING"
     api.control(run, "pause")
-    assert next(watching)[2]["wish"] == "PAUSE"
+    assert next(watching)[2]["pending_action"] == "PAUSE"
     gate.let(1)
     assert [next(watching)[1], next(watching)[2]["state"]] == ["generation", "PAUSED"]
     api.control(run, "cancel")

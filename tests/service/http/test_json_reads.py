@@ -16,16 +16,18 @@ from sqlalchemy.orm import Session
 
 from tests.service import toy
 from tests.service.conftest import Api, made, toy_service
+from wingfit.client.answers import HistoryItem, Run
+from wingfit.service.answers import checked
 from wingfit.service.auth.access import KeyRing
 from wingfit.service.container import Service
+from wingfit.service.examples import EXAMPLES
 from wingfit.service.http import json_reads
 from wingfit.service.http.events import Events, JobState, Watched
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.runs import views
-from wingfit.service.runs.schemas import HistoryItem, Page, RunOut
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
-from wingfit.service.storage.tables import RunRow
+from wingfit.service.storage.tables import GenerationRow, RunRow
 
 Json = dict[str, Any]
 
@@ -55,13 +57,12 @@ def used(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Used]:
 def test_answers_are_what_the_schemas_make_of_the_rows(used: Used) -> None:
     with used.service.database.read() as session:
         rows = list(session.scalars(select(RunRow).order_by(RunRow.number.desc())))
-        past = store.history(session, used.runs[0], 0)
-    listed = Page[RunOut](items=[views.run(row) for row in rows], next_cursor=None)
-    assert used.api.get("/v1/runs") == listed.model_dump(mode="json")
+        past = store.steps(session, GenerationRow, used.runs[0])
+    assert used.api.get("/v1/runs") == {"items": [views.run(row) for row in rows], "next_cursor": None}
     for row in rows:
-        assert used.api.run(row.id) == views.run(row).model_dump(mode="json")
-    items = Page[HistoryItem](items=[views.history_item(row) for row in past], next_cursor=None)
-    assert used.api.get(f"/v1/runs/{used.runs[0]}/history") == items.model_dump(mode="json")
+        assert used.api.run(row.id) == views.run(row)
+    items = [checked(HistoryItem, views.columns(row)) for row in past]
+    assert used.api.get(f"/v1/runs/{used.runs[0]}/history") == {"items": items, "next_cursor": None}
     assert len(past) == 10
 
 
@@ -134,7 +135,7 @@ def test_a_write_is_visible_in_the_next_read(used: Used) -> None:
     before = [used.api.get(path) for path in paths]
     for name in ("another", before[0]["name"]):
         with used.service.database.write() as session:
-            store.run(session, used.runs[1]).name = name
+            store.one(session, RunRow, used.runs[1]).name = name
         after = used.api.get(paths[0]), used.api.get(paths[1])["items"][1]
         assert [run["name"] for run in after] == [name, name]
     assert [used.api.get(path) for path in paths] == before
@@ -197,9 +198,8 @@ def test_a_failed_read_is_repeated(tmp_path: Path) -> None:
     database.close()
 
 
-def job(state: str) -> RunOut:
-    example: Json = RunOut.model_config["json_schema_extra"]["examples"][0]  # type: ignore[assignment, index]
-    return RunOut.model_validate(example | {"state": state})
+def job(state: str) -> Run:
+    return checked(Run, {**EXAMPLES[Run], "state": state})
 
 
 @pytest.mark.parametrize("filters", [some for n in range(5) for some in combinations(FILTERS, n)])

@@ -8,16 +8,17 @@ from typing import Any, get_args
 
 import httpx
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 from tests.service import toy
 from tests.service.conftest import Api
 from wingfit.calibration.spec import CalibrationSpec, resolved
 from wingfit.client.transport import parse_events
 from wingfit.records import Dataset
-from wingfit.service.diagnoses import schemas as diagnosis_schemas
-from wingfit.service.outcomes import force_schemas
-from wingfit.service.runs import schemas, spec_schemas
+from wingfit.service.diagnoses.requests import DiagnosisIn
+from wingfit.service.examples import EXAMPLES
+from wingfit.service.outcomes.requests import LoadsIn, PredictionIn, SimulationIn
+from wingfit.service.runs.requests import Method, Mode, RunIn
 from wingfit.sim.virtual_rigs.balance import delfly
 from wingfit.sim.virtual_rigs.campaign import robird_wing
 
@@ -135,24 +136,39 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
 @pytest.mark.parametrize(
     "model",
     [
-        spec_schemas.RunIn,
-        schemas.RunOut,
-        schemas.DatasetOut,
-        schemas.SimulationIn,
-        schemas.LoadsIn,
-        schemas.ProblemOut,
-        force_schemas.PredictionIn,
-        diagnosis_schemas.DiagnosisIn,
-        diagnosis_schemas.DiagnosisOut,
+        RunIn,
+        SimulationIn,
+        LoadsIn,
+        PredictionIn,
+        DiagnosisIn,
     ],
 )
-def test_examples_are_valid(model: type[BaseModel]) -> None:
+def test_examples_of_requests_are_valid(model: type[BaseModel]) -> None:
     extra = model.model_config["json_schema_extra"]
     assert isinstance(extra, dict)
     examples = extra["examples"]
     assert isinstance(examples, list)
     for example in examples:
         model.model_validate(example)
+
+
+@pytest.mark.parametrize("shape", list(EXAMPLES))
+def test_examples_of_answers_are_valid(shape: type, specification: Specification) -> None:
+    assert specification["components"]["schemas"][shape.__name__]["examples"] == [EXAMPLES[shape]]
+    TypeAdapter(shape).validate_python(EXAMPLES[shape])
+
+
+def test_settings_in_answers_are_described_as_in_requests(specification: Specification) -> None:
+    schemas = specification["components"]["schemas"]
+    for answer, request in (("RunSpec", "RunIn"), ("DiagnosisSpec", "DiagnosisIn")):
+        described = {
+            name: field["description"]
+            for name, field in schemas[request]["properties"].items()
+            if "description" in field
+        }
+        assert len(described) > 5
+        for name in described.keys() & schemas[answer]["properties"].keys():
+            assert schemas[answer]["properties"][name]["description"] == described[name]
 
 
 def test_the_documentation_page_needs_no_other_origin(client: httpx.Client, specification: Specification) -> None:
@@ -176,9 +192,9 @@ def test_modes_and_methods_are_those_that_a_calibration_takes(which: str) -> Non
     dataset = Dataset("d", robird_wing() if which == "wing" else delfly(), ())
     rows = dict(re.findall(r"^\| `(mode|method)` \| (.*) \|$", DOCS.read_text(), re.MULTILINE))
     (of_this,) = re.findall(rf"of a {which} ([^;]*)", rows["mode"])
-    accepted = {mode for mode in get_args(spec_schemas.Mode) if _accepts(CalibrationSpec(mode=mode), dataset)}
+    accepted = {mode for mode in get_args(Mode) if _accepts(CalibrationSpec(mode=mode), dataset)}
     assert set(re.findall(r"`(\w+)`", of_this)) == accepted
-    assert set(re.findall(r"`(\w+)`", rows["method"])) == set(get_args(spec_schemas.Method))
+    assert set(re.findall(r"`(\w+)`", rows["method"])) == set(get_args(Method))
     unasked = resolved(CalibrationSpec(), dataset)
     assert f"`{unasked.mode}` (default)" in of_this
     assert f"`{unasked.method}` (default of a {which})" in rows["method"]

@@ -23,9 +23,9 @@ from wingfit.records.description.schema import dataset_schema
 from wingfit.records.files import confined
 from wingfit.service import settings
 from wingfit.service.app import create_app
-from wingfit.service.diagnoses import schemas as diagnosis_schemas
+from wingfit.service.diagnoses import requests as diagnosis_requests
 from wingfit.service.http import concurrency_limit, events, header_limits, request_limits, responses
-from wingfit.service.runs import schemas, spec_schemas
+from wingfit.service.runs import requests, views
 from wingfit.service.settings import Settings
 from wingfit.sim.wing import division
 
@@ -237,7 +237,7 @@ def highest(model: Any, name: str) -> int:
 
 def test_the_documented_limits_are_those_of_the_code() -> None:
     rows = dict(re.findall(r"^\| ([^|]+?) \| ([\d,]+)[^|]*\|", PAGE.partition("## Limits")[2], re.MULTILINE))
-    run, diagnosis = spec_schemas.RunIn, diagnosis_schemas.DiagnosisIn
+    run, diagnosis = requests.RunIn, diagnosis_requests.DiagnosisIn
     in_force = {
         "request line and headers": header_limits.HEAD_LIMIT // 2**10,
         "body of an upload": request_limits.UPLOAD_LIMIT // 2**20,
@@ -266,7 +266,7 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         "generations of a stage": highest(run, "max_generations"),
         "items on a page": responses.LARGEST_PAGE,
         "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
-        "coordinates in an answer": schemas.MOST_COORDINATES,
+        "coordinates in an answer": views.MOST_COORDINATES,
         "concurrent simulations": concurrency_limit.SIMULATIONS,
         "concurrent uploads": concurrency_limit.UPLOADS,
         "concurrent NetCDF exports": concurrency_limit.EXPORTS,

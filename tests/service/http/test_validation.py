@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from tests.service.conftest import Api
-from wingfit.service.runs import schemas
+from wingfit.service.runs import views
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_a_simulation(api: Api) -> None:
 def test_a_long_recording_is_thinned_out(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     body: dict[str, Any] = {"dataset_id": api.upload()["id"], "recording": "fast"}
     whole = api.client.post("/v1/simulations", json=body).json()
-    assert (whole["every"], len(whole["phase"])) == (1, 4)
-    monkeypatch.setattr(schemas, "MOST_COORDINATES", 4 * 6 // 2)
+    assert (whole["stride"], len(whole["phase"])) == (1, 4)
+    monkeypatch.setattr(views, "MOST_COORDINATES", 4 * 6 // 2)
     thinned = api.client.post("/v1/simulations", json=body).json()
-    assert thinned["every"] == 2
+    assert thinned["stride"] == 2
     for name in ("phase", "recorded_mm", "simulated_mm"):
         assert thinned[name] == whole[name][::2]
     assert thinned["mean_distance_mm"] == whole["mean_distance_mm"]

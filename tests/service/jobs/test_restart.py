@@ -108,8 +108,8 @@ def test_wishes_and_states_outlive_the_server(tmp_path: Path) -> None:
         for run in (to_cancel, to_pause):
             first.api.until(run, lambda r: r["state"] == "RUNNING")
         first.api.control(paused, "pause")
-        assert first.api.control(to_cancel, "cancel")["wish"] == "CANCEL"
-        assert first.api.control(to_pause, "pause")["wish"] == "PAUSE"
+        assert first.api.control(to_cancel, "cancel")["pending_action"] == "CANCEL"
+        assert first.api.control(to_pause, "pause")["pending_action"] == "PAUSE"
         first.kill()
     with server(tmp_path / "data", "0") as second:
         assert second.api.finish(queued)["state"] == "SUCCEEDED"

@@ -14,18 +14,19 @@ import pytest
 
 from tests.service import toy
 from tests.service.conftest import Api, Gate, serving
+from tests.service.shapes import fields, valid
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.cli.simulate import solved
+from wingfit.client.answers import Comparison
 from wingfit.client.answers import Numerics as NumericsAnswer
 from wingfit.client.client import Client
 from wingfit.records import Dataset, FourBarDrive
 from wingfit.service.app import create_app
 from wingfit.service.runs import views
-from wingfit.service.runs.engine import ModelEngine
-from wingfit.service.runs.schemas import ComparisonOut, NumericsOut
+from wingfit.service.runs.engine import Engine
+from wingfit.service.runs.requests import COARSEST_MM, FINEST_MM
 from wingfit.service.runs.simulation_hints import FLUTTER, with_remedy
-from wingfit.service.runs.spec_schemas import COARSEST_MM, FINEST_MM
-from wingfit.service.runs.spec_views import spec_out
+from wingfit.service.runs.spec_views import run_settings
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import FILE_NAME
 from wingfit.sim.solver.numerics import Numerics
@@ -69,7 +70,7 @@ def test_the_limits_are_published(client: httpx.Client) -> None:
 
 def test_what_is_not_said_is_what_the_library_does() -> None:
     usual = CalibrationSpec(mode="staged", method="genetic")
-    assert spec_out(usual).accuracy_mm == 0.1
+    assert run_settings(usual)["accuracy_mm"] == 0.1
     assert usual.accuracy == Numerics().accuracy == 1e-4
 
 
@@ -79,7 +80,7 @@ def test_a_run_shows_and_uses_its_accuracy(api: Api) -> None:
     for run, stated in ((usual, 0.1), (fine, 0.123)):
         assert run["spec"]["accuracy_mm"] == stated, "as it was written, without the digits of a division"
         assert api.finish(run["id"])["spec"]["accuracy_mm"] == stated
-        tracks = ComparisonOut.model_validate(api.get(f"/v1/runs/{run['id']}/comparison"))
+        tracks = valid(Comparison, api.get(f"/v1/runs/{run['id']}/comparison"))
         assert tracks.numerics.accuracy_mm == stated
         # a fifth of what was asked for is what the toy says it has
         assert tracks.numerics.estimated_error_mm == pytest.approx(stated / 5)
@@ -107,16 +108,16 @@ def test_the_engine_is_given_metres(
 def test_a_simulation_says_how_it_was_solved(api: Api) -> None:
     answer = ask(api, "/v1/simulations", accuracy_mm=0.5).json()["numerics"]
     assert answer == {"accuracy_mm": 0.5, "estimated_error_mm": 0.1, "steps_per_beat": 144, "beats": 7}
-    assert set(answer) == set(NumericsOut.model_fields) == set(NumericsAnswer.__annotations__)
+    assert set(answer) == fields(NumericsAnswer)
 
 
 def test_the_same_key_with_another_accuracy_is_another_request(api: Api) -> None:
     body: Json = {"dataset_id": api.upload()["id"], "max_generations": 1}
     key = {"Idempotency-Key": "k"}
     first = api.client.post("/v1/runs", json=body, headers=key).json()
-    for same in (body, body | {"accuracy_mm": 0.1}, body | {"population": 50}):
-        assert api.client.post("/v1/runs", json=same, headers=key).json() == first
-    assert api.client.post("/v1/runs", json=body | {"accuracy_mm": 0.2}, headers=key).status_code == 422
+    assert api.client.post("/v1/runs", json=dict(reversed(body.items())), headers=key).json() == first
+    for other in ({"accuracy_mm": 0.2}, {"accuracy_mm": 0.1}, {"population": 50}):  # a default that is named counts
+        assert api.client.post("/v1/runs", json=body | other, headers=key).status_code == 422
 
 
 def test_a_run_of_a_version_without_accuracy_goes_on(settings: Settings, gate: Gate, engine: toy.ToyEngine) -> None:
@@ -173,7 +174,7 @@ def dataset() -> Dataset:
 
 
 def test_the_real_engine_solves_as_well_as_asked(dataset: Dataset) -> None:
-    engine = ModelEngine()
+    engine = Engine()
     rough, fine = (CalibrationSpec(division="4", accuracy=accuracy) for accuracy in (1e-3, 2e-5))
     genome = engine.genome(rough, dataset, {})
     found = [engine.compare(spec, dataset, genome, "still") for spec in (rough, fine, fine)]
@@ -185,7 +186,7 @@ def test_the_real_engine_solves_as_well_as_asked(dataset: Dataset) -> None:
     apart = np.linalg.norm(found[0].simulated - found[1].simulated, axis=2).max()
     assert 0 < apart <= rough.accuracy + fine.accuracy
     assert np.array_equal(found[1].simulated, found[2].simulated), "the same numbers, bit for bit"
-    shown = NumericsOut.model_validate(views.comparison(found[1])["numerics"])
+    shown = valid(NumericsAnswer, views.comparison(found[1])["numerics"])
     assert shown.steps_per_beat == found[1].solution.steps
     assert shown.estimated_error_mm == pytest.approx(1e3 * found[1].solution.error)
 
@@ -196,7 +197,7 @@ def test_the_real_loads_are_given_the_accuracy_too(dataset: Dataset, monkeypatch
     monkeypatch.setattr(
         "wingfit.service.runs.engine.simulate_outputs", lambda model, *_: given.append(model.numerics.accuracy)
     )
-    engine, spec = ModelEngine(), CalibrationSpec(division="4", accuracy=3e-4)
+    engine, spec = Engine(), CalibrationSpec(division="4", accuracy=3e-4)
     engine.loads(spec, dataset, engine.genome(spec, dataset, {}), dataset.recordings[0])
     assert given == [3e-4]
 

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from tests.service.conftest import Api
+from tests.service.shapes import valid
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client.effect_answers import Effects
 from wingfit.records import Dataset, Genome
 from wingfit.service.http.problems import ProblemError
-from wingfit.service.outcomes.effect_schemas import EffectsOut
-from wingfit.service.runs.engine import ModelEngine
-from wingfit.service.runs.spec_schemas import RunIn
-from wingfit.service.runs.spec_views import of_run, of_simulation, refuse_effects, run_name, spec_out
+from wingfit.service.outcomes.requests import SimulationIn
+from wingfit.service.runs.engine import Engine
+from wingfit.service.runs.requests import RunIn
+from wingfit.service.runs.spec_views import calibration_spec, refuse_effects, run_name, run_settings, simulation_spec
 from wingfit.service.storage import store
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.solver.numerics import Numerics
@@ -26,7 +28,7 @@ Json = dict[str, Any]
 
 
 def test_the_list_is_the_registry(api: Api) -> None:
-    found = EffectsOut.model_validate(api.get("/v1/effects")).effects
+    found = valid(Effects, api.get("/v1/effects")).effects
     assert [one.name for one in found] == list(EFFECTS)
     for one in found:
         effect = EFFECTS[one.name]
@@ -34,7 +36,7 @@ def test_the_list_is_the_registry(api: Api) -> None:
             rig for rig, data in (("wing", robird_wing()), ("vehicle", delfly())) if effect.applies_to(data)
         } == set(one.applies_to)
         assert [p.name for p in one.parameters] == [f"{one.name}.{p.name}" for p in effect.parameters]
-        assert [p.size for p in one.parameters] == [p in effect.size for p in effect.parameters]
+        assert [p.is_size for p in one.parameters] == [p in effect.size for p in effect.parameters]
         assert one.source
         assert one.signature
 
@@ -45,7 +47,7 @@ def test_bounds_that_scale_with_the_rig_are_parts_of_it(api: Api) -> None:
     assert shift["applies_to"] == ["wing"]
     first = shift["parameters"][0]
     gene = EFFECTS["camera_shift"].genes(robird_wing())[0]
-    assert (first["name"], first["unit"], first["of"], first["size"]) == (gene.name, "m", "chord", True)
+    assert (first["name"], first["unit"], first["relative_to"], first["is_size"]) == (gene.name, "m", "chord", True)
     assert first["upper"] / first["lower"] == gene.upper / gene.lower
     assert first["upper"] != gene.upper
 
@@ -111,18 +113,18 @@ def test_a_run_keeps_its_effects_and_is_named_after_them(api: Api) -> None:
 
 def test_effects_tell_requests_apart_that_repeat_a_key(api: Api) -> None:
     dataset, key = api.upload()["id"], {"Idempotency-Key": "one"}
-    bodies: list[Json] = [{}, {"effects": []}, {"effects": ["camera_shift"]}]
+    bodies: list[Json] = [{"effects": []}, {"effects": []}, {"effects": ["camera_shift"]}]
     answers = [api.client.post("/v1/runs", json={"dataset_id": dataset} | body, headers=key) for body in bodies]
     assert [answer.status_code for answer in answers] == [202, 202, 422]
     assert answers[0].json()["id"] == answers[1].json()["id"]
 
 
 def test_specifications_go_around_and_those_of_before_name_no_effect() -> None:
-    spec = of_run(RunIn(dataset_id="x", effects=["camera_shift"], mode="joint", method="genetic"))
+    spec = calibration_spec(RunIn(dataset_id="x", effects=["camera_shift"], mode="joint", method="genetic"))
     assert spec.effects == ("camera_shift",)
     stored = store.spec_json(spec)
     assert store.spec_from(stored) == spec
-    assert spec_out(spec).effects == ["camera_shift"]
+    assert run_settings(spec)["effects"] == ["camera_shift"]
     del stored["effects"]
     assert store.spec_from(stored).effects == ()
 
@@ -140,7 +142,7 @@ def test_a_vehicle_takes_effects_on_forces_and_no_others() -> None:
     refuse_effects(["clap_and_peel"], dataset, RunIn(dataset_id="x", without=["clap_and_peel"]))
     spec = CalibrationSpec(effects=("balance_offset",), without=("inertial",), mode="local")
     assert run_name(dataset, spec) == "delfly, proposed without inertial with balance_offset, local"
-    names = ModelEngine().gene_names(spec, dataset)
+    names = Engine().gene_names(spec, dataset)
     assert [name for name in names if "." in name] == [gene.name for gene in EFFECTS["balance_offset"].genes(delfly())]
 
 
@@ -151,8 +153,11 @@ def test_a_simulation_with_an_effect_contains_it() -> None:
     recording = record(
         model, Genome.nominal(model.genes), vacuum(10.0, 0.0, 3.0), Tracking(beats=1), np.random.default_rng(1)
     )
-    dataset, engine = Dataset("robird", wing, (recording,)), ModelEngine()
-    plain, shifted = (of_simulation("4", 1.0, effects) for effects in ([], ["camera_shift"]))
+    dataset, engine = Dataset("robird", wing, (recording,)), Engine()
+    plain, shifted = (
+        simulation_spec(SimulationIn(dataset_id="d", recording="r", division="4", accuracy_mm=1.0, effects=effects))
+        for effects in ([], ["camera_shift"])
+    )
     genome = engine.genome(shifted, dataset, {"camera_shift.y": 2e-3})
     before = engine.compare(plain, dataset, engine.genome(plain, dataset, {}), recording.name)
     after = engine.compare(shifted, dataset, genome, recording.name)

@@ -6,7 +6,7 @@ import pytest
 
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.runs.engine import Engine
 from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, vacuum
 
 SPEC = CalibrationSpec(division="4", mode="joint")
@@ -20,7 +20,7 @@ def dataset() -> Dataset:
 
 
 def test_the_standing_of_genes_is_in_the_order_and_units_of_the_model(dataset: Dataset) -> None:
-    engine = ModelEngine()
+    engine = Engine()
     nominal = engine.genome(SPEC, dataset, {})
     names = engine.gene_names(SPEC, dataset)
     assert tuple(nominal) == names
@@ -30,7 +30,7 @@ def test_the_standing_of_genes_is_in_the_order_and_units_of_the_model(dataset: D
 
 
 def test_a_value_out_of_bounds_names_gene_value_and_limits(dataset: Dataset) -> None:
-    engine = ModelEngine()
+    engine = Engine()
     name = engine.gene_names(SPEC, dataset)[0]
     value = engine.genome(SPEC, dataset, {})[name] * 6
     with pytest.raises(ValueError, match=f"'{name}' is .* must lie in"):
@@ -42,9 +42,9 @@ def test_a_value_out_of_bounds_names_gene_value_and_limits(dataset: Dataset) -> 
 @pytest.mark.parametrize("division", ["5", "99", "99,99", "99x99"])
 def test_an_impossible_division_is_a_value_error(dataset: Dataset, division: str) -> None:
     with pytest.raises(ValueError, match=f"division '{division}'"):
-        ModelEngine().gene_names(CalibrationSpec(division=division), dataset)
+        Engine().gene_names(CalibrationSpec(division=division), dataset)
 
 
 def test_a_specification_that_does_not_fit_is_a_value_error(dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="unknown gene 'nope'; there are E_f"):
-        ModelEngine().check(CalibrationSpec(division="4", genes=("nope",)), dataset)
+        Engine().check(CalibrationSpec(division="4", genes=("nope",)), dataset)

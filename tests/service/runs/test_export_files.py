@@ -14,12 +14,13 @@ from tests.report.findings import bare, force_finding, wing_finding
 from tests.service import toy, toy_diagnosis
 from tests.service.conftest import Api, Gate, serving
 from tests.service.runs.export_files import FORMATS, exported, opened, rows_of, texts, variables
+from tests.service.shapes import valid
 from wingfit.cli.main import app as commands
 from wingfit.client.client import Client, WingfitError
+from wingfit.client.export_answers import DiagnosisExport
 from wingfit.diagnosis.finding import Finding
 from wingfit.report import finding_json
 from wingfit.service.app import create_app
-from wingfit.service.runs.export_schemas import DiagnosisExportOut
 from wingfit.service.settings import Settings
 
 Json = dict[str, Any]
@@ -35,7 +36,7 @@ def test_a_diagnosis_is_exported_with_its_finding(api: Api) -> None:
     path = f"diagnoses/{made['id']}"
     finding = api.get(f"/v1/{path}/finding")
     found = json.loads(exported(api, path, "json"))
-    DiagnosisExportOut.model_validate(found)
+    valid(DiagnosisExport, found)
     assert (found["diagnosis"], found["finding"]) == (made, finding)
     assert found["dataset"] == api.get(f"/v1/datasets/{made['dataset_id']}")
     rows = rows_of(api, path)

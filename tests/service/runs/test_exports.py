@@ -20,15 +20,16 @@ from tests.service import toy
 from tests.service.conftest import Api, Gate, serving
 from tests.service.runs import force_data
 from tests.service.runs.export_files import ENDINGS, FORMATS, exported, opened, rows_of, texts, variables
+from tests.service.shapes import valid
 from wingfit.calibration.result import Comparison
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.client.export_answers import RunExport
 from wingfit.records import Dataset
 from wingfit.service.app import create_app
 from wingfit.service.http import csv_text
 from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.runs import exports as run_exports
-from wingfit.service.runs.export_schemas import RunExportOut
 from wingfit.service.settings import Settings
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -88,7 +89,7 @@ def test_the_table_of_a_run_is_its_history(api: Api, done: Json) -> None:
 
 def test_the_document_of_a_run_is_all_that_the_api_tells_and_repeats_it(api: Api, done: Json) -> None:
     found = json.loads(exported(api, f"runs/{done['id']}", "json"))
-    RunExportOut.model_validate(found)
+    valid(RunExport, found)
     assert found["schema_id"] == "urn:wingfit:schema:run-export:1"
     assert found["wingfit_version"] == api.get("/v1/health")["version"]
     assert found["run"] == done
@@ -184,11 +185,13 @@ def test_a_recording_that_cannot_be_simulated_does_not_spoil_the_others(tmp_path
 def long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Database, RunRow, list[int]]]:
     """A run of 25 generations, read ten at a time, and how many each reading asked for."""
     asked: list[int] = []
-    original = store.history
+    original = store.steps
 
-    def counted(session: Any, run_id: str, after: int, limit: int | None = None) -> list[GenerationRow]:
+    def counted(
+        session: Any, table: type[GenerationRow], run_id: str, after: int, limit: int | None = None
+    ) -> list[GenerationRow]:
         asked.append(limit or 0)
-        return original(session, run_id, after, limit)
+        return original(session, table, run_id, after, limit)
 
     monkeypatch.setattr(run_exports, "BLOCK", 10)
     app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
@@ -196,8 +199,8 @@ def long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Data
         api = Api(client)
         run = api.finish(api.submit(api.upload()["id"], max_generations=13)["id"])["id"]
         with app.state.service.database.read() as session:
-            row = store.run(session, run)
-        monkeypatch.setattr(store, "history", counted)
+            row = store.one(session, RunRow, run)
+        monkeypatch.setattr(store, "steps", counted)
         yield app.state.service.database, row, asked
 
 
@@ -216,7 +219,7 @@ def test_a_run_that_is_deleted_meanwhile_does_not_look_whole(long: tuple[Databas
     pieces = run_exports.table(database, row)
     next(pieces), next(pieces)
     with database.write() as session:
-        store.delete_run(session, row.id)
+        store.delete_job(session, RunRow, row.id)
     with pytest.raises(ProblemError, match="there is no run"):
         next(pieces)
 
@@ -303,7 +306,7 @@ def test_a_real_run_on_forces_has_every_source_of_every_recording(tmp_path: Path
             (item["stage"], item["best"], item["best_mn"]) for item in history
         ]
         document = json.loads(exported(api, path, "json"))
-        RunExportOut.model_validate(document)
+        valid(RunExport, document)
         assert document["result"] == api.get(f"/v1/{path}/result")
         with opened(exported(api, path, "netcdf")) as file:
             assert file["best"].attrs["units"] == "N2"

@@ -4,65 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.service.conftest import Api, serving
+from tests.service.conftest import Api
 from tests.service.runs import force_data
-from wingfit.calibration.search import CalibrationSpec, resolved
-from wingfit.records import LowPass, Recording
-from wingfit.service.app import create_app
-from wingfit.service.outcomes.force_schemas import (
-    ForceResultOut,
-    ForceSimulationOut,
-    ForcesOut,
-    ModelsOut,
-    PredictionOut,
+from tests.service.runs.force_data import TRUTH, finished, served, upload
+from tests.service.shapes import fields, valid
+from wingfit.client.answers import Dataset, Run
+from wingfit.client.force_answers import (
+    ForceResult,
+    Forces,
+    Prediction,
     Quantity,
     Source,
 )
-from wingfit.service.runs.schemas import DatasetOut, RunOut
-from wingfit.service.runs.spec_schemas import Preset
-from wingfit.service.runs.spec_views import run_name
-from wingfit.service.settings import Settings
+from wingfit.records import Recording
 from wingfit.sim.vehicle.lift_drag import lift_drag
-from wingfit.sim.vehicle.terms import PRESETS, TERMS
 from wingfit.sim.virtual_rigs.balance import TRIALS
-from wingfit.workers import make_evaluator
 
 Json = dict[str, Any]
-TRUTH = {trial.name: trial.coefficients for trial in TRIALS}
 PITCH = {trial.name: trial.condition.angle_of_attack for trial in TRIALS}
 
 
 @pytest.fixture(scope="module")
 def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Api]:
-    settings = Settings(data=tmp_path_factory.mktemp("forces") / "data")
-    app = create_app(settings, make_evaluator=lambda: make_evaluator("in_process", None, None))
-    with serving(app) as client:
-        yield Api(client)
-
-
-def upload(api: Api, data: bytes) -> Json:
-    answer = api.client.post("/v1/datasets", files={"file": ("delfly.zip", data)})
-    assert answer.status_code == 201, answer.text
-    return dict(answer.json())
+    yield from served(tmp_path_factory.mktemp("forces"))
 
 
 @pytest.fixture(scope="module")
 def dataset(api: Api) -> Json:
     return upload(api, force_data.archive())
-
-
-def finished(api: Api, dataset: Json, **body: Any) -> Json:
-    answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]} | body)
-    assert answer.status_code == 202, answer.text
-    run = api.finish(answer.json()["id"], 120.0)
-    assert run["state"] == "SUCCEEDED", run["error"]
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +55,7 @@ def result(api: Api, local: Json) -> Json:
 
 
 def test_a_dataset_of_forces_is_described(dataset: Json) -> None:
-    shown = DatasetOut.model_validate(dataset)
+    shown = valid(Dataset, dataset)
     assert (shown.kind, shown.markers) == ("forces", 0)
     first = shown.recordings[0]
     assert (first.markers, first.channels, first.missing_percent) == (0, ["force_x", "force_z"], 0.0)
@@ -90,7 +64,7 @@ def test_a_dataset_of_forces_is_described(dataset: Json) -> None:
 
 
 def test_what_is_left_open_is_decided_and_shown(api: Api, local: Json) -> None:
-    run = RunOut.model_validate(local)
+    run = valid(Run, local)
     assert (run.kind, run.best_mm, run.name) == ("forces", None, "delfly, proposed, local")
     spec = run.spec
     assert (spec.mode, spec.method, spec.preset, spec.axes) == ("local", "gauss_newton", "proposed", ["x"])
@@ -102,7 +76,7 @@ def test_what_is_left_open_is_decided_and_shown(api: Api, local: Json) -> None:
 
 
 def test_the_result_has_the_coefficients_that_were_put_in(local: Json, result: Json) -> None:
-    found = ForceResultOut.model_validate(result)
+    found = valid(ForceResult, result)
     assert result["after_mn"] == local["best_mn"]
     assert result["after_mn"] < 0.3 * result["before_mn"]
     assert result["held_out_after_mn"] < 0.5 * result["held_out_before_mn"]
@@ -130,7 +104,7 @@ def test_the_result_compares_every_recording_with_every_model(result: Json) -> N
     quantities = ("lift", "drag", "x", "z")
     expected = {(name, source, q) for name in force_data.FITTED for source in (*every, "local") for q in quantities}
     assert keys == expected | {(force_data.HELD_OUT, source, q) for source in every for q in quantities}
-    assert {a["source"] for a in result["left_out"]} == {"global"}
+    assert {a["source"] for a in result["leave_one_out"]} == {"global"}
     x = {(a["recording"], a["source"]): a for a in result["agreements"] if a["quantity"] == "x"}
     for name in force_data.FITTED:
         assert x[name, "local"]["rmse_n"] < x[name, "average"]["rmse_n"]
@@ -163,12 +137,12 @@ def test_the_global_model_is_in_hertz_and_degrees(result: Json) -> None:
 def test_forces_over_the_beat_agree_as_the_result_says(api: Api, local: Json, result: Json, source: Source) -> None:
     name = "test-4"
     answer = api.get(f"/v1/runs/{local['id']}/forces?recording={name}&source={source}")
-    shown = ForcesOut.model_validate(answer)
-    assert set(answer) == set(ForcesOut.model_fields)
+    shown = valid(Forces, answer)
+    assert set(answer) == fields(Forces)
     assert (shown.recording, shown.source) == (name, source)
     n = len(shown.phase)
     assert [shown.phase[0], shown.phase[-1]] == pytest.approx([0.0, 1 - 1 / n])
-    for series in (shown.recorded_n, shown.spread_n, shown.modelled_n):
+    for series in (shown.recorded_n, shown.standard_deviation_n, shown.modelled_n):
         assert {q: len(values) for q, values in series.items()} == dict.fromkeys(("lift", "drag", "x", "z"), n)
     assert len(shown.frequency_hz) == len(shown.recorded_spectrum_n2_hz["x"]) == len(shown.modelled_spectrum_n2_hz["x"])
     said = {a["quantity"]: a for a in result["agreements"] if (a["recording"], a["source"]) == (name, source)}
@@ -230,8 +204,8 @@ def test_a_prediction_at_a_fitted_condition_is_the_global_model(api: Api, local:
     body = {"flap_frequency_hz": 12.5, "body_pitch_deg": 71.0, "airspeed_m_s": trial.condition.airspeed}
     answer = api.client.post(f"/v1/runs/{local['id']}/predictions", json=body)
     assert answer.status_code == 200, answer.text
-    found = PredictionOut.model_validate(answer.json())
-    assert set(answer.json()) == set(PredictionOut.model_fields)
+    found = valid(Prediction, answer.json())
+    assert set(answer.json()) == fields(Prediction)
     assert found.warnings == []
     lengths = {len(s) for s in (found.phase, found.x_n, found.z_n, found.lift_n, found.drag_n)}
     assert len(lengths) == 1
@@ -282,7 +256,7 @@ def test_too_few_conditions_give_no_global_model_and_say_why(api: Api) -> None:
     run = finished(api, upload(api, force_data.archive(3)))
     result = api.get(f"/v1/runs/{run['id']}/result")
     assert result["global_model"] is None
-    assert result["left_out"] == []
+    assert result["leave_one_out"] == []
     body = {"flap_frequency_hz": 12.5, "body_pitch_deg": 71.0, "airspeed_m_s": 0.65}
     answer = api.client.post(f"/v1/runs/{run['id']}/predictions", json=body)
     assert answer.status_code == 409
@@ -297,148 +271,9 @@ def test_a_force_that_is_constant_has_no_percentage(api: Api) -> None:
     given = force_data.dataset()
     flat = replace(given, recordings=tuple(without_z(r) for r in given.recordings))
     run = finished(api, upload(api, force_data.zipped(flat)))
-    found = ForceResultOut.model_validate(api.get(f"/v1/runs/{run['id']}/result"))
-    for a in (*found.agreements, *found.left_out):
+    found = valid(ForceResult, api.get(f"/v1/runs/{run['id']}/result"))
+    for a in (*found.agreements, *found.leave_one_out):
         assert ((a.rmse_percent, a.correlation) == (None, None)) is (a.quantity == "z")
         assert a.rmse_n is not None
-    shown = ForcesOut.model_validate(api.get(f"/v1/runs/{run['id']}/forces"))
+    shown = valid(Forces, api.get(f"/v1/runs/{run['id']}/forces"))
     assert set(shown.recorded_n["z"]) == {0.0}
-
-
-def test_a_recording_without_a_whole_beat_is_refused_when_it_is_submitted(api: Api) -> None:
-    def broken(recording: Recording) -> Recording:
-        values = recording.values.copy()
-        values[20::60] = np.nan
-        return replace(recording, values=values, low_pass=LowPass(40.0))
-
-    given = force_data.dataset()
-    recordings = tuple(broken(r) if r.name == force_data.HELD_OUT else r for r in given.recordings)
-    dataset = upload(api, force_data.zipped(replace(given, recordings=recordings)))
-    answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]})
-    assert answer.status_code == 422
-    (error,) = answer.json()["errors"]
-    assert "recording 'test-7' holds no whole beat without a gap: each of its 4 whole beats" in error["message"]
-
-
-def test_a_simulation_of_a_genome_of_ones_own(api: Api, dataset: Json) -> None:
-    body: Json = {"dataset_id": dataset["id"], "recording": "test-4", "genome": TRUTH["test-4"]}
-    answer = api.client.post("/v1/simulations", json=body)
-    assert answer.status_code == 200, answer.text
-    true = ForceSimulationOut.model_validate(answer.json())
-    assert {(a.quantity, a.source) for a in true.agreements} == {(q, "given") for q in ("lift", "drag", "x", "z")}
-    x = next(a for a in true.agreements if a.quantity == "x")
-    assert x.correlation is not None
-    assert x.correlation > 0.98
-    other = api.client.post("/v1/simulations", json=body | {"preset": "berman_wang", "genome": {}}).json()
-    assert next(a["rmse_n"] for a in other["agreements"] if a["quantity"] == "x") > 2 * (x.rmse_n or 1)
-    raw = api.client.post("/v1/simulations", json=body | {"low_pass_hz": 0}).json()
-    assert np.ptp(raw["modelled_n"]["x"]) > np.ptp(true.modelled_n["x"])
-
-
-@pytest.mark.parametrize(
-    ("body", "where"),
-    [
-        ({"genome": {"C_l": 6.0}}, "body.genome"),
-        ({"genome": {"C_x": 1.0}}, "body.genome"),
-        ({"preset": "berman_wang", "genome": {"C_F": 1.0}}, "body.genome"),
-        ({"without": ["fling"]}, "body.without"),
-        ({"division": "4"}, "body.division"),
-        ({"low_pass_hz": 12.4}, "body.low_pass_hz"),
-        ({"outputs": True}, "body.outputs"),
-        ({"peel_width_beats": 0.6}, "body.peel_width_beats"),
-    ],
-)
-def test_a_simulation_that_cannot_be_meant(api: Api, dataset: Json, body: Json, where: str) -> None:
-    complete: Json = {"dataset_id": dataset["id"], "recording": "test-4"} | body
-    answer = api.client.post("/v1/simulations", json=complete)
-    assert (answer.status_code, [e["where"] for e in answer.json()["errors"]]) == (422, [where])
-
-
-@pytest.mark.parametrize(
-    ("body", "where", "said"),
-    [
-        ({"mode": "staged"}, "body", "use 'local'"),
-        ({"method": "annealing"}, "body.method", "'genetic', 'cma_es' or 'gauss_newton'"),
-        ({"preset": "blade"}, "body.preset", "'proposed', 'berman_wang' or 'dickinson'"),
-        ({"without": ["fling"]}, "body.without", "has no term 'fling' to leave out; it has inertial, translation"),
-        ({"axes": ["y"]}, "body.axes.0", "'x' or 'z'"),
-        ({"axes": []}, "body.axes", "at least 1"),
-        ({"axes": ["x", "x"]}, "body.axes", "once"),
-        ({"low_pass_hz": 700}, "body", "a low-pass at 700 Hz does not fit recording 'test-3', sampled at 1250 Hz"),
-        ({"low_pass_hz": 13}, "body.low_pass_hz", "flap frequency of recording 'test-6', 13.3 Hz"),
-        ({"low_pass_hz": -1}, "body.low_pass_hz", "greater than or equal to 0"),
-        ({"peel_width_beats": 0.6}, "body.peel_width_beats", "less than or equal to 0.5"),
-        ({"genes": ["E_f"]}, "body.genes.0", "known are C_l, C_r, C_F, C_D0"),
-        ({"preset": "berman_wang", "genes": ["C_F"]}, "body.genes.0", "known are C_l, C_r, C_D0"),
-        ({"division": "4"}, "body.division", "means nothing for a vehicle"),
-        ({"accuracy_mm": 0.2}, "body.accuracy_mm", "means nothing for a vehicle"),
-        ({"finish": 1}, "body.finish", "boolean"),
-        ({"finish": True}, "body.finish", "gauss_newton, which searches nothing"),
-        ({"method": "gauss_newton", "population": 20}, "body.population", "leave it out, or use genetic or cma_es"),
-        ({"stall": 3}, "body.stall", "searches nothing"),
-    ],
-)
-def test_a_specification_that_does_not_fit_is_refused(
-    api: Api, dataset: Json, body: Json, where: str, said: str
-) -> None:
-    before = len(api.get("/v1/runs")["items"])
-    answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]} | body)
-    assert answer.status_code == 422, answer.text
-    (error,) = answer.json()["errors"]
-    assert error["where"] == where
-    assert said in error["message"]
-    assert len(api.get("/v1/runs")["items"]) == before
-
-
-def test_a_search_followed_by_gauss_newton(api: Api, dataset: Json) -> None:
-    options: Json = {"method": "cma_es", "finish": True, "population": 6, "max_generations": 5, "genes": ["C_l", "C_F"]}
-    run = finished(api, dataset, recordings=["test-4"], axes=["x", "z"], low_pass_hz=40, **options)
-    assert run["name"] == "delfly, proposed, local, CMA-ES finished by Gauss-Newton"
-    assert [item["stage"] for item in api.history(run["id"])][:6] == ["test-4"] * 5 + ["test-4, Gauss-Newton"]
-    (estimate,) = api.get(f"/v1/runs/{run['id']}/result")["estimates"]
-    assert [c["name"] for c in estimate["coefficients"]] == ["C_l", "C_F"]
-    assert np.shape(estimate["noise_mn2"]) == (1, 2, 2)
-
-
-def test_the_models_are_those_of_the_simulator(api: Api) -> None:
-    found = ModelsOut.model_validate(api.get("/v1/models"))
-    assert [p.name for p in found.presets] == list(PRESETS) == list(Preset.__args__)  # type: ignore[attr-defined]
-    assert {t.name: [g.name for g in t.genes] for t in found.terms} == {
-        t.name: [g.name for g in t.genes] for t in TERMS.values()
-    }
-    assert all(t.equation and t.source and t.description for t in found.terms)
-    assert all(set(p.terms) <= {t.name for t in found.terms} for p in found.presets)
-
-
-def test_settings_of_a_vehicle_are_refused_for_a_wing(tmp_path: Path) -> None:
-    from tests.service import toy
-
-    app = create_app(Settings(data=tmp_path / "data"), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
-    with serving(app) as client:
-        tracks = Api(client)
-        wing = tracks.upload()
-        assert (wing["kind"], wing["recordings"][0]["channels"]) == ("tracks", [])
-        body = {"dataset_id": wing["id"], "preset": "dickinson", "axes": ["z"], "low_pass_hz": 40.0}
-        answer = client.post("/v1/runs", json=body)
-        assert answer.status_code == 422
-        assert [e["where"] for e in answer.json()["errors"]] == ["body.preset", "body.axes", "body.low_pass_hz"]
-        run = tracks.finish(tracks.submit(wing["id"], axes=["x"], without=[])["id"])
-        assert (run["kind"], run["best_mn"], run["spec"]["method"]) == ("tracks", None, "genetic")
-        assert tracks.get(f"/v1/runs/{run['id']}/result")["kind"] == "tracks"
-        forces = client.get(f"/v1/runs/{run['id']}/forces")
-        assert (forces.status_code, "/comparison" in forces.json()["detail"]) == (409, True)
-        body = {"flap_frequency_hz": 12.5, "body_pitch_deg": 71.0, "airspeed_m_s": 0.65}
-        assert client.post(f"/v1/runs/{run['id']}/predictions", json=body).status_code == 409
-
-
-@pytest.mark.parametrize(
-    ("spec", "name"),
-    [
-        ({}, "delfly, proposed, local"),
-        ({"without": ("clap_and_peel",), "mode": "joint"}, "delfly, proposed without clap_and_peel, joint"),
-        ({"preset": "dickinson", "method": "genetic"}, "delfly, dickinson, local, genetic"),
-    ],
-)
-def test_a_run_without_a_name_is_named_after_what_tells_it_from_others(spec: Json, name: str) -> None:
-    given = force_data.dataset()
-    assert run_name(given, resolved(CalibrationSpec(**spec), given)) == name

@@ -15,14 +15,16 @@ import numpy as np
 import pytest
 
 from tests.service.conftest import Api, Gate
+from tests.service.shapes import valid
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.cli import main as cli
 from wingfit.client.answers import CONDITION
 from wingfit.client.client import Client, WingfitError
+from wingfit.client.load_answers import Loads, Outputs
 from wingfit.records import Condition, Dataset
 from wingfit.service.outcomes import load_views
-from wingfit.service.outcomes.load_schemas import OUTPUT_NAMES, ConditionIn, LoadsOut, OutputsOut
-from wingfit.service.runs.engine import ModelEngine
+from wingfit.service.outcomes.requests import OUTPUT_NAMES, ConditionIn
+from wingfit.service.runs.engine import Engine
 from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, tunnel
 
 Json = dict[str, Any]
@@ -47,15 +49,15 @@ def test_loads_come_only_when_asked_for(api: Api) -> None:
     assert "outputs" not in simulate(api, outputs=False).json()
     assert "outputs" not in simulate(api, outputs=[]).json()
     whole = simulate(api, outputs=True).json()["outputs"]
-    assert set(whole) == {"phase", "drive_phase", "solved"}.union(*GROUPS.values())
-    assert whole["solved"] == {"steps_per_beat": 96, "beats": 5, "estimated_error_mm": 0.02}
-    OutputsOut.model_validate(whole)
+    assert set(whole) == {"phase", "drive_phase", "numerics"}.union(*GROUPS.values())
+    assert whole["numerics"] == {"steps_per_beat": 96, "beats": 5, "estimated_error_mm": 0.02}
+    valid(Outputs, whole)
 
 
 @pytest.mark.parametrize("name", OUTPUT_NAMES)
 def test_each_name_brings_its_own(api: Api, name: str) -> None:
     found = simulate(api, outputs=[name, name]).json()["outputs"]
-    assert set(found) == {"phase", "drive_phase", "solved"} | GROUPS[name]
+    assert set(found) == {"phase", "drive_phase", "numerics"} | GROUPS[name]
 
 
 def test_the_beat_begins_at_the_upstroke_crossing(api: Api) -> None:
@@ -98,11 +100,11 @@ def test_loads_of_a_run(api: Api) -> None:
     dataset = api.upload()["id"]
     run_id = api.submit(dataset)["id"]
     assert api.finish(run_id)["state"] == "SUCCEEDED"
-    best = LoadsOut.model_validate(api.get(f"/v1/runs/{run_id}/loads"))
+    best = valid(Loads, api.get(f"/v1/runs/{run_id}/loads"))
     assert best.recording == "slow"
     nominal = api.get(f"/v1/runs/{run_id}/loads?recording=fast&genome=nominal&outputs=averages&outputs=air")
     assert nominal["recording"] == "fast"
-    assert set(nominal["outputs"]) == {"phase", "drive_phase", "solved", "averages"} | GROUPS["air"]
+    assert set(nominal["outputs"]) == {"phase", "drive_phase", "numerics", "averages"} | GROUPS["air"]
     assert best.outputs.averages is not None
     assert best.outputs.averages.supplied_w > nominal["outputs"]["averages"]["supplied_w"]
     for query, where in (("outputs=torque", "query.outputs.0"), ("recording=nope", "query.recording")):
@@ -131,11 +133,11 @@ def under(api: Api, **body: Any) -> httpx.Response:
 
 def test_loads_under_another_condition(api: Api) -> None:
     """The toy's torque grows with the flap frequency, which is 3 Hz in its recordings."""
-    answer = LoadsOut.model_validate(under(api).json())
-    faster = LoadsOut.model_validate(under(api, condition={"flap_frequency_hz": 6.0}, outputs=["averages"]).json())
+    answer = valid(Loads, under(api).json())
+    faster = valid(Loads, under(api, condition={"flap_frequency_hz": 6.0}, outputs=["averages"]).json())
     assert answer.outputs.averages is not None
     assert faster.outputs.averages is not None
-    assert faster.outputs.connectors is None
+    assert "connectors" not in faster.outputs
     assert faster.outputs.averages.supplied_w == pytest.approx(2 * answer.outputs.averages.supplied_w)
 
 
@@ -171,7 +173,7 @@ def test_the_client(client: httpx.Client, api: Api) -> None:
     api.finish(run_id)
     with Client(str(client.base_url)) as mine:
         outputs = mine.simulate(dataset, "slow", outputs=["motors"])["outputs"]
-        assert set(outputs) == {"phase", "drive_phase", "solved"} | GROUPS["motors"]
+        assert set(outputs) == {"phase", "drive_phase", "numerics"} | GROUPS["motors"]
         loads = mine.loads(run_id, "fast", "nominal", ["air", "energy"])
         assert (loads["recording"], len(loads["outputs"]["energy_j"])) == ("fast", 3)
         assert "connectors" in mine.loads(run_id)["outputs"]
@@ -218,7 +220,7 @@ def test_the_command_line_writes_them(wingfit: Wingfit, api: Api, tmp_path: Path
     assert page.count("<figure>") == 5
     assert "<script" not in page
     assert wingfit(*words, "--outputs", str(plain))[0] == 0
-    OutputsOut.model_validate(json.loads(plain.read_text()))
+    valid(Outputs, json.loads(plain.read_text()))
 
 
 def test_the_command_line_under_another_condition(wingfit: Wingfit, api: Api, tmp_path: Path) -> None:
@@ -266,16 +268,16 @@ def test_the_real_engine() -> None:
     wing = robird_wing()
     recording = blank_recording(wing, tunnel(0.05, 3.0, 6.0), "windy")
     dataset = Dataset("robird", wing, (recording,))
-    engine, spec = ModelEngine(), CalibrationSpec(division="4", bounds_factor=100.0)
+    engine, spec = Engine(), CalibrationSpec(division="4", bounds_factor=100.0)
     found = engine.loads(spec, dataset, engine.genome(spec, dataset, {}), recording)
     answer = load_views.outputs(found, load_views.wanted(True))
-    valid = OutputsOut.model_validate(json.loads(json.dumps(answer)))
-    assert valid.averages is not None
-    assert valid.averages.lift_n > 0.5
-    assert abs(valid.averages.closing_error_percent) < 1
-    assert valid.connectors is not None
-    assert {c.kind for c in valid.connectors} == {"root", "spanwise"}
-    torque = valid.motor_torque_n_m
+    checked = valid(Outputs, json.loads(json.dumps(answer)))
+    assert checked.averages is not None
+    assert checked.averages.lift_n > 0.5
+    assert abs(checked.averages.closing_error_percent) < 1
+    assert checked.connectors is not None
+    assert {c.kind for c in checked.connectors} == {"root", "spanwise"}
+    torque = checked.motor_torque_n_m
     assert torque is not None
     np.testing.assert_allclose(sorted(torque.front), sorted(found.motors[0].torque), atol=1e-6)
     vacuum = replace(recording, condition=replace(recording.condition, pressure=0.0, airspeed=0.0))

@@ -72,10 +72,10 @@ def test_pause_keeps_what_is_done_and_resume_ends_alike(api: Api, gate: Gate, en
     run = api.submit(dataset)["id"]
     gate.let(2)
     api.until(run, lambda r: r["generations"] == 2)
-    assert api.control(run, "pause")["wish"] == "PAUSE"
+    assert api.control(run, "pause")["pending_action"] == "PAUSE"
     gate.let(1)
     paused = api.until(run, lambda r: r["state"] == "PAUSED")
-    assert (paused["generations"], paused["wish"]) == (3, None)
+    assert (paused["generations"], paused["pending_action"]) == (3, None)
     assert api.get(f"/v1/runs/{run}/genome")["final"] is False
     assert api.client.post(f"/v1/runs/{run}/pause").status_code == 409
     assert api.control(run, "resume")["state"] in ("QUEUED", "RUNNING")
@@ -94,7 +94,7 @@ def test_cancel(api: Api, gate: Gate) -> None:
     run = api.submit(dataset)["id"]
     gate.let(1)
     api.until(run, lambda r: r["generations"] == 1)
-    assert api.control(run, "cancel")["wish"] == "CANCEL"
+    assert api.control(run, "cancel")["pending_action"] == "CANCEL"
     gate.let(1)
     assert api.finish(run)["state"] == "CANCELLED"
     answer = api.client.post(f"/v1/runs/{run}/cancel")

@@ -123,7 +123,7 @@ def test_jobs_that_ended_long_ago_are_forgotten_where_it_is_asked_for(tmp_path: 
     assert told == [old]
     with database.read() as session:
         assert session.scalars(select(RunRow.id)).all() == [new]
-        assert set(session.scalars(select(GenerationRow.run_id))) == {new}
+        assert set(session.scalars(select(GenerationRow.job_id))) == {new}
     database.close()
 
 

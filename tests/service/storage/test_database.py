@@ -15,8 +15,9 @@ from sqlalchemy.exc import IntegrityError, OperationalError
 
 from tests.service import toy
 from tests.service.conftest import Api, serving
+from tests.service.shapes import valid
+from wingfit.client.answers import Dataset, Result, Run
 from wingfit.service.app import create_app
-from wingfit.service.runs.schemas import DatasetOut, ResultOut, RunOut
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import FILE_NAME, Database, DatabaseClosedError, DataFolderError, migrate
 from wingfit.service.storage.tables import ArchiveRow, Table
@@ -142,12 +143,12 @@ def test_what_the_first_schema_stored_is_all_there(tmp_path: Path) -> None:
     app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
     with serving(app) as client:
         api = Api(client)
-        dataset = DatasetOut.model_validate(api.get("/v1/datasets/ds_1"))
+        dataset = valid(Dataset, api.get("/v1/datasets/ds_1"))
         assert (dataset.kind, dataset.markers, dataset.recordings[0].channels) == ("tracks", 2, [])
-        done = RunOut.model_validate(api.run("run_1"))
+        done = valid(Run, api.run("run_1"))
         assert (done.kind, done.best_mm, done.best_mn) == ("tracks", 1.5, None)
         assert (done.spec.mode, done.spec.method, done.spec.finish, done.spec.seed) == ("staged", "genetic", False, 4)
-        result = ResultOut.model_validate(api.get("/v1/runs/run_1/result"))
+        result = valid(Result, api.get("/v1/runs/run_1/result"))
         assert (result.kind, result.after_mm) == ("tracks", 1.5)
         (item,) = api.history("run_1")
         assert (item["best_mm"], item["best_mn"]) == (1.5, None)

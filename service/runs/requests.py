@@ -1,14 +1,12 @@
-"""How a run calibrates, on the wire."""
+"""The body of a request for a run, and the types of fields that other requests share."""
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 from pydantic_core import PydanticCustomError
-
-from wingfit.service.outcomes.load_schemas import Number
 
 Mode = Literal["staged", "joint", "local"]
 Method = Literal["genetic", "cma_es", "gauss_newton"]
@@ -22,6 +20,7 @@ LONGEST_DIVISION = 200
 DIVISION_FORMS = "preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2"
 FINEST_MM, COARSEST_MM = 0.02, 1.0
 
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Whole = Annotated[int, Field(strict=True)]
 # Control characters, and those that take no room or turn the text after them around.
@@ -106,31 +105,9 @@ Effects = Annotated[
     Field(max_length=100, description="effects that the model contains as well, see /v1/effects; fitted like others"),
 ]
 
-SPEC: dict[str, Any] = {
-    "method": "genetic",
-    "mode": "staged",
-    "division": "11",
-    "population": 50,
-    "stall": 10,
-    "tolerance": 0.001,
-    "max_generations": 200,
-    "seed": 1,
-    "bounds_factor": 5.0,
-    "accuracy_mm": 0.1,
-    "recordings": [],
-    "genes": [],
-    "effects": [],
-    "finish": False,
-    "preset": "proposed",
-    "without": [],
-    "axes": ["x"],
-    "low_pass_hz": None,
-    "peel_width_beats": 0.0,
-}
-
 
 class VehicleModel(BaseModel):
-    """Which model of a vehicle, and what it is compared with; a wing takes none of it."""
+    """The model of a vehicle, and how recorded forces are filtered; none of it applies to a wing."""
 
     preset: Annotated[Preset, Field(description="vehicles only: blade-element model, see /v1/models")] = "proposed"
     without: Annotated[list[Name], Field(max_length=100, description="vehicles only: terms to leave out")] = []
@@ -143,34 +120,18 @@ class VehicleModel(BaseModel):
     ] = 0.0
 
 
-class Spec(VehicleModel):
-    """What every specification says; see `wingfit.calibration.spec.CalibrationSpec`."""
+class JobSettings(VehicleModel):
+    """The settings that runs and diagnoses share; see `wingfit.calibration.spec.CalibrationSpec`."""
 
     division: Division = "11"
-    population: Annotated[Whole, Field(ge=4, le=1000)] = 50
-    stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
-    tolerance: Annotated[Number, Field(ge=0, le=1)] = 1e-3
-    max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
     seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1
     bounds_factor: Annotated[Number, Field(ge=1.01, le=100)] = 5.0
     accuracy_mm: Accuracy = 0.1
     recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
-    genes: Annotated[
-        list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
-    ] = []
     effects: Effects = []
-    finish: Annotated[StrictBool, Field(description="Gauss-Newton after the search of each stage")] = False
-    axes: Axes = ["x"]
 
 
-class SpecOut(Spec):
-    """How a run calibrates."""
-
-    mode: Mode
-    method: Method
-
-
-class RunIn(Spec):
+class RunIn(JobSettings):
     """A calibration to run."""
 
     model_config = ConfigDict(
@@ -182,3 +143,12 @@ class RunIn(Spec):
     name: Title | None = None
     mode: Annotated[Mode | None, Field(description="null: staged for a wing, local for a vehicle")] = None
     method: Annotated[Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle")] = None
+    population: Annotated[Whole, Field(ge=4, le=1000)] = 50
+    stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
+    tolerance: Annotated[Number, Field(ge=0, le=1)] = 1e-3
+    max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
+    genes: Annotated[
+        list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
+    ] = []
+    finish: Annotated[StrictBool, Field(description="Gauss-Newton after the search of each stage")] = False
+    axes: Axes = ["x"]

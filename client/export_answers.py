@@ -1,0 +1,40 @@
+"""Exports of runs and diagnoses as JSON: complete documents to archive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from typing_extensions import TypedDict
+
+from wingfit.client.answers import Dataset, GenomeInfo, HistoryItem, Result, Run
+from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.force_answers import ForceResult
+
+
+class Export(TypedDict):
+    """The fields that every export has."""
+
+    schema_id: str
+    wingfit_version: str
+    exported_at: str
+    dataset: Dataset
+
+
+class RunExport(Export):
+    """A run with all its results; ``genome`` is null before its first generation, ``result`` before its end.
+
+    ``request`` is the body of POST /v1/runs that repeats the run.
+    """
+
+    run: Run
+    request: dict[str, Any]
+    genome: GenomeInfo | None
+    result: Result | ForceResult | None
+    history: list[HistoryItem]
+
+
+class DiagnosisExport(Export):
+    """A diagnosis with its finding; the schema of the finding is at /v1/schemas/finding."""
+
+    diagnosis: Diagnosis
+    finding: dict[str, Any]

@@ -1,0 +1,116 @@
+"""Examples of answers in the published description (OpenAPI)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.client.answers import Dataset, Problem, RecordingInfo, Run
+from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.key_answers import Key, NewKey, Session
+from wingfit.diagnosis.spec import DiagnosisSpec
+from wingfit.service.auth.key_schemas import SECRET
+from wingfit.service.diagnoses.specs import diagnosis_settings
+from wingfit.service.outcomes.requests import RECORDING
+from wingfit.service.runs.requests import DATASET_ID
+from wingfit.service.runs.spec_views import run_settings
+
+_RECORDING: RecordingInfo = {
+    "name": RECORDING,
+    "rig": "vacuum_chamber",
+    "held_out": False,
+    "frames": 90,
+    "markers": 40,
+    "channels": [],
+    "missing_percent": 4.2,
+    "flap_frequency_hz": 3.0,
+    "phase_lag_deg": 0.0,
+    "pressure_mbar": 10.0,
+    "temperature_c": 20.0,
+    "airspeed_m_s": 0.0,
+    "angle_of_attack_deg": 0.0,
+}
+_DATASET: Dataset = {
+    "id": DATASET_ID,
+    "name": "Robird campaign",
+    "kind": "tracks",
+    "description": "Left wing, vacuum chamber and wind tunnel",
+    "created_at": "2026-11-05T09:30:00.000000Z",
+    "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+    "size_bytes": 1482003,
+    "markers": 49,
+    "recordings": [_RECORDING],
+}
+_RUN: Run = {
+    "id": "run_5c1e07a94bd83f26",
+    "name": "first try",
+    "dataset_id": DATASET_ID,
+    "kind": "tracks",
+    "spec": run_settings(CalibrationSpec(mode="staged", method="genetic")),
+    "state": "RUNNING",
+    "pending_action": None,
+    "stage": "structural",
+    "progress": 0.31,
+    "eta_seconds": 84.0,
+    "created_at": "2026-11-05T09:31:00.000000Z",
+    "started_at": "2026-11-05T09:31:00.120000Z",
+    "finished_at": None,
+    "generations": 12,
+    "evaluations": 600,
+    "best_mm": 1.84,
+    "best_mn": None,
+    "error": None,
+}
+_DIAGNOSIS: Diagnosis = {
+    "id": "dx_7d20c14be5a9f386",
+    "name": "Robird campaign, division 11",
+    "dataset_id": DATASET_ID,
+    "run_id": None,
+    "kind": "tracks",
+    "spec": diagnosis_settings(DiagnosisSpec()),
+    "state": "RUNNING",
+    "pending_action": None,
+    "stage": "refitting with hinge offset",
+    "progress": 0.62,
+    "eta_seconds": 71.0,
+    "created_at": "2026-11-05T09:31:00.000000Z",
+    "started_at": "2026-11-05T09:31:00.120000Z",
+    "finished_at": None,
+    "steps": 48,
+    "evaluations": 5210,
+    "verdict": None,
+    "summary": None,
+    "error": None,
+}
+_PROBLEM: Problem = {
+    "type": "urn:wingfit:problem:invalid",
+    "title": "Unprocessable Entity",
+    "status": 422,
+    "detail": "the request is invalid",
+    "errors": [{"where": "body.seed", "value": -1, "message": "Input should be greater than or equal to 0"}],
+}
+_KEY: Key = {
+    "id": "key_5c1e07a94bd83f26",
+    "name": "bench in room 3",
+    "owner": "wind tunnel group",
+    "scopes": ["read", "write"],
+    "created_at": "2026-11-05T09:30:00.000000Z",
+    "revoked_at": None,
+}
+_NEW_KEY: NewKey = {**_KEY, "secret": SECRET}
+_SESSION: Session = {
+    "keys_required": True,
+    "key_id": _KEY["id"],
+    "owner": _KEY["owner"],
+    "scopes": _KEY["scopes"],
+}
+
+EXAMPLES: Mapping[type, Mapping[str, object]] = {
+    Dataset: _DATASET,
+    Run: _RUN,
+    Diagnosis: _DIAGNOSIS,
+    Problem: _PROBLEM,
+    Key: _KEY,
+    NewKey: _NEW_KEY,
+    Session: _SESSION,
+}
