@@ -35,7 +35,7 @@ class Effect(TypedDict):
     name: str
     title: str
     family: Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
-    port: Literal["inertia", "connector", "drive", "air", "observation"]
+    port: Literal["inertia", "connector", "drive", "air", "point", "observation"]
     power: Literal["conservative", "dissipative", "any"]
     memory: str | None
     law: str

@@ -227,7 +227,7 @@ def test_the_plot_has_the_band_between_beats_and_no_rounding_noise(tmp_path: Pat
     answer |= {"modelled_n": {"x": [1.0, 2.0]}, "modelled_spectrum_n2_hz": {"x": [9.0, 1e-3, 1e-36]}, **spectra}
     beat, spectrum = charts(answer)
     assert [list(edge) for edge in beat.curves[0].band] == [pytest.approx([0.9, 2.8]), pytest.approx([1.1, 3.2])]
-    assert [one.name for one in charts(answer | {"spread_n": {}})[0].curves] == ["recorded", "modelled"]
+    assert [one.name for one in charts(answer | {"standard_deviation_n": {}})[0].curves] == ["recorded", "modelled"]
     assert [list(one.y) for one in spectrum.curves] == [[1e-2, 1e-5], [1e-3, 1e-36]], "without the mean"
     write_forces(answer, None, tmp_path / "plot.html")
     text = (tmp_path / "plot.html").read_text()

@@ -23,7 +23,7 @@ def test_forces_over_the_beat_follow_recording_model_and_axes(seen: Seen, api: A
     answer = _forces(api, local, first, "local")
     assert seen.data("beat-0", 3, "y")[:-1] == pytest.approx(answer["recorded_n"]["lift"])
     assert seen.data("beat-0", 2, "y")[:-1] == pytest.approx(answer["modelled_n"]["lift"])
-    band = [r + s for r, s in zip(answer["recorded_n"]["drag"], answer["spread_n"]["drag"], strict=True)]
+    band = [r + s for r, s in zip(answer["recorded_n"]["drag"], answer["standard_deviation_n"]["drag"], strict=True)]
     assert seen.data("beat-1", 1, "y")[:-1] == pytest.approx(band)
     assert seen.page.evaluate("document.getElementById('spectrum-0').layout.yaxis.type") == "log"
     tones = seen.data("spectrum-0", 1, "x")

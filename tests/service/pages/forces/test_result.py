@@ -97,7 +97,7 @@ def test_the_agreement_table_has_every_model(seen: Seen, local: str, result: dic
     assert set(rows) == {*force_data.FITTED, force_data.HELD_OUT, "Mean, fitted"}
     first = force_data.FITTED[0]
     entries = [_agreement(result["agreements"], first, source, quantity) for source in ("local", "global")]
-    entries.append(_agreement(result["left_out"], first, "global", quantity))
+    entries.append(_agreement(result["leave_one_out"], first, "global", quantity))
     entries += [_agreement(result["agreements"], first, source, quantity) for source in ("average", "nominal")]
     shown = seen.page.evaluate("[...document.querySelectorAll('#agreement thead th')].map((c) => c.textContent)")
     assert "mN" in shown
@@ -116,7 +116,7 @@ def test_forces_of_a_small_vehicle_keep_their_digits(seen: Seen, local: str) -> 
     def shrink(route: Route) -> None:
         answer = route.fetch()
         body = answer.json()
-        for one in [*body["agreements"], *body["left_out"]]:
+        for one in [*body["agreements"], *body["leave_one_out"]]:
             for key in ("rmse_n", "mean_recorded_n", "mean_modelled_n"):
                 one[key] = 1e-4 * one[key]
         for key in ("before_mn", "after_mn", "held_out_before_mn", "held_out_after_mn"):
