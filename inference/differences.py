@@ -10,10 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
+
 Outputs = Sequence[Array]
 Simulate = Callable[[Array], tuple[Outputs, Sequence[str | None]]]
 """From unit coordinates [B, F] to outputs, arrays [B, ...], and why each individual failed (None where it did not)."""
@@ -39,15 +38,15 @@ class Differences:
 
     outputs: tuple[Array, ...]
     slopes: tuple[Array, ...]
-    known: Flags
+    known: Bool[Mask, " K"]
     evaluations: int
     reasons: tuple[str, ...]
 
 
 def differences(
     simulate: Simulate,
-    unit: Array,
-    columns: npt.NDArray[np.int64],
+    unit: Float[Array, " F"],
+    columns: Int[Index, " K"],
     *,
     at: Outputs | None = None,
     step: float = STEP,
@@ -76,7 +75,7 @@ def differences(
     return Differences(tuple(at), tuple(slopes), width != 0.0, len(batch), tuple(r for r in reasons if r))
 
 
-def _slopes(base: Array, neighbours: Array, failed: Flags, width: Array) -> Array:
+def _slopes(base: Array, neighbours: Array, failed: Mask, width: Array) -> Array:
     """[..., K] of one output, known at the point [...] and at its neighbours [K, ...] or [2 K, ...]."""
     values = np.where(failed.reshape(-1, *[1] * base.ndim), base, neighbours)
     down = values[len(width) :] if len(values) > len(width) else base

@@ -11,18 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 
 @dataclass(frozen=True)
 class Quadratic:
     """A cost near a point, slope . d + d . curvature d / 2, with ``curvature`` [F, F] and ``slope`` [F]."""
 
-    curvature: Array
-    slope: Array
+    curvature: Float[Array, "F F"]
+    slope: Float[Array, " F"]
 
     @classmethod
     def of(cls, whitened: Sequence[tuple[Array, Array]]) -> Quadratic:
@@ -32,7 +31,9 @@ class Quadratic:
             np.asarray(sum(steep.T @ white for white, steep in whitened), float),
         )
 
-    def step(self, unit: Array, damping: Array, slope: Array | None = None) -> Array:
+    def step(
+        self, unit: Float[Array, " F"], damping: Float[Array, " F"], slope: Float[Array, " F"] | None = None
+    ) -> Float[Array, " F"]:
         """Step [F] from ``unit`` [F] that minimises the cost inside the box, ``damping`` [F] added to the curvatures.
 
         ``slope`` [F] replaces the quadratic's own.
@@ -41,7 +42,7 @@ class Quadratic:
         aim = -np.linalg.solve(factor, self.slope if slope is None else slope)
         return np.asarray(lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
 
-    def decrease(self, steps: Array) -> Array:
+    def decrease(self, steps: Float[Array, "S F"]) -> Float[Array, " S"]:
         """Decrease [S] of the cost that the quadratic predicts for ``steps`` [S, F]."""
         return np.asarray(-(steps @ self.slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, self.curvature, steps))
 
@@ -53,9 +54,9 @@ class Trials:
     ``decrease`` is -inf for a point that cannot be simulated.
     """
 
-    units: Array
-    predicted: Array
-    decrease: Array
+    units: Float[Array, "S F"]
+    predicted: Float[Array, " S"]
+    decrease: Float[Array, " S"]
 
     @classmethod
     def of(cls, units: Array, predicted: Array, before: float, after: Array, reasons: Sequence[str | None]) -> Trials:

@@ -9,10 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import qmc
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 DEPENDENT = 1e-10  # of the largest direction of the nuisance genes; the rest is round-off
 RIDGE = 1e-9  # of the fields' own squares, so that fields that are alike can be solved for
@@ -23,15 +22,15 @@ INVISIBLE = 1e-12  # of a field's length that the nuisance genes cannot make up 
 class Nuisance:
     """An orthonormal basis [N, O] of what the nuisance genes can do to whitened residuals [N]."""
 
-    basis: Array
+    basis: Float[Array, "N O"]
 
     @classmethod
-    def of(cls, slopes: Array) -> Nuisance:
+    def of(cls, slopes: Float[Array, "N F"]) -> Nuisance:
         """From whitened sensitivities [N, F]."""
         basis, power, _ = np.linalg.svd(slopes, full_matrices=False)
         return cls(basis[:, power > DEPENDENT * power.max(initial=0.0)])
 
-    def rest(self, vectors: Array) -> Array:
+    def rest(self, vectors: Float[Array, "*batch M"]) -> Float[Array, "*batch N"]:
         """Whitened ``vectors`` [..., M], M <= N, zero beyond M, without what the genes can do: [..., N]."""
         size = vectors.shape[-1]
         inside = (vectors @ self.basis[:size]) @ self.basis.T
@@ -39,13 +38,18 @@ class Nuisance:
         return np.asarray(-inside)
 
 
-def explained(fields: Array, residual: Array) -> float:
+def explained(fields: Float[Array, "S N"], residual: Float[Array, " N"]) -> float:
     """Decrease of the sum of squares of ``residual`` [N] when multiples of the ``fields`` [S, N] are fitted to it."""
     inner, score = fields @ fields.T, fields @ residual
     return float(score @ np.linalg.solve(inner + RIDGE * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
 
 
-def amounts(fields: Array, residual: Array, limits: tuple[Array, Array], smallest: float) -> Array:
+def amounts(
+    fields: Float[Array, "S N"],
+    residual: Float[Array, " N"],
+    limits: tuple[Float[Array, " S"], Float[Array, " S"]],
+    smallest: float,
+) -> Float[Array, " S"]:
     """Multiples [S] of the ``fields`` [S, N] that bring ``residual`` [N] nearest to zero within ``limits``, [S] each.
 
     A single field is clipped; several are scaled together, so that their proportion stays. A field not longer than
@@ -67,11 +71,11 @@ def amounts(fields: Array, residual: Array, limits: tuple[Array, Array], smalles
     return found
 
 
-def remaining(fields: Array, residual: Array, multiples: Array) -> float:
+def remaining(fields: Float[Array, "S N"], residual: Float[Array, " N"], multiples: Float[Array, " S"]) -> float:
     """Sum of squares of ``residual`` [N] plus ``multiples`` [S] of the ``fields`` [S, N]."""
     return float(np.sum((residual + multiples @ fields) ** 2))
 
 
-def spread(count: int, size: int) -> Array:
+def spread(count: int, size: int) -> Float[Array, "count size"]:
     """``count`` points [count, size] spread evenly over the unit box."""
     return np.asarray(qmc.Halton(size, scramble=False).random(count + 1)[1:])  # the first of all is a corner

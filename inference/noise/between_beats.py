@@ -11,12 +11,10 @@ taper (Politis and Romano 1995; for scores: Newey and West 1987).
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.inference.noise.mean_beat import fourier_basis, scatter_about
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Bool, Float, Index, Mask
 
 FEWEST_MEAN = 3  # beats at least, to separate a mean beat from noise
 HARMONICS = 8  # of the mean beat
@@ -27,8 +25,8 @@ WHOLE = 0.9  # fraction of the median number of samples that a whole beat must h
 
 
 def beat_scores(
-    record: Recording, white: Array, sensitivity: Array, seen: npt.NDArray[np.bool_]
-) -> tuple[Array, float]:
+    record: Recording, white: Float[Array, "T C"], sensitivity: Float[Array, "T C F"], seen: Bool[Mask, "T C0"]
+) -> tuple[Float[Array, "B F"], float]:
     """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], 0 where not ``seen``.
 
     Also the share of all samples seen that lies in whole beats.
@@ -41,7 +39,7 @@ def beat_scores(
     return scores[whole], float(count[whole].sum() / count.sum())
 
 
-def beat_score_covariance(scores: Array, samples_used: float, absorbed: float) -> Array:
+def beat_score_covariance(scores: Float[Array, "B F"], samples_used: float, absorbed: float) -> Float[Array, "F F"]:
     """Covariance [F, F] of the sum of all scores of a recording, from those of its B whole beats [B, F].
 
     A fit to this recording alone makes its scores add up to zero, as if their mean had been taken off; of what the
@@ -58,7 +56,7 @@ def beat_score_covariance(scores: Array, samples_used: float, absorbed: float) -
     return np.asarray((axes * np.maximum(value, 0.0)) @ axes.T)
 
 
-def without_mean_beat(record: Recording, white: Array, beats: int) -> Array:
+def without_mean_beat(record: Recording, white: Float[Array, "T C"], beats: int) -> Float[Array, "T C"]:
     """Residuals [T, C] less what repeats in every beat, of a recording with so many whole ``beats``; zeros stay.
 
     What repeats is misfit of the model, which is no noise: it does not change from recording to recording.
@@ -70,7 +68,7 @@ def without_mean_beat(record: Recording, white: Array, beats: int) -> Array:
     return np.asarray(scatter_about(fourier_basis(psi, HARMONICS), white, white != 0.0) * widened)
 
 
-def _beats(record: Recording) -> npt.NDArray[np.int64]:
+def _beats(record: Recording) -> Index:
     """Number [T] of the beat of each sample."""
     beat = np.floor(record.times * record.condition.flap_frequency + 1e-6).astype(np.int64)
     return np.asarray(beat - beat[0])

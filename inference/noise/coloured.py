@@ -23,11 +23,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
 
-Array = npt.NDArray[np.float64]
-Spectrum = npt.NDArray[np.complex128]
+from wingfit.records.array_types import Array, Bool, Complex, Float, Index, Mask
 
 MEMORIES = 4.0
 LARGEST_LAG = 1.0 / 3.0  # of the recording
@@ -50,14 +48,22 @@ class Block:
         length: of the padded transform.
     """
 
-    sensitivity: Spectrum
-    pairs: Array
-    raw: Array
-    seen: npt.NDArray[np.bool_]
+    sensitivity: Complex
+    pairs: Float[Array, " lags"]
+    raw: Float[Array, "lags n n"]
+    seen: Bool[Mask, "G K"]
     length: int
 
     @classmethod
-    def of(cls, times: Array, white: Array, sensitivity: Array, seen: npt.NDArray[np.bool_], *, grouped: bool) -> Block:
+    def of(
+        cls,
+        times: Float[Array, " T"],
+        white: Float[Array, "T C"],
+        sensitivity: Float[Array, "T C F"],
+        seen: Bool[Mask, "T C"],
+        *,
+        grouped: bool,
+    ) -> Block:
         """From whitened residuals [T, C], sensitivities [T, C, F] and ``seen`` [T, C], all zero where not seen.
 
         ``grouped``: the C outputs may be correlated with each other.
@@ -69,7 +75,7 @@ class Block:
         size = int(slots[-1]) + 1
         length = next_fast_len(size + lags + 1, real=True)
 
-        def spread(values: Array, trailing: tuple[int, ...]) -> Spectrum:
+        def spread(values: Array, trailing: tuple[int, ...]) -> Complex:
             whole = np.zeros((size, *trailing))
             whole[slots] = values.reshape(frames, *trailing)
             return np.asarray(rfft(whole, length, axis=0))
@@ -86,7 +92,7 @@ class Block:
         """Correlations [lags, n, n] of the noise, when the fit took ``lost`` [lags, n, n] of the sums; not tapered."""
         return np.asarray((self.raw + lost) / np.maximum(self.pairs, 1.0)[:, None, None])
 
-    def spectrum(self, correlation: Array, last: int) -> Spectrum:
+    def spectrum(self, correlation: Array, last: int) -> Complex:
         """Spectral density [f, n, n] of correlations tapered at lag ``last``, negative densities set to zero."""
         k = np.arange(last + 1)
         taper = np.clip(2.0 * (1.0 - k / max(last, 1)), 0.0, 1.0)
@@ -96,14 +102,14 @@ class Block:
         density, axes = np.linalg.eigh(rfft(kernel, axis=0))
         return np.asarray((axes * np.maximum(density, 0.0)[:, None, :]) @ np.swapaxes(axes.conj(), 1, 2))
 
-    def through(self, spectrum: Spectrum) -> Spectrum:
-        """Spectrum [f, K, n, F] of R_vv S at the frames seen."""
+    def through(self, spectrum: Complex) -> Complex:
+        """Complex [f, K, n, F] of R_vv S at the frames seen."""
         whole = irfft(np.einsum("fab,fkbp->fkap", spectrum, self.sensitivity), self.length, axis=0)
         whole[: len(self.seen)] *= self.seen[:, :, None, None]
         whole[len(self.seen) :] = 0.0
         return np.asarray(rfft(whole, axis=0))
 
-    def scores(self, through: Spectrum) -> Array:
+    def scores(self, through: Complex) -> Array:
         """Covariance [F, F] of the scores, sum_ij S_i^T R_vv(i - j) S_j."""
         flat = self.sensitivity.reshape(len(self.sensitivity), -1, self.sensitivity.shape[-1])
         other = through.reshape(flat.shape)
@@ -113,7 +119,7 @@ class Block:
             weight[-1] = 1.0 / self.length
         return np.asarray(np.einsum("f,fkp,fkq->pq", weight, flat.conj(), other, optimize=True).real)
 
-    def lost(self, through: Spectrum, inverse: Array, covariance: Array) -> Array:
+    def lost(self, through: Complex, inverse: Array, covariance: Array) -> Array:
         """Expected loss [lags, n, n] of the sums of products to a fit with M^-1 = ``inverse``."""
         mine = self.sensitivity
         kept = through @ inverse - 0.5 * mine @ covariance
@@ -121,7 +127,7 @@ class Block:
         return both[: len(self.pairs)]
 
 
-def grid(times: Array, longest: int) -> npt.NDArray[np.int64]:
+def grid(times: Array, longest: int) -> Index:
     """Place of each frame on a grid of the median interval, [T]; pauses count for at most ``longest`` + 1 intervals.
 
     Frames so uneven that two would share a place are numbered as they come.
@@ -136,7 +142,7 @@ def grid(times: Array, longest: int) -> npt.NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(np.minimum(apart, longest + 1))])
 
 
-def score_covariances(blocks: list[Block], inverse: Array) -> list[Array]:
+def score_covariances(blocks: list[Block], inverse: Float[Array, "F F"]) -> list[Array]:
     """Covariance [F, F] of each block's scores, with M^-1 = ``inverse``, by the iteration of the module's text."""
     lost = [np.zeros_like(block.raw) for block in blocks]
     each, total = [np.zeros_like(inverse)] * len(blocks), np.zeros_like(inverse)
@@ -161,6 +167,6 @@ def last_lag(correlation: Array) -> int:
     return int(enough[0]) if len(enough) else len(rho) - 1
 
 
-def _lagged(a: Spectrum, b: Spectrum, length: int) -> Array:
+def _lagged(a: Complex, b: Complex, length: int) -> Array:
     """[lag, n, n] of sum_i a_i b_(i + lag)^T over groups and columns, from spectra [f, K, n, P]."""
     return np.asarray(irfft(np.einsum("fkap,fkbp->fab", a.conj(), b, optimize=True), length, axis=0))

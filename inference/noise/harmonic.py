@@ -14,16 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import elliprg
 
 from wingfit.inference.noise.mean_beat import fourier_basis, scatter_about
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
 from wingfit.records import Recording
+from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 HARMONICS = 8  # of tracks: a wing of membrane and foam follows no faster
 HARMONICS_OF_FORCES = 10
@@ -51,18 +48,18 @@ class HarmonicFit:
         coefficients: [C, P] of the recording itself.
     """
 
-    order: npt.NDArray[np.int64]
-    trend: Flags
-    weight: Array
-    inverse: Array
-    used: Flags
-    variance: Array
-    noise: Array
+    order: Int[Index, " P"]
+    trend: Bool[Mask, " P"]
+    weight: Float[Array, " P"]
+    inverse: Float[Array, "C P T"]
+    used: Bool[Mask, " C"]
+    variance: Float[Array, "C P"]
+    noise: Float[Array, " C"]
     lag1: float
     between_beats: bool
-    coefficients: Array
+    coefficients: Float[Array, "C P"]
 
-    def of(self, residuals: Array) -> Array:
+    def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Coefficients [..., C, P] of residuals [..., T, C], NaN where not recorded; zero for a channel not used."""
         filled = np.where(np.isfinite(residuals), residuals, 0.0)
         channels = np.moveaxis(filled, -1, 0).reshape(len(self.inverse), -1, filled.shape[-2])
@@ -70,7 +67,7 @@ class HarmonicFit:
         return np.asarray(found.reshape(*residuals.shape[:-2], *self.variance.shape))
 
 
-def harmonic_fit(recording: Recording, compared: Flags | None = None) -> HarmonicFit:
+def harmonic_fit(recording: Recording, compared: Mask | None = None) -> HarmonicFit:
     """Reduce ``recording``; ``compared`` [T, C] says which samples count (None: all that were recorded).
 
     ValueError where no channel has enough samples, or moves, or every sample is from the same phase of the beat.
@@ -113,7 +110,7 @@ def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
     return total / count if count else None
 
 
-def whole_markers(recording: Recording) -> Flags:
+def whole_markers(recording: Recording) -> Mask:
     """True [T, C] where all of x, y and z of a marker were recorded."""
     return np.repeat(np.isfinite(recording.positions).all(axis=2), 3, axis=1)
 
@@ -133,17 +130,17 @@ class _Scatter:
     """
 
     values: Array
-    valid: Flags
+    valid: Mask
     basis: Array
-    order: npt.NDArray[np.int64]
-    trend: Flags
+    order: Index
+    trend: Mask
     beats: int
     inner: Array
     density: tuple[Array, Array]
     variance: Array
 
     @classmethod
-    def of(cls, recording: Recording, compared: Flags | None) -> _Scatter:
+    def of(cls, recording: Recording, compared: Mask | None) -> _Scatter:
         """ValueError where the recording has no beat of samples, or no channel with enough of them."""
         advance, number = _apparent(recording)
         harmonics, beats = _harmonics(recording, advance), int(advance * (number[-1] + 1) + 0.05)
@@ -164,7 +161,7 @@ class _Scatter:
         return cls(values, valid, basis, order, trend, beats, inner, density, variance)
 
 
-def _check_moves(recording: Recording, seen: npt.NDArray[np.bool_]) -> None:
+def _check_moves(recording: Recording, seen: Mask) -> None:
     """ValueError where every channel holds one and the same value throughout."""
     least, most = (
         end(np.where(seen, recording.values, none), axis=0) for end, none in ((np.min, np.inf), (np.max, -np.inf))
@@ -182,7 +179,7 @@ def still_markers(recording: Recording) -> tuple[str, ...]:
     return tuple(name for k, name in enumerate(recording.markers) if still[3 * k])
 
 
-def _still(recording: Recording) -> npt.NDArray[np.bool_]:
+def _still(recording: Recording) -> Mask:
     """Channels [C] of markers none of whose coordinates ever changes."""
     if recording.kind != "tracks":
         return np.zeros(recording.values.shape[1], bool)
@@ -191,7 +188,7 @@ def _still(recording: Recording) -> npt.NDArray[np.bool_]:
     return np.repeat((first == last).all(axis=1), 3)
 
 
-def _apparent(recording: Recording) -> tuple[float, npt.NDArray[np.int64]]:
+def _apparent(recording: Recording) -> tuple[float, Index]:
     """Apparent advance of the beat from sample to sample (beats, at most half), and the number [T] of each sample."""
     times = recording.times
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -223,7 +220,7 @@ def _harmonics(recording: Recording, advance: float) -> int:
     return found
 
 
-def _basis(recording: Recording, harmonics: int, beats: int) -> tuple[Array, npt.NDArray[np.int64], Flags]:
+def _basis(recording: Recording, harmonics: int, beats: int) -> tuple[Array, Index, Mask]:
     psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
     k = np.arange(1, harmonics + 1)
     slow = np.linspace(-1.0, 1.0, len(psi)) if len(psi) > 1 else np.zeros(1)
@@ -232,7 +229,7 @@ def _basis(recording: Recording, harmonics: int, beats: int) -> tuple[Array, npt
     return np.column_stack([fourier_basis(psi, harmonics), *trends]), order, np.arange(len(order)) > 2 * harmonics
 
 
-def _inner(basis: Array, valid: Flags) -> tuple[Array, Flags]:
+def _inner(basis: Array, valid: Mask) -> tuple[Array, Mask]:
     """(A^T A)^-1 [C, P, P] over the valid samples of each channel, and which channels determine all coefficients."""
     inner, used = np.zeros((valid.shape[1], basis.shape[1], basis.shape[1])), np.zeros(valid.shape[1], bool)
     masks, group = np.unique(valid, axis=1, return_inverse=True)
@@ -246,7 +243,7 @@ def _inner(basis: Array, valid: Flags) -> tuple[Array, Flags]:
     return inner, used
 
 
-def _too_few(name: str, size: int, valid: Flags) -> str:
+def _too_few(name: str, size: int, valid: Mask) -> str:
     return (
         f"recording {name!r}: no channel has {int(np.ceil(SPARE * size))} samples spread over the beat without "
         f"long gaps, which its {size} coefficients need; the fullest has {int(valid.sum(axis=0).max(initial=0))}: "

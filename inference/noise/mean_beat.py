@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from wingfit.records.array_types import Array, Bool, Float, Mask
 
 
-def fourier_basis(psi: Array, harmonics: int) -> Array:
+def fourier_basis(psi: Float[Array, " T"], harmonics: int) -> Float[Array, "T P"]:
     """Columns 1, cos k psi, sin k psi for k = 1 .. H at phases [T]: [T, 1 + 2 H]."""
     angles = psi[:, None] * np.arange(1, harmonics + 1)
     return np.hstack([np.ones((len(psi), 1)), np.cos(angles), np.sin(angles)])
 
 
-def scatter_about(basis: Array, values: Array, valid: Flags) -> Array:
+def scatter_about(
+    basis: Float[Array, "T P"], values: Float[Array, "T C"], valid: Bool[Mask, "T C"]
+) -> Float[Array, "T C"]:
     """``values`` [T, C] minus their least-squares fit by ``basis`` [T, P] over the ``valid`` samples, zero elsewhere.
 
     A channel with fewer valid samples than columns has no scatter.

@@ -7,11 +7,9 @@ variance s.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 POOLED = 10.0  # lines that the mean scale of all channels counts for in the scale of one
 LOCAL = 0.6  # harmonics to either side over which the noise's spectrum is averaged
@@ -22,8 +20,13 @@ FLAT = 0.002  # of the largest density: no density is taken to be lower
 
 
 def density_at_harmonics(
-    scatter: Array, valid: Flags, advance: float, number: npt.NDArray[np.int64], harmonics: int, beats: int
-) -> tuple[Array, Array]:
+    scatter: Float[Array, "T C"],
+    valid: Bool[Mask, "T C"],
+    advance: float,
+    number: Int[Index, " T"],
+    harmonics: int,
+    beats: int,
+) -> tuple[Float[Array, " H1"], Float[Array, " C"]]:
     """Density of the noise at harmonics 0 .. H, relative to the scale [C] of each channel (a variance), and that scale.
 
     ``scatter`` [T, C] is what does not repeat with the beat, zero where not ``valid``; ``advance`` the apparent advance
@@ -93,7 +96,7 @@ def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> A
     return model(best.x, np.arange(harmonics + 1, dtype=float))
 
 
-def lag1_autocorrelation(scatter: Array, valid: Flags) -> float:
+def lag1_autocorrelation(scatter: Float[Array, "T C"], valid: Bool[Mask, "T C"]) -> float:
     """Correlation of successive samples of ``scatter`` [T, C], zero where not ``valid``; the median of the channels."""
     both = valid[1:] & valid[:-1]
     product = np.where(both, scatter[1:] * scatter[:-1], 0.0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)

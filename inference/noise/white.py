@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 FLOOR = 1e-6  # of the largest recorded value: residuals are taken to be at least this large, so that R stays regular
 POOLED = 5.0  # samples: weight of the mean variance of a recording in the variance of each track
@@ -19,13 +17,13 @@ POOLED = 5.0  # samples: weight of the mean variance of a recording in the varia
 class Noise:
     """R of one recording [C, C] (m^2 or N^2), and the matrix [C, C] that whitens rows of residuals from the right."""
 
-    covariance: Array
-    whitening: Array
-    log_determinants: Array
+    covariance: Float[Array, "C C"]
+    whitening: Float[Array, "C C"]
+    log_determinants: Float[Array, " C"]
     """[C] logarithms that add up to ln det R, one for each channel."""
 
     @classmethod
-    def of(cls, record: Recording, residuals: Array) -> Noise:
+    def of(cls, record: Recording, residuals: Float[Array, "T C"]) -> Noise:
         """Estimate R from the residuals [T, C] of ``record``.
 
         Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
@@ -46,16 +44,16 @@ class Noise:
         whitening = np.asarray(np.linalg.solve(factor, np.eye(len(factor))).T, float)
         return cls(matrix, whitening, 2.0 * np.log(np.diag(factor)))
 
-    def whitened(self, residuals: Array) -> Array:
+    def whitened(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B T C"]:
         """Residuals [..., T, C] with unit covariance; zero where not compared."""
         return np.asarray(np.where(np.isfinite(residuals), residuals, 0.0) @ self.whitening)
 
-    def cost(self, residuals: Array) -> float:
+    def cost(self, residuals: Float[Array, "T C"]) -> float:
         """-ln likelihood of residuals [T, C], Eq. 22."""
         count, white = np.isfinite(residuals).sum(axis=0), self.whitened(residuals)
         return 0.5 * float((white**2).sum() + count @ (self.log_determinants + np.log(2 * np.pi)))
 
 
-def whitened_sensitivity(noise: Noise, sensitivity: Array) -> Array:
+def whitened_sensitivity(noise: Noise, sensitivity: Float[Array, "T C F"]) -> Float[Array, "T C F"]:
     """[T, C, F] of the whitened residuals from that of the residuals."""
     return np.asarray(np.einsum("tcf,cd->tdf", sensitivity, noise.whitening, optimize=True))
