@@ -32,7 +32,7 @@ class Policy:
         0.35, "nominal residual RMS", "what a law that is not in the library would leave, were it known"
     )
     unknown_genes: float = _threshold(6.0, "genes", "what such a law would need: size, place, exponents")
-    refuted: float = _threshold(4.0, "standard errors", "excess that refutes the nominal model by itself")
+    nominal_refuted: float = _threshold(4.0, "standard errors", "excess that refutes the nominal model by itself")
     allowance: float = _threshold(2.0, "standard errors", "excess that noise alone may make")
     predicted_weight: float = _threshold(
         0.25, "fraction", "weight of predicted recordings beside fitted ones: a linearised prediction is rough"
@@ -43,8 +43,10 @@ class Policy:
         0.75, "probability", "effects of the library have as much of that of all missing physics: else unnamed"
     )
     possible: float = _threshold(0.05, "probability", "another explanation with as much is reported as possible")
-    pieces: float = _threshold(6.0, "per recording", "independent pieces of a model's error")
-    most_pieces: float = _threshold(48.0, "pieces", "recordings under similar conditions repeat the same error")
+    effective_samples: float = _threshold(6.0, "per recording", "independent pieces of a model's error")
+    max_effective_samples: float = _threshold(
+        48.0, "pieces", "recordings under similar conditions repeat the same error"
+    )
     tolerance: float = _threshold(0.1, "noise RMS", "no model is expected to be better, however long the recording")
     gene_freedom: float = _threshold(
         0.1, "gene box", "standard deviation by which leaving a recording out may move a gene"

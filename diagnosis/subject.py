@@ -43,21 +43,21 @@ class Suspect:
     title: str
     family: Family
     genes: tuple[Gene, ...]
-    sizes: tuple[str, ...]
+    size_genes: tuple[str, ...]
     typical: Mapping[str, float]
     source: str
     signature: str
-    places: Mapping[Literal["span", "chord"], str]
-    alike: tuple[str, ...] = ()
-    spots: tuple[tuple[float, ...], ...] = ()
+    location_genes: Mapping[Literal["span", "chord"], str]
+    confused_with: tuple[str, ...] = ()
+    candidate_shapes: tuple[tuple[float, ...], ...] = ()
 
     @property
-    def shapes(self) -> tuple[str, ...]:
+    def shape_genes(self) -> tuple[str, ...]:
         """Names of the genes that are not its size."""
-        return tuple(gene.name for gene in self.genes if gene.name not in self.sizes)
+        return tuple(gene.name for gene in self.genes if gene.name not in self.size_genes)
 
 
-class Place(NamedTuple):
+class ChannelLocation(NamedTuple):
     """Where a channel is measured: ``name`` of the marker or force axis, ``axis`` ("x", "y", "z"), place on the wing.
 
     ``span`` and ``chord`` in parts, ``x`` and ``y`` in m; None for a force.
@@ -90,7 +90,7 @@ class Subject(Protocol):
         ...
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """The model in words."""
         ...
 
@@ -98,30 +98,30 @@ class Subject(Protocol):
         """The nominal model with suspects put in; their genes follow its own, switched off."""
         ...
 
-    def beside(self, model: Model, genome: Array) -> Model:
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:
         """``model``, told that individuals will be near ``genome`` [G], so that it may begin its search there."""
         ...
 
-    def finer(self) -> Sequence[Subject]:
+    def finer_subjects(self) -> Sequence[Subject]:
         """The same with finer divisions, cheapest first; none where there is none, or it would cost too much."""
         ...
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
         """Where each channel of ``recording`` is measured."""
         ...
 
-    def origin(self, recording: Recording) -> float:
+    def beat_start_phase(self, recording: Recording) -> float:
         """Phase 2 pi f t (rad) of ``recording`` at which a beat begins."""
         ...
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
         """What ``model`` with ``genome`` [G] shows under ``condition``, recorded as the rig does; None if it fails."""
         ...
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
         """What the nominal model with ``genome`` [G] answers to known loads; None for a rig that cannot be probed."""
         ...
 
-    def conditions(self) -> tuple[Condition, ...]:
+    def candidate_conditions(self) -> tuple[Condition, ...]:
         """Conditions that the rig can run and that one might record next."""
         ...

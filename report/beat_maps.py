@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from wingfit.diagnosis.evidence.intervals import reach
+from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
 from wingfit.report.layout import figure, panels
 from wingfit.report.markup import Markup, joined, tag
@@ -44,7 +44,7 @@ WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
-NINETY = reach()
+NINETY = standard_errors()
 MOST_ROWS, MOST_COLUMNS, MOST_LOADS = 32, 64, 6
 Pool = Callable[[Sequence[float]], float]
 

@@ -16,17 +16,17 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import PRIOR, Fit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject, Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
 
 Array = npt.NDArray[np.float64]
 
-PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
-SHAPES = 7  # of one with other shape genes
-SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
+LOCATION_SAMPLES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
+SHAPE_SAMPLES = 7  # of one with other shape genes
+VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Trial:
     gain: float
     amounts: Array
     freedom: int
-    leaves: float
+    remaining_chi_squared: float
 
     @property
     def start(self) -> Array:
@@ -69,14 +69,14 @@ class Nuisance:
     they cannot make up for.
     """
 
-    def __init__(self, stack: Stack, fit: Fit) -> None:
-        weight = 1.0 / (PRIOR * np.sqrt(stack.trust(fit.coefficients)))
-        slopes = fit.jacobian / stack.scale[:, None]
-        self.scale = stack.scale
+    def __init__(self, data: WhitenedData, fit: Fit) -> None:
+        weight = 1.0 / (PRIOR_SD * np.sqrt(data.likelihood_weight(fit.coefficients)))
+        slopes = fit.jacobian / data.scale[:, None]
+        self.scale = data.scale
         self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
-        self.left = self.genes.rest(np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)]))
+        self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
-    def rest(self, changes: Array) -> Array:
+    def project_out(self, changes: Array) -> Array:
         """Whitened changes [..., D + F] of coefficients [..., D], without what the genes can make up for."""
         return self.genes.rest(changes / self.scale)
 
@@ -88,12 +88,12 @@ def off_units(suspect: Suspect) -> Array:
 
 def size_columns(suspect: Suspect) -> list[int]:
     """Columns of the genes that are its size."""
-    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.sizes]
+    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]
 
 
-def screened(
+def score_tests(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     nominal: Fit,
     evaluator: Evaluator,
     suspects: Sequence[Suspect],
@@ -103,27 +103,22 @@ def screened(
 
     The fit is the nominal one, or has in it the suspects that are ``known``; all its genes may adapt.
     """
-    nuisance = Nuisance(stack, nominal)
+    nuisance = Nuisance(data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
         genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
-        model = subject.beside(subject.extended([*known, suspect.name]), genome)
+        model = subject.with_initial_motion(subject.extended([*known, suspect.name]), genome)
         free = tuple(gene.name for gene in suspect.genes)
-        problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
-        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance)
+        problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
+        yield suspect, _suspect_trials(data, problem, nominal, evaluator, suspect, nuisance)
 
 
-def _tried(
-    stack: Stack,
-    problem: Problem,
-    nominal: Fit,
-    evaluator: Evaluator,
-    suspect: Suspect,
-    nuisance: Nuisance,
+def _suspect_trials(
+    data: WhitenedData, problem: Problem, nominal: Fit, evaluator: Evaluator, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
-    blocks = list(_blocks(suspect))
+    blocks = list(_genes_to_try(suspect))
     units = np.concatenate(blocks)
-    found, reasons, _ = stack.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    found, reasons, _ = data.evaluate(problem, evaluator, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
     trials, row = [], 0
@@ -136,13 +131,21 @@ def _tried(
 
 
 def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
-    own, left = nuisance.rest(fields), nuisance.left
-    found = amounts(own, left, _limits(suspect, block), SEEN * np.sqrt(len(left)))
-    leaves = remaining(own, left, found)
-    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), found, len(suspect.genes), leaves)
+    own, residual = nuisance.project_out(fields), nuisance.residual
+    found = amounts(own, residual, _multiple_limits(suspect, block), VISIBLE_CHANGE * np.sqrt(len(residual)))
+    remaining_chi_squared = remaining(own, residual, found)
+    return Trial(
+        suspect,
+        block,
+        fields,
+        max(float(residual @ residual) - remaining_chi_squared, 0.0),
+        found,
+        len(suspect.genes),
+        remaining_chi_squared,
+    )
 
 
-def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
+def _multiple_limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
     """Least and largest multiples [S] of each size that stay in the box."""
     off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
     for row, unit in enumerate(block):
@@ -153,21 +156,21 @@ def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _spots(suspect: Suspect, typical: Array) -> list[Array]:
+def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
     """Shapes [E'] in parts of their boxes to be tried: its spots if it has any, else the ``typical`` one and others."""
-    if suspect.spots:
-        genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
-        return [unit_at(genes, np.array(spot)) for spot in suspect.spots]
-    count = PLACES if suspect.places else SHAPES
+    if suspect.candidate_shapes:
+        genes = [gene for gene in suspect.genes if gene.name in suspect.shape_genes]
+        return [unit_at(genes, np.array(spot)) for spot in suspect.candidate_shapes]
+    count = LOCATION_SAMPLES if suspect.location_genes else SHAPE_SAMPLES
     return [typical, *spread(count, len(typical))]
 
 
-def _blocks(suspect: Suspect) -> Iterator[Array]:
+def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
     """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]
-    for spot in _spots(suspect, typical[shape]) if shape else [typical[shape]]:
+    for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
             block = []
             for k in size:

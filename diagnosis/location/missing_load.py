@@ -25,16 +25,18 @@ from wingfit.sim.effects.probe import Probe
 Array = npt.NDArray[np.float64]
 
 PHASES = 36  # instants of a beat that loads are told at
-GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
-LINEAR = 0.03  # of a response: what is not proportional to the load
-TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is none
+GENE_ERROR_SD = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
+NONLINEARITY = 0.03  # of a response: what is not proportional to the load
+MIN_EVIDENCE = 5.0  # natural logarithm of the evidence for a load over none: less is none
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
-_LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
-_MOST = 60  # kinds to average over
-DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
+_MIN_RELATIVE_PROBABILITY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
+_MAX_KINDS = 60  # kinds to average over
+RESPONSE_ERROR = (
+    0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
+)
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
-SPREAD = 0.3  # mean direction of the phase: less, and the load is spread over the beat
+MIN_PHASE_CONCENTRATION = 0.3  # mean direction of the phase: less, and the load is spread over the beat
 
 
 @dataclass(frozen=True)
@@ -50,17 +52,17 @@ class Case:
     """
 
     name: str
-    lacking: Array
+    residual: Array
     responses: Array
     sensitivities: Array
     crossing: float
 
 
-def decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
+def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
     """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
     if not len(values):
         return values
-    kept = memory ** np.diff(place)[:, None]
+    kept = lag1 ** np.diff(place)[:, None]
     return np.concatenate([values[:1], (values[1:] - kept * values[:-1]) / np.sqrt(1.0 - kept**2)])
 
 
@@ -121,8 +123,8 @@ class Inferred:
         places = np.eye(2) if self.driven else self.probe.hats(span)
         for r, crossing in enumerate(self.crossings):
             basis = np.kron(places, self.probe.terms(phase + crossing))
-            each = np.array([basis @ kind.sizes[r, self.told] for kind in self.kinds])
-            covariances = [kind.covariance[r, self.told, self.told] for kind in self.kinds]
+            each = np.array([basis @ kind.sizes[r, self.reported] for kind in self.kinds])
+            covariances = [kind.covariance[r, self.reported, self.reported] for kind in self.kinds]
             own = [np.einsum("np,pq,nq->n", basis, one, basis, optimize=True) for one in covariances]
             mean = weight @ each
             values.append(mean)
@@ -131,12 +133,12 @@ class Inferred:
         return np.reshape(values, shape), np.reshape(errors, shape)
 
     @property
-    def told(self) -> slice:
+    def reported(self) -> slice:
         """The forces among the sizes, or the turns of the rods."""
         return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
 
     @property
-    def left(self) -> float:
+    def noise_inflation(self) -> float:
         """Mean square of what is left, in parts of the noise's: of two models, the one with less is nearer."""
         return float(np.mean(self.floor**2))
 
@@ -153,28 +155,28 @@ class LoadPlace:
     """
 
     span: Interval | None
-    reach: tuple[float, float]
+    extent: tuple[float, float]
     phase: Interval | None
-    lasts: tuple[float, float]
+    duration: tuple[float, float]
     chord: Interval | None = None
 
 
-class _Normal:
+class _NormalEquations:
     """Normal equations of one recording, the noise raised to what no load and no gene explains."""
 
     def __init__(self, case: Case) -> None:
-        H, S, y = case.responses, case.sensitivities, case.lacking
+        H, S, y = case.responses, case.sensitivities, case.residual
         both = np.concatenate([H, S], axis=1)
-        left = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
-        size, left_over = both.shape[1], float(left @ left)
+        remainder = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
+        size, left_over = both.shape[1], float(remainder @ remainder)
         told = max(float(y @ y) - left_over - size, 0.0) / size  # mean square, in the directions of loads and genes
-        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + LINEAR**2 * told))
+        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + NONLINEARITY**2 * told))
         scale = self.floor**-2
         self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
         self.h, self.s = scale * (H.T @ y), scale * (S.T @ y)
-        genes = np.linalg.inv(self.C + np.eye(len(self.C)) / GENES**2)
-        self.alone = self.A - self.B @ genes @ self.B.T
-        self.force = self.h - self.B @ genes @ self.s
+        genes = np.linalg.inv(self.C + np.eye(len(self.C)) / GENE_ERROR_SD**2)
+        self.load_information = self.A - self.B @ genes @ self.B.T
+        self.load_score = self.h - self.B @ genes @ self.s
 
     def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
         """Logarithm of the evidence over that of no load, [K, strengths].
@@ -189,20 +191,22 @@ class _Normal:
 
     def _evidence(self, shapes: Array, spread: Array) -> Array:
         M = len(spread)
-        Q = len(self.force) // M
-        inner = self.alone.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
+        Q = len(self.load_score) // M
+        inner = self.load_information.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
         K, Z = shapes.shape[:2]
         pairs = np.einsum("kyq,kzr->kyzqr", shapes, shapes).reshape(K * Z * Z, Q * Q)
         blocks = (pairs @ inner).reshape(K, Z, Z, M, M).transpose(0, 1, 3, 2, 4)
         whole = (blocks * spread[:, None, None] * spread).reshape(K, Z * M, Z * M)
-        along = ((shapes @ self.force.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
+        along = ((shapes @ self.load_score.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
         size, turn = np.linalg.eigh(whole)
         told = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
         along = (along @ turn) * _STRENGTHS[:, None]
         return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
 
 
-def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt: float = DOUBT) -> Inferred:
+def infer(
+    cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
+) -> Inferred:
     """Invert ``cases``, which share the nominal genes; ValueError where there is none.
 
     Kinds of load are averaged over; rods that move otherwise are told where nothing else does as well.
@@ -213,7 +217,7 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
         raise ValueError("no recording to infer a load from; give at least one")
     if probe.turning and (chord is None or len(chord) != len(probe.stations)):
         raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
-    normals = [_Normal(case) for case in cases]
+    normals = [_NormalEquations(case) for case in cases]
     families = [smooth(probe, chord), placed(probe, chord), driven(probe)]
     forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
     evidence = np.array(
@@ -224,15 +228,15 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     ).transpose(1, 0, 2)  # [forms, R, strengths]
     best = evidence.max(axis=2)
     total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
-    weight = np.exp((total - total.max()) / max(doubt * float(total.max()), 1.0))
+    weight = np.exp((total - total.max()) / max(response_error * float(total.max()), 1.0))
     driving = np.array([form.family.driven for form in forms])
     weight[driving != driving[np.argmax(total)]] = 0.0  # loads that do as well as rods are huge ones at the root
-    kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
+    kept = [int(k) for k in np.argsort(-weight)[:_MAX_KINDS] if weight[k] >= _MIN_RELATIVE_PROBABILITY]
     kinds = []
     for k in kept:
         family, number, _ = form = forms[k]
         strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
-        solved = _solved(normals, [strength * form.root for strength in strengths])
+        solved = _posterior(normals, [strength * form.root for strength in strengths])
         kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], family.driven, *solved))
     return Inferred(
         probe,
@@ -244,10 +248,10 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     )
 
 
-def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array]:
+def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> tuple[Array, Array]:
     """Loads [R, P] and their covariance [R, P, P], the genes free: the loads are eliminated first."""
     F = len(normals[0].s)
-    precision, slope = np.eye(F) / GENES**2, np.zeros(F)
+    precision, slope = np.eye(F) / GENE_ERROR_SD**2, np.zeros(F)
     inner = []
     for one, root in zip(normals, roots, strict=True):
         V = root @ np.linalg.solve(np.eye(root.shape[1]) + root.T @ one.A @ root, root.T)
@@ -281,12 +285,12 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
     )
 
 
-def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
+def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
     """Where and when the load acts, over all recordings that show one; None where none does.
 
     From draws of what the data leave possible. The centre in the beat is that of what is larger than half of the most.
     """
-    shown = np.flatnonzero(inferred.evidence > TOLD)
+    shown = np.flatnonzero(inferred.evidence > MIN_EVIDENCE)
     if not len(shown):
         return None
     rng = np.random.default_rng(seed)
@@ -296,7 +300,7 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
     for kind, count in zip(inferred.kinds, draws, strict=True):
         if not count:
             continue
-        fields = _drawn(inferred, kind, shown, phase, int(count), rng)
+        fields = _posterior_draws(inferred, kind, shown, phase, int(count), rng)
         if kind.driven:
             pass
         elif kind.centre is not None and kind.width is not None:
@@ -308,30 +312,29 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
         during.append(np.abs(over).sum(axis=(0, 2)))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
     if inferred.driven:
-        return LoadPlace(None, (0.0, 1.0), *_during(phase, np.concatenate(during)))
-    span, reach = _along(np.concatenate(along))
+        return LoadPlace(None, (0.0, 1.0), *_phase_location(phase, np.concatenate(during)))
+    span, extent = _span_location(np.concatenate(along))
     likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
     if likeliest is not None and inferred.placed > 0.5:  # the mean of all places lies between root and tip
-        span = _told(likeliest.centre, span)
-        chord = _told(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
-    return LoadPlace(span, reach, *_during(phase, np.concatenate(during)), chord)
+        span = _with_interval(likeliest.centre, span)
+        chord = (
+            _with_interval(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
+            if chords
+            else None
+        )
+    return LoadPlace(span, extent, *_phase_location(phase, np.concatenate(during)), chord)
 
 
-def _told(value: float | None, draws: Interval) -> Interval:
+def _with_interval(value: float | None, draws: Interval) -> Interval:
     """``value`` with the interval of draws, which it may lie at an end of."""
     if value is None or draws.low is None or draws.high is None:
         return draws
     return Interval(value, min(draws.low, value), max(draws.high, value))
 
 
-def _drawn(
-    inferred: Inferred,
-    kind: Kind,
-    shown: npt.NDArray[np.int64],
-    phase: Array,
-    count: int,
-    rng: np.random.Generator,
+def _posterior_draws(
+    inferred: Inferred, kind: Kind, shown: npt.NDArray[np.int64], phase: Array, count: int, rng: np.random.Generator
 ) -> Array:
     """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square.
 
@@ -341,14 +344,14 @@ def _drawn(
     for r in shown:
         size, turn = np.linalg.eigh(kind.covariance[r])
         off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
-        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.told].reshape(count, places.shape[1], -1)
+        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.reported].reshape(count, places.shape[1], -1)
         series = inferred.probe.terms(phase + inferred.crossings[r])
         field = np.einsum("sj,cjk,pk->csp", places, sizes, series, optimize=True)
         found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))
     return np.array(found)
 
 
-def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
+def _span_location(size: Array) -> tuple[Interval, tuple[float, float]]:
     """Centre of loads of sizes [draws, span] with its interval, and the part of the span with 90 % of them."""
     share = size / size.sum(axis=1, keepdims=True)
     centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
@@ -357,12 +360,12 @@ def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
     return Interval(*centre.tolist()), (float(first), float(last))
 
 
-def _during(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
+def _phase_location(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
     """The same in the beat, for sizes [draws, phase]."""
     peak = np.where(size > 0.5 * size.max(axis=1, keepdims=True), size, 0.0)
     turns = peak @ np.exp(2j * np.pi * phase) / peak.sum(axis=1)
     middle = turns.mean()
-    if np.abs(middle) < SPREAD:
+    if np.abs(middle) < MIN_PHASE_CONCENTRATION:
         return None, (0.0, 1.0)
     centre = float(np.angle(middle) / (2 * np.pi)) % 1.0
     off = np.quantile(np.angle(turns / middle) / (2 * np.pi), [0.05, 0.95])

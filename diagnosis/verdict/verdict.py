@@ -10,12 +10,12 @@ import numpy as np
 from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from wingfit.diagnosis.subject import Suspect
-from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 
-LISTED = 12  # suspects that were not refitted and are told all the same
+MAX_SCREENED_LISTED = 12  # suspects that were not refitted and are told all the same
 
 
 @dataclass(frozen=True)
@@ -29,35 +29,35 @@ class Decision:
     best: Refit
 
 
-def decided(weighed: Weighed) -> Decision:
+def decide(weights: HypothesisWeights) -> Decision:
     """Which verdict the probabilities of the hypotheses make."""
-    policy = weighed.policy
-    nominal, effects = float(weighed.probabilities[0]), weighed.probabilities[1:]
-    refits = weighed.refits[1:]
+    policy = weights.policy
+    nominal, effects = float(weights.probabilities[0]), weights.probabilities[1:]
+    refits = weights.refits[1:]
     probability: dict[str, float] = dict.fromkeys(VERDICTS, 0.0)
-    probability["adequate"], probability["unnamed"] = nominal, weighed.unknown
+    probability["adequate"], probability["unnamed"] = nominal, weights.unknown
     total = float(effects.sum())
     possible: list[Refit] = []
-    best = weighed.refits[0]
+    best = weights.refits[0]
     if len(effects):
         top = int(np.argmax(effects))
         possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= policy.possible * max(total, 1e-300)]
-        sure = refits[top] if effects[top] >= policy.single * total else _shared(possible)
-        one: Verdict = "measurement fault" if sure and _measured(sure) else "named"
+        sure = refits[top] if effects[top] >= policy.single * total else _common_subset(possible)
+        one: Verdict = "measurement fault" if sure and _is_measurement_fault(sure) else "named"
         if sure:
             holds = [set(sure.names) <= set(refit.names) for refit in refits]
             probability[one] = float(effects[holds].sum())
         probability["ambiguous"] = total - probability[one]
-    lacking = total + weighed.unknown
+    missing = total + weights.unknown
     verdict: Verdict
-    if nominal >= lacking:
+    if nominal >= missing:
         verdict = "adequate"
-    elif total >= policy.listed * lacking:
+    elif total >= policy.listed * missing:
         verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
-        if weighed.evidence[1:].max(initial=0.0) > policy.least_evidence:  # the nearest is put in if it earns it
-            best = refits[int(np.argmax(weighed.evidence[1:]))]
+        if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # the nearest is put in if it earns it
+            best = refits[int(np.argmax(weights.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()
     if verdict == "ambiguous":
@@ -67,55 +67,61 @@ def decided(weighed: Weighed) -> Decision:
     return Decision(verdict, probability, named, alike, best)
 
 
-def _shared(possible: Sequence[Refit]) -> Refit | None:
+def _common_subset(possible: Sequence[Refit]) -> Refit | None:
     """The one of them that all others only add to: it is what lacks, whether or not more does. None without one."""
     return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 
-def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:
+def hypotheses(
+    data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]]
+) -> tuple[Hypothesis, ...]:
     """All that was weighed, most probable first, then what was only tested, by score."""
-    order = np.argsort(-weighed.probabilities, kind="stable")
+    order = np.argsort(-weights.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
-    told = [_weighed(stack, weighed, int(k), gains) for k in order]
-    known = {refit.names for refit in weighed.refits}
+    texts = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
+    known = {refit.names for refit in weights.refits}
     rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
-    start = max(weighed.refits[0].excess, 0.0) / stack.noise**2
-    return (*told, *(_tested(trial, start, stack) for trial in rest[:LISTED]))
+    start = max(weights.refits[0].excess, 0.0) / data.noise**2
+    return (*texts, *(_screened_hypothesis(trial, start, data) for trial in rest[:MAX_SCREENED_LISTED]))
 
 
-def _weighed(stack: Stack, weighed: Weighed, k: int, gains: Mapping[str, Trial]) -> Hypothesis:
-    refit, nominal = weighed.refits[k], weighed.refits[0]
+def _refitted_hypothesis(
+    data: WhitenedData, weights: HypothesisWeights, k: int, gains: Mapping[str, Trial]
+) -> Hypothesis:
+    refit, nominal = weights.refits[k], weights.refits[0]
     suspects = [trial.suspect for trial in refit.trials]
     predicted = None
     if refit.predicted is not None and nominal.predicted is not None:
-        predicted = _part(refit.predicted, nominal.predicted)
+        predicted = _explained_fraction(refit.predicted, nominal.predicted)
     return Hypothesis(
         effects=refit.names,
         title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
         family=suspects[0].family if suspects else "",
         source="; ".join(s.source for s in suspects),
         signature="; ".join(s.signature for s in suspects),
-        probability=float(weighed.probabilities[k]),
-        evidence=float(weighed.evidence[k]),
+        probability=float(weights.probabilities[k]),
+        evidence=float(weights.evidence[k]),
         score=sum(gains[s.name].gain for s in suspects if s.name in gains),
         freedom=refit.freedom,
-        explained=_part(refit.excess, nominal.excess),
+        explained=_explained_fraction(refit.excess, nominal.excess),
         predicted=predicted,
-        misfit=float(np.sqrt(max(refit.excess, 0.0) + stack.noise**2)),
+        misfit=float(np.sqrt(max(refit.excess, 0.0) + data.noise**2)),
         refitted=True,
-        genes=effect_genes(stack, refit),
+        genes=effect_genes(data, refit),
     )
 
 
-def _part(left: float, before: float) -> float:
+def _explained_fraction(left: float, before: float) -> float:
     """Which part of a mean square beyond the noise is gone; of nothing, nothing."""
     return float(np.clip(1.0 - max(left, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
-def _tested(trial: Trial, start: float, stack: Stack) -> Hypothesis:
-    suspect, samples = trial.suspect, len(stack.scale)
+def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypothesis:
+    suspect, samples = trial.suspect, len(data.scale)
     by_chance = np.sqrt(2.0 * samples)  # of chi-squared
-    explained = float(np.clip(trial.gain / max(trial.gain + trial.leaves - samples, by_chance), 0.0, 1.0))
+    explained = float(
+        np.clip(trial.gain / max(trial.gain + trial.remaining_chi_squared - samples, by_chance), 0.0, 1.0)
+    )
     left = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),
@@ -129,36 +135,36 @@ def _tested(trial: Trial, start: float, stack: Stack) -> Hypothesis:
         trial.freedom,
         explained,
         None,
-        float(stack.noise * np.sqrt(1.0 + left)),
+        float(data.noise * np.sqrt(1.0 + left)),
         False,
     )
 
 
-def effect_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+def effect_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """Genes of the suspects of a refit."""
     own = {gene.name for trial in refit.trials for gene in trial.suspect.genes}
-    return tuple(gene for gene in all_genes(stack, refit) if gene.name in own)
+    return tuple(gene for gene in all_genes(data, refit) if gene.name in own)
 
 
-def all_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+def all_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """All free genes of a refit."""
-    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.sizes}
-    return gene_values(stack, refit.fit, off)
+    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
+    return gene_values(data, refit.fit, off)
 
 
-def _measured(refit: Refit) -> bool:
+def _is_measurement_fault(refit: Refit) -> bool:
     return bool(refit.trials) and all(trial.suspect.family == "measurement" for trial in refit.trials)
 
 
-def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
+def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[str, str]) -> str:
     """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
     names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
-    start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
+    start = f"After the best refit the nominal model leaves {texts['before']}; the noise is {texts['noise']}."
     if decision.verdict == "adequate":
         return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
     if decision.verdict == "unnamed":
-        return f"Something is lacking that nothing in the library explains: {told['where']}. {start} " + (
-            f"The nearest that there is, {nearest}, leaves {told['after']}."
+        return f"Something is lacking that nothing in the library explains: {texts['where']}. {start} " + (
+            f"The nearest that there is, {nearest}, leaves {texts['after']}."
             if nearest
             else "No effect takes as much of it as it costs, and none was put in."
         )
@@ -166,7 +172,7 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[s
         either = " or ".join(_titles(suspects, found, " with ") for found in decision.alike) or names
         return (
             f"Something is lacking, and these recordings cannot tell which: {either}. {start} The best leaves "
-            f"{told['after']}. {told['held_out']}"
+            f"{texts['after']}. {texts['held_out']}"
         )
     kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
     link = ": " if decision.verdict == "measurement fault" else " "
@@ -177,7 +183,7 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[s
     instead = [_titles(suspects, one, " with ") for one in others]
     more = f" Whether {_titles(suspects, list(besides), ' or ')} is lacking besides is open." if besides else ""
     more += f" Less probable, but possible instead: {' or '.join(instead)}." if instead else ""
-    return f"{kind}{link}{names}.{more} {start} With it the misfit is {told['after']}. {told['held_out']}"
+    return f"{kind}{link}{names}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
 
 
 def _titles(suspects: Mapping[str, Suspect], names: Sequence[str], between: str = " and ") -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.location.missing_load import Case, decorrelated
+from wingfit.diagnosis.location.missing_load import Case, whitened
 from wingfit.records import Condition, Recording
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.solver.numerics import Numerics
@@ -123,7 +123,7 @@ def of_samples(
     seen = np.isfinite(residuals)
     both = np.concatenate([-residuals[..., None], np.nan_to_num(responses), sensitivities], axis=2) / NOISE
     white = np.concatenate(
-        [decorrelated(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) for c in range(residuals.shape[1])]
+        [whitened(both[seen[:, c], c], np.flatnonzero(seen[:, c]), memory) for c in range(residuals.shape[1])]
     )
     P = responses.shape[2]
     return Case(name, white[:, 0], white[:, 1 : 1 + P], white[:, 1 + P :], crossing)

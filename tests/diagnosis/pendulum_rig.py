@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.subject import Family, Place, Suspect
+from wingfit.diagnosis.subject import ChannelLocation, Family, Suspect
 from wingfit.records import Condition, Gene, Recording
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.model import Array, Model, Observation, genome_batch
@@ -28,7 +28,7 @@ MARKERS = {"inner": 0.10, "middle": 0.17, "outer": 0.24}  # m from the axis
 TORQUE = (0.015,)  # N m: cosines of the motor's torque, from the first harmonic on
 SLIDING = 0.3  # rad/s: friction is 3/4 of dry friction at this rate
 HARMONICS, SAMPLES = 11, 128
-STEPS, HALVINGS, BALANCED = 12, 6, 1e-11  # N m
+STEPS, MAX_HALVINGS, BALANCED = 12, 6, 1e-11  # N m
 PARTS = ((1.0,), (0.1, 0.25, 0.5, 0.75, 1.0))  # of what is not linear, one after the other: at once, or with care
 FRAMES, PER_BEAT = 124, 30  # strobed: each frame is of another beat
 FREQUENCIES = (1.2, 1.7, 2.0, 2.7, 3.4)  # Hz; the nominal pendulum's own is 2.25 Hz
@@ -224,7 +224,7 @@ def _balanced(law: _Law, rate: float, dynamic: Array, drive: Array, motion: Arra
         if not np.isfinite(size):
             break
         step = np.linalg.solve(slope, now)
-        for part in 0.5 ** np.arange(HALVINGS):
+        for part in 0.5 ** np.arange(MAX_HALVINGS):
             then, other = left(motion - part * step)
             if np.linalg.norm(then) < size:
                 break
@@ -245,39 +245,39 @@ class PendulumRig:
         return ((-0.005, 0.0), (-0.005, REACH), (0.005, REACH), (0.005, 0.0), (-0.005, 0.0))
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         return "torsional pendulum of one degree of freedom"
 
     def extended(self, names: Sequence[str]) -> Pendulum:
         return replace(self.model, effects=(*self.model.effects, *names))
 
-    def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
         return model
 
-    def finer(self) -> tuple[()]:
+    def finer_subjects(self) -> tuple[()]:
         """None: a pendulum is one body."""
         return ()
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
         return tuple(
-            Place(name, axis, MARKERS[name] / REACH, 0.5, 0.0, MARKERS[name])
+            ChannelLocation(name, axis, MARKERS[name] / REACH, 0.5, 0.0, MARKERS[name])
             for name in recording.markers
             for axis in "xyz"
         )
 
-    def origin(self, recording: Recording) -> float:  # noqa: ARG002
+    def beat_start_phase(self, recording: Recording) -> float:  # noqa: ARG002
         """Times count from the start of a beat."""
         return 0.0
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
         empty = blank(condition)
         seen = model.observe(genome[None], empty)
         return None if seen.reasons[0] else replace(empty, values=seen.channels[0])
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> None:
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> None:
         """None: it has no span."""
 
-    def conditions(self) -> tuple[Condition, ...]:
+    def candidate_conditions(self) -> tuple[Condition, ...]:
         """From the lowest frequency to the highest, between those that are recorded."""
         return tuple(at(float(f)) for f in np.linspace(FREQUENCIES[0], FREQUENCIES[-1], 12)[1:-1])
 

@@ -26,7 +26,7 @@ from tests.diagnosis.pendulum_rig import (
 )
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, check
-from wingfit.diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
+from wingfit.diagnosis.rigs import MAX_BODIES, MAX_CONDITIONS, VehicleSubject, WingSubject, subject_of
 from wingfit.diagnosis.subject import Subject
 from wingfit.records import Dataset, LowPass, Wing
 from wingfit.sim.effects.ports.markers import nearest
@@ -75,9 +75,9 @@ def test_suspects_put_in_and_switched_off_change_nothing(subjects: dict[str, Sub
     own = len(subject.model.genes)
     assert extended.genes[:own] == tuple(subject.model.genes)
     assert extended.genes[own:] == tuple(gene for suspect in subject.suspects for gene in suspect.genes)
-    condition = subject.conditions()[0]
-    with_all = subject.shown(extended, np.array([gene.nominal for gene in extended.genes]), condition)
-    own_alone = subject.shown(subject.model, nominal(subject)[0], condition)
+    condition = subject.candidate_conditions()[0]
+    with_all = subject.simulated_recording(extended, np.array([gene.nominal for gene in extended.genes]), condition)
+    own_alone = subject.simulated_recording(subject.model, nominal(subject)[0], condition)
     assert with_all is not None
     assert own_alone is not None
     assert with_all.values.tobytes() == own_alone.values.tobytes()
@@ -87,10 +87,10 @@ def test_suspects_put_in_and_switched_off_change_nothing(subjects: dict[str, Sub
 def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str) -> None:
     for suspect in subjects[rig].suspects:
         names = [gene.name for gene in suspect.genes]
-        assert set(suspect.sizes) <= set(names) == set(suspect.typical)
-        assert set(suspect.places.values()) <= set(suspect.shapes)
-        assert all(gene.nominal == 0.0 for gene in suspect.genes if gene.name in suspect.sizes)
-        assert any(suspect.typical[name] != 0.0 for name in suspect.sizes)
+        assert set(suspect.size_genes) <= set(names) == set(suspect.typical)
+        assert set(suspect.location_genes.values()) <= set(suspect.shape_genes)
+        assert all(gene.nominal == 0.0 for gene in suspect.genes if gene.name in suspect.size_genes)
+        assert any(suspect.typical[name] != 0.0 for name in suspect.size_genes)
         for gene in suspect.genes:
             gene.check(suspect.typical[gene.name])
         assert suspect.source
@@ -101,24 +101,24 @@ def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str
 def test_what_is_shown_is_what_would_be_recorded(subjects: dict[str, Subject], rig: str) -> None:
     """All channels under every condition proposed, aligned: the model that showed it meets it, and it begins a beat."""
     subject = subjects[rig]
-    conditions = subject.conditions()
-    assert 5 < len(conditions) <= MOST_CONDITIONS
+    conditions = subject.candidate_conditions()
+    assert 5 < len(conditions) <= MAX_CONDITIONS
     assert len(set(conditions)) == len(conditions)
     for condition in conditions[::13]:
-        shown = subject.shown(subject.model, nominal(subject)[0], condition)
+        shown = subject.simulated_recording(subject.model, nominal(subject)[0], condition)
         assert shown is not None
         assert shown.condition == condition
         assert shown.valid.all()
-        assert len(subject.places(shown)) == shown.values.shape[1] == len(shown.channels)
+        assert len(subject.channel_locations(shown)) == shown.values.shape[1] == len(shown.channels)
         np.testing.assert_allclose(subject.model.observe(nominal(subject), shown).channels[0], shown.values, atol=1e-9)
-        assert subject.origin(shown) == pytest.approx(0.0, abs=1e-6)
+        assert subject.beat_start_phase(shown) == pytest.approx(0.0, abs=1e-6)
 
 
 def test_what_cannot_be_simulated_is_not_shown(subjects: dict[str, Subject]) -> None:
     subject = subjects["wing"]
     genome = nominal(subject)[0]
     genome[[gene.name for gene in subject.model.genes].index("L_a")] = 1e6
-    assert subject.shown(subject.model, genome, subject.conditions()[0]) is None
+    assert subject.simulated_recording(subject.model, genome, subject.candidate_conditions()[0]) is None
 
 
 def test_a_wing_of_effects_has_them_in_its_nominal_model(wing: Dataset) -> None:
@@ -127,7 +127,7 @@ def test_a_wing_of_effects_has_them_in_its_nominal_model(wing: Dataset) -> None:
     assert "hinge_offset" in subject.model.effects
     assert "hinge_offset" not in {suspect.name for suspect in subject.suspects}
     assert "hinge_offset" in {suspect.name for suspect in subject_of(wing, FEW).suspects}
-    assert "Hinge offset" in subject.told
+    assert "Hinge offset" in subject.description
 
 
 def test_a_term_of_a_vehicle_is_no_suspect_and_one_left_out_is(vehicle: Dataset) -> None:
@@ -136,7 +136,7 @@ def test_a_term_of_a_vehicle_is_no_suspect_and_one_left_out_is(vehicle: Dataset)
     apart = replace(vehicle, rig=replace(vehicle.vehicle, claps=False))
     assert lacks - has == {"clap_and_peel"}
     assert {s.name for s in subject_of(apart, CalibrationSpec(without=("clap_and_peel",))).suspects} == has
-    assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).told
+    assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).description
 
 
 def test_what_cannot_be_diagnosed_is_refused_before_anything_is_simulated(wing: Dataset) -> None:
@@ -162,7 +162,7 @@ def test_what_cannot_be_diagnosed_is_refused_before_anything_is_simulated(wing: 
 
 def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:
     subject, recording = subjects["wing"], wing.recordings[0]
-    places = subject.places(recording)
+    places = subject.channel_locations(recording)
     stations = wing.wing.stations
     for place, channel in zip(places, recording.channels, strict=True):
         assert channel == f"{place.name}_{place.axis}"
@@ -182,9 +182,9 @@ def test_a_fault_of_a_marker_is_tried_at_every_marker(wing: Dataset) -> None:
     rig, suspects = wing.rig, {s.name: s for s in subject_of(wing, CalibrationSpec()).suspects}
     assert isinstance(rig, Wing)
     for name in ("marker_slip", "marker_swap"):
-        station, chord = np.array(suspects[name].spots).T
+        station, chord = np.array(suspects[name].candidate_shapes).T
         assert nearest(rig, {"station": station, "chord": chord})[:, 0].tolist() == list(range(len(rig.markers)))
-    assert suspects["lumped_mass"].spots == ()
+    assert suspects["lumped_mass"].candidate_shapes == ()
 
 
 def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject], wing: Dataset) -> None:
@@ -193,12 +193,12 @@ def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject
     while True:
         coarse = subject.model.structure.division
         divisions.append(coarse.total)
-        finer = subject.finer()
+        finer = subject.finer_subjects()
         for one in finer:
             fine = one.model.structure.division
             assert len(fine.bodies) > len(coarse.bodies)
             assert max(fine.bodies) >= max(coarse.bodies)
-            assert coarse.total < fine.total <= MOST_BODIES
+            assert coarse.total < fine.total <= MAX_BODIES
         if not finer:
             break
         subject = finer[-1]
@@ -206,16 +206,19 @@ def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject
     assert len(divisions) > 2
     eleven = subject_of(wing, CalibrationSpec(division="11"))
     assert isinstance(eleven, WingSubject)
-    assert [one.model.structure.division.bodies for one in eleven.finer()] == [(3,) * 6, (4,) * 6]
+    assert [one.model.structure.division.bodies for one in eleven.finer_subjects()] == [(3,) * 6, (4,) * 6]
 
 
 def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
     """Of 4 bodies, against a wing finer than any that a diagnosis compares with."""
     subject = subjects["wing"]
     assert isinstance(subject, WingSubject)
-    finer = subject.finer()[-1]
+    finer = subject.finer_subjects()[-1]
     best = FlexibleWing(subject.model.wing, "10x6")
-    found = [subject.shown(model, nominal(subject)[0], SMALL[5][0]) for model in (subject.model, finer.model, best)]
+    found = [
+        subject.simulated_recording(model, nominal(subject)[0], SMALL[5][0])
+        for model in (subject.model, finer.model, best)
+    ]
     coarse, fine, true = (one.values for one in found if one is not None)
     told, error = (np.sqrt(np.mean((coarse - other) ** 2)) for other in (fine, true))
     assert told == pytest.approx(error, rel=0.5)
@@ -225,15 +228,15 @@ def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict
 def test_a_finer_vehicle_only_where_it_tells(vehicle: Dataset) -> None:
     subject = subject_of(vehicle, CalibrationSpec())
     assert isinstance(subject, VehicleSubject)
-    assert subject.finer() == (), "40 elements are enough"
+    assert subject.finer_subjects() == (), "40 elements are enough"
     coarse = replace(subject, model=replace(subject.model, elements=3, instants=80))
-    (finer,) = coarse.finer()
+    (finer,) = coarse.finer_subjects()
     assert finer.model.elements == 6
 
 
 def test_conditions_lie_within_what_was_run_and_are_new(subjects: dict[str, Subject], wing: Dataset) -> None:
     recorded_ones = [r.condition for r in wing.recordings]
-    for condition in subjects["wing"].conditions():
+    for condition in subjects["wing"].candidate_conditions():
         assert condition not in recorded_ones
         for name in ("flap_frequency", "phase_lag", "airspeed", "pressure"):
             ran = [getattr(c, name) for c in recorded_ones]
@@ -249,13 +252,13 @@ def test_values_that_jitter_are_one_level(wing: Dataset) -> None:
         replace(r, condition=replace(r.condition, flap_frequency=r.condition.flap_frequency + rng.normal(0, 0.005)))
         for r in wing.recordings
     )
-    found = subject_of(replace(wing, recordings=shaken), FEW).conditions()
+    found = subject_of(replace(wing, recordings=shaken), FEW).candidate_conditions()
     assert len({c.flap_frequency for c in found}) <= 2 * 5, "three and the middles between them, in either rig"
 
 
 def test_nothing_is_proposed_in_free_flight(vehicle: Dataset) -> None:
     flown = tuple(replace(r, rig="free_flight") for r in vehicle.recordings)
-    assert subject_of(replace(vehicle, recordings=flown), CalibrationSpec()).conditions() == ()
+    assert subject_of(replace(vehicle, recordings=flown), CalibrationSpec()).candidate_conditions() == ()
 
 
 # -- the third rig ---------------------------------------------------------------------------------------------
@@ -371,8 +374,8 @@ def test_the_pendulum_is_fast_and_hardly_ever_fails() -> None:
 
 def test_forces_are_shown_as_they_would_be_fitted(vehicle: Dataset) -> None:
     through, whole = (subject_of(vehicle, CalibrationSpec(low_pass=low_pass)) for low_pass in (None, 0.0))
-    condition, genome = through.conditions()[0], nominal(through)[0]
-    filtered, plain = (one.shown(one.model, genome, condition) for one in (through, whole))
+    condition, genome = through.candidate_conditions()[0], nominal(through)[0]
+    filtered, plain = (one.simulated_recording(one.model, genome, condition) for one in (through, whole))
     assert filtered is not None
     assert plain is not None
     assert plain.low_pass is None

@@ -12,18 +12,18 @@ import pytest
 
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec
-from wingfit.diagnosis.evidence.competing_fits import Entry
+from wingfit.diagnosis.evidence.competing_fits import StartPoint
 from wingfit.diagnosis.evidence.screen import Trial
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _alike, _exchanges, assess
-from wingfit.diagnosis.search_state import Assessment
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, search_missing_physics
+from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
 
-def trial(name: str, *, alike: tuple[str, ...] = ()) -> Trial:
+def trial(name: str, *, confused_with: tuple[str, ...] = ()) -> Trial:
     """A suspect of the pendulum at its typical genes, which looks like those that are ``alike``."""
-    suspect = replace(next(one for one in SUSPECTS if one.name == name), alike=alike)
+    suspect = replace(next(one for one in SUSPECTS if one.name == name), confused_with=confused_with)
     count = len(suspect.genes)
     return Trial(suspect, np.full((1, count), 0.4), np.zeros((1, 1)), 0.0, np.ones(1), count, 0.0)
 
@@ -43,47 +43,57 @@ def known(evidence: Sequence[float], *refits: Any) -> Any:
 
 def state(*tried: Trial) -> Any:
     """An assessment in which these were ``tried``, beside noise of 1."""
-    stack = SimpleNamespace(noise=1.0, uncertainty=0.0, policy=POLICY)
-    return SimpleNamespace(stack=stack, trials=[[one] for one in tried])
+    data = SimpleNamespace(noise=1.0, excess_standard_error=0.0, policy=POLICY)
+    return SimpleNamespace(data=data, trials=[[one] for one in tried])
 
 
-def names(entries: Sequence[Entry]) -> list[tuple[str, ...]]:
-    return [tuple(one.suspect.name for one in entry.trials) for entry in entries]
+def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
+    return [tuple(one.suspect.name for one in entry.trials) for entry in start_points]
 
 
 def test_single_explanations_that_are_hard_to_tell_apart_race() -> None:
     mass, cubic, gain = refit(trial("point_mass")), refit(trial("cubic")), refit(trial("gain"))
     close = known([40.0, 40.0 - 0.9 * POLICY.overtake, 40.0 - 1.1 * POLICY.overtake], mass, cubic, gain)
-    assert names(_alike(close)) == [("point_mass",), ("point_mass",), ("cubic",)]  # what has a place, from two places
-    assert _alike(known([40.0, 0.9 * POLICY.overtake], mass, cubic)) == []
-    assert _alike(known([4.0, -0.1], mass, cubic)) == [], "what explains nothing is no rival"
-    assert _alike(known([])) == []
+    assert names(_indistinguishable(close)) == [
+        ("point_mass",),
+        ("point_mass",),
+        ("cubic",),
+    ]  # what has a place, from two places
+    assert _indistinguishable(known([40.0, 0.9 * POLICY.overtake], mass, cubic)) == []
+    assert _indistinguishable(known([4.0, -0.1], mass, cubic)) == [], "what explains nothing is no rival"
+    assert _indistinguishable(known([])) == []
 
 
 def test_explanations_of_several_do_not() -> None:
     both = refit(trial("cubic"), trial("gain"))
-    assert _alike(known([40.0, 39.0], refit(trial("cubic")), both)) == []
+    assert _indistinguishable(known([40.0, 39.0], refit(trial("cubic")), both)) == []
 
 
 def test_each_part_is_exchanged_for_what_it_is_confused_with() -> None:
-    cubic, gain, delay = trial("cubic", alike=("gain", "point_mass", "unheard_of")), trial("gain"), trial("delay")
-    found = _exchanges(state(cubic, gain, delay), cast("Any", refit(cubic, delay)))
+    cubic, gain, delay = (
+        trial("cubic", confused_with=("gain", "point_mass", "unheard_of")),
+        trial("gain"),
+        trial("delay"),
+    )
+    found = _look_alikes(state(cubic, gain, delay), cast("Any", refit(cubic, delay)))
     assert names(found) == [("delay", "gain")], "a mass was never tried"
     np.testing.assert_allclose(found[0].unit[0], 0.8)  # the delay stays where it was fitted
-    assert names(_exchanges(state(cubic, gain), cast("Any", refit(cubic, gain)))) == [], "it is in it already"
+    assert names(_look_alikes(state(cubic, gain), cast("Any", refit(cubic, gain)))) == [], "it is in it already"
 
 
 def test_what_leaves_no_more_than_noise_is_not_exchanged() -> None:
-    cubic, gain = trial("cubic", alike=("gain",)), trial("gain")
-    assert names(_exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
-    assert _exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
+    cubic, gain = trial("cubic", confused_with=("gain",)), trial("gain")
+    assert names(_look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
+    assert _look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
 
 
 def test_fits_from_the_estimates_begin_there_whatever_a_calibration_ended_with() -> None:
     rig = PendulumRig()
-    known = Assessment(rig, Stack.of(recorded({})))
-    steps = assess(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
+    known = SearchState(rig, WhitenedData.of(recorded({})))
+    steps = search_missing_physics(
+        known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator()
+    )
     next(steps)
     next(steps)
-    assert known.begun is not None
-    assert known.begun[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})
+    assert known.initial_fit is not None
+    assert known.initial_fit[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})

@@ -9,20 +9,20 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from wingfit.diagnosis.location.differences import _along
-from wingfit.diagnosis.subject import Place
+from wingfit.diagnosis.location.differences import _extent_along
+from wingfit.diagnosis.subject import ChannelLocation
 
 
 def misfit(stations: Sequence[float], sizes: Sequence[float]) -> Any:
     """One recording, of a marker at each of the ``stations`` with a mean square misfit of such ``sizes``."""
-    view = SimpleNamespace(weight=np.ones(1))
-    places = tuple(Place(f"m{k}", "z", at, 0.5, 0.0, at) for k, at in enumerate(stations))
+    beat_fit = SimpleNamespace(weight=np.ones(1))
+    places = tuple(ChannelLocation(f"m{k}", "z", at, 0.5, 0.0, at) for k, at in enumerate(stations))
     coefficients = np.sqrt(np.array(sizes, float))[:, None]
-    return [SimpleNamespace(view=view, places=places, coefficients=coefficients, variance=np.zeros(1))]
+    return [SimpleNamespace(beat_fit=beat_fit, locations=places, coefficients=coefficients, variance=np.zeros(1))]
 
 
 def along(stations: Sequence[float], sizes: Sequence[float]) -> tuple[float, float, float]:
-    found = _along(cast("Any", misfit(stations, sizes)), "span")
+    found = _extent_along(cast("Any", misfit(stations, sizes)), "span")
     assert found is not None
     assert found.low is not None
     assert found.high is not None
@@ -48,4 +48,4 @@ def test_several_markers_at_a_station_are_one() -> None:
 
 
 def test_no_misfit_has_no_place() -> None:
-    assert _along(cast("Any", misfit([0.2, 0.8], [0.0, 0.0])), "span") is None
+    assert _extent_along(cast("Any", misfit([0.2, 0.8], [0.0, 0.0])), "span") is None

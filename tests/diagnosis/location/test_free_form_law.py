@@ -44,13 +44,13 @@ def heavier() -> tuple[tuple[Case, ...], tuple[StationMotion, ...]]:
     return tuple(one for one, _ in found), tuple(answers.motion for _, answers in found)
 
 
-def lacking(loads: Sequence[Array], seed: int = 0) -> list[Case]:
+def cases_with(loads: Sequence[Array], seed: int = 0) -> list[Case]:
     """Cases that lack loads [J, N] at the motions' phases, and noise."""
     rng, cases = np.random.default_rng(seed), []
     for one, motion, load in zip(*heavier(), loads, strict=True):
         series = np.linalg.pinv(PROBE.terms(motion.phase + one.crossing))
         sizes = (load @ series.T).ravel()
-        cases.append(replace(one, lacking=one.responses @ sizes + rng.standard_normal(len(one.lacking))))
+        cases.append(replace(one, residual=one.responses @ sizes + rng.standard_normal(len(one.residual))))
     return cases
 
 
@@ -66,17 +66,12 @@ def test_added_mass_is_told_from_tracks_with_its_coefficient() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "coefficient"),
-    [
-        ("rho c |V_n| V_n (outer 40 % of the span)", -2.0),
-        ("sign V_n", -1.0),
-        ("w^3", -2e5),
-    ],
+    ("name", "coefficient"), [("rho c |V_n| V_n (outer 40 % of the span)", -2.0), ("sign V_n", -1.0), ("w^3", -2e5)]
 )
 def test_laws_of_the_dictionary_are_found_again(name: str, coefficient: float) -> None:
     motions = heavier()[1]
     (candidate,) = (one for one in candidates() if one.name == name)
-    law = free_law(lacking([coefficient * candidate.field(motion) for motion in motions]), PROBE, motions)
+    law = free_law(cases_with([coefficient * candidate.field(motion) for motion in motions]), PROBE, motions)
     assert law is not None
     assert law.terms[0].feature == name
     low, high = law.terms[0].coefficient.low, law.terms[0].coefficient.high
@@ -93,7 +88,7 @@ def test_loads_of_no_law_predict_nothing() -> None:
     motions, rng = heavier()[1], np.random.default_rng(8)
     hats = PROBE.hats(np.array(PROBE.stations))
     loads = [hats @ rng.standard_normal((5, 17)) @ PROBE.terms(motion.phase).T for motion in motions]
-    law = free_law(lacking(loads), PROBE, motions)
+    law = free_law(cases_with(loads), PROBE, motions)
     assert law is not None
     assert law.terms == ()
     assert law.explained < 0.1

@@ -23,8 +23,8 @@ from tests.diagnosis.loaded import (
     pushed,
 )
 from wingfit.diagnosis.finding import Interval
-from wingfit.diagnosis.location.missing_load import PHASES, Case, LoadPlace, infer, missing_loads, place
-from wingfit.diagnosis.location.unexplained import missing_force
+from wingfit.diagnosis.location.missing_load import PHASES, Case, LoadPlace, infer, locate_load, missing_loads
+from wingfit.diagnosis.location.missing_physics import missing_force
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import Probed
 
@@ -58,7 +58,7 @@ def hurried_cases(*turns_deg: float) -> tuple[tuple[Case, Probed], ...]:
 
 def test_a_drive_that_hurries_is_no_load() -> None:
     inferred = infer([one for one, _ in hurried_cases(1.0, 1.0)], DRIVING)
-    found = place(inferred)
+    found = locate_load(inferred)
     assert inferred.driven
     assert found is not None
     assert found.span is found.chord is None
@@ -95,7 +95,7 @@ def test_a_push_is_no_drive_that_hurries() -> None:
         found.append(case(model("6x1"), recording, DRIVING)[0])
     inferred = infer(found, DRIVING)
     assert not inferred.driven
-    assert span_of(place(inferred)).value == pytest.approx(PLACE, abs=0.1)
+    assert span_of(locate_load(inferred)).value == pytest.approx(PLACE, abs=0.1)
 
 
 def span_of(found: LoadPlace | None) -> Interval:
@@ -107,13 +107,13 @@ def span_of(found: LoadPlace | None) -> Interval:
 
 def quiet(one: Case, rng: np.random.Generator, size: Array | None = None) -> Case:
     """The same with noise alone, and perhaps a load of a ``size`` [P]."""
-    lacking = rng.standard_normal(len(one.lacking))
-    return replace(one, lacking=lacking if size is None else lacking + one.responses @ size)
+    residual = rng.standard_normal(len(one.residual))
+    return replace(one, residual=residual if size is None else residual + one.responses @ size)
 
 
 def test_a_push_is_found_with_all_genes_free() -> None:
-    inferred = infer([one for one, _ in cases()], PROBE, doubt=0.0)
-    found = place(inferred)
+    inferred = infer([one for one, _ in cases()], PROBE, response_error=0.0)
+    found = locate_load(inferred)
     assert found is not None
     assert found.phase is not None
     assert found.chord is None
@@ -123,9 +123,9 @@ def test_a_push_is_found_with_all_genes_free() -> None:
     assert span.low is not None
     assert span.high is not None
     assert span.high - span.low < 0.35
-    assert found.lasts[0] > WHEN - 0.12
-    assert found.lasts[1] < WHEN + 0.12
-    assert found.reach[0] > 0.2
+    assert found.duration[0] > WHEN - 0.12
+    assert found.duration[1] < WHEN + 0.12
+    assert found.extent[0] > 0.2
     for load in missing_loads(inferred):
         values = np.array(load.values)
         assert values.shape == (len(PROBE.stations), PHASES)
@@ -136,7 +136,10 @@ def test_a_push_is_found_with_all_genes_free() -> None:
 
 
 def test_doubt_about_the_model_widens_the_place() -> None:
-    sure, doubtful = (place(infer([one for one, _ in cases()], PROBE, doubt=doubt)) for doubt in (0.0, 0.002))
+    sure, doubtful = (
+        locate_load(infer([one for one, _ in cases()], PROBE, response_error=response_error))
+        for response_error in (0.0, 0.002)
+    )
     assert abs(span_of(doubtful).value - PLACE) < 0.05
     spans = [span_of(one) for one in (sure, doubtful)]
     ends = [span.high - span.low for span in spans if span.high and span.low]
@@ -152,7 +155,7 @@ def test_where_along_the_chord_it_is_pushed(part: float) -> None:
         genome = pushed(plant, condition, PLACE, WHEN, SIZE, part)
         recording = filmed(plant, genome, condition, np.random.default_rng(k))
         found.append(case(model("6x1"), recording, probe)[0])
-    told = place(infer(found, probe, chord_at(plant, probe.stations)))
+    told = locate_load(infer(found, probe, chord_at(plant, probe.stations)))
     assert told is not None
     assert told.chord is not None
     assert abs(told.chord.value - part) < 0.1
@@ -167,7 +170,7 @@ def test_a_probe_that_turns_needs_the_chord() -> None:
 def test_noise_alone_is_no_load() -> None:
     rng = np.random.default_rng(5)
     for _ in range(5):
-        assert place(infer([quiet(one, rng) for one, _ in cases()], PROBE)) is None
+        assert locate_load(infer([quiet(one, rng) for one, _ in cases()], PROBE)) is None
 
 
 def test_errors_are_what_estimates_are_off_by() -> None:
@@ -182,7 +185,7 @@ def test_errors_are_what_estimates_are_off_by() -> None:
         sizes = [np.outer(shape, fall * rng.standard_normal(len(fall))).ravel() for _ in cases()]
         drawn = [quiet(one, rng, 2.0 * size) for (one, _), size in zip(cases(), sizes, strict=True)]
         phase = np.arange(12) / 12
-        values, errors = infer(drawn, PROBE, doubt=0.0).fields(span, phase)
+        values, errors = infer(drawn, PROBE, response_error=0.0).fields(span, phase)
         for r, size in enumerate(sizes):
             truth = np.kron(PROBE.hats(span), PROBE.terms(phase + drawn[r].crossing)) @ (2.0 * size)
             scores.append((values[r].ravel() - truth) / errors[r].ravel())
@@ -193,7 +196,7 @@ def test_errors_are_what_estimates_are_off_by() -> None:
 
 def test_what_no_load_explains_makes_errors_larger() -> None:
     one = cases()[0][0]
-    rough = replace(one, lacking=one.lacking + 3.0 * np.random.default_rng(1).standard_normal(len(one.lacking)))
+    rough = replace(one, residual=one.residual + 3.0 * np.random.default_rng(1).standard_normal(len(one.residual)))
     plain, worse = (infer([c], PROBE).floor[0] for c in (one, rough))
     assert worse == pytest.approx(np.hypot(plain, 3.0), rel=0.05)
 
@@ -203,7 +206,7 @@ def test_coloured_noise_is_made_white() -> None:
     residuals = noise((400, 6), rng)
     residuals[rng.uniform(size=residuals.shape) < 0.2] = np.nan
     nothing = np.zeros((400, 6, 1))
-    white = of_samples("", residuals, MEMORY, nothing, nothing, 0.0).lacking
+    white = of_samples("", residuals, MEMORY, nothing, nothing, 0.0).residual
     assert len(white) == np.isfinite(residuals).sum()
     assert abs(np.std(white) - 1.0) < 0.05
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06
@@ -211,8 +214,8 @@ def test_coloured_noise_is_made_white() -> None:
 
 def test_forces_show_what_they_lack() -> None:
     rng, phase = np.random.default_rng(3), np.asarray(np.arange(300) * 0.0337 % 1.0, float)
-    lacking = np.asarray(0.2 * np.cos(2 * np.pi * (phase - 0.25)) + 0.05, float)
-    off = [missing_force("run", 0.02 * rng.normal(size=300) - lacking, phase, 0.02, 0.0) for _ in range(20)]
+    residual = np.asarray(0.2 * np.cos(2 * np.pi * (phase - 0.25)) + 0.05, float)
+    off = [missing_force("run", 0.02 * rng.normal(size=300) - residual, phase, 0.02, 0.0) for _ in range(20)]
     at = np.array(off[0].phase)
     scores = [
         (np.array(one.values[0]) - 0.2 * np.cos(2 * np.pi * (at - 0.25)) - 0.05) / np.array(one.errors[0])
@@ -232,5 +235,5 @@ def test_genes_take_what_is_theirs() -> None:
     rng = np.random.default_rng(4)
     genes = len(nominal(model("6x1")))
     wrong = 0.2 * np.eye(genes)[0]
-    off = [replace(one, lacking=quiet(one, rng).lacking + one.sensitivities @ wrong) for one, _ in cases()]
-    assert place(infer(off, PROBE)) is None
+    off = [replace(one, residual=quiet(one, rng).residual + one.sensitivities @ wrong) for one, _ in cases()]
+    assert locate_load(infer(off, PROBE)) is None

@@ -7,36 +7,39 @@ import numpy as np
 from tests.diagnosis.pendulum_rig import Pendulum, PendulumRig, at, recorded
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import Fit, thoroughly
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
-from wingfit.diagnosis.verdict.next_experiment import unlike
+from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.verdict.next_experiment import separation
 from wingfit.workers.in_process import InProcessEvaluator
 
 RIG, EVALUATOR = PendulumRig(), InProcessEvaluator()
 TRUTH = {"stiffness": 0.2, "damping": 4e-3, "inertia": 1e-3}
 
 
-def fitted(stack: Stack) -> Fit:
+def fitted_pendulum(data: WhitenedData) -> Fit:
     """The pendulum fitted from TRUTH; ``gain`` free as well, which is no gene of what is compared with."""
     model = Pendulum(("gain",))
-    asked = Problem(model, stack.recordings, model.searched, base_genome(model, TRUTH), stack.axes)
-    genes = free_genes(asked)
-    *_, found = thoroughly(
-        RIG, stack, asked, EVALUATOR, unit_at(genes, np.array([asked.base[g.name] for g in genes])), 15
+    problem = Problem(model, data.recordings, model.searched, base_genome(model, TRUTH), data.axes)
+    genes = free_genes(problem)
+    *_, found = gauss_newton_fit(
+        RIG, data, problem, EVALUATOR, unit_at(genes, np.array([problem.base[g.name] for g in genes])), 15
     )
     return found
 
 
-def apart(frequencies: tuple[float, ...], then: float, **lacking: float) -> tuple[float, float]:
+def apart(frequencies: tuple[float, ...], then: float, **missing: float) -> tuple[float, float]:
     """Of what is ``lacking`` at ``then`` (Hz): what a pendulum with a gain cannot make up for, and as it was fitted."""
-    truth = {**TRUTH, **lacking}
-    stack = Stack.of(recorded(truth, noise=2e-4, frequencies=frequencies))
-    rival = fitted(stack)
-    model = Pendulum(("cubic",)) if lacking else Pendulum()
+    truth = {**TRUTH, **missing}
+    data = WhitenedData.of(recorded(truth, noise=2e-4, frequencies=frequencies))
+    rival = fitted_pendulum(data)
+    model = Pendulum(("cubic",)) if missing else Pendulum()
     genome = np.array([truth[gene.name] for gene in model.genes])
-    shell = RIG.shown(model, genome, at(then))
-    assert shell is not None
-    adapted, plain = (unlike(RIG, stack, genome, shell, rival, EVALUATOR, adapts=adapts) for adapts in (True, False))
+    recording = RIG.simulated_recording(model, genome, at(then))
+    assert recording is not None
+    adapted, plain = (
+        separation(RIG, data, genome, recording, rival, EVALUATOR, refit_genes=refit_genes)
+        for refit_genes in (True, False)
+    )
     assert adapted is not None
     assert plain is not None
     return adapted, plain

@@ -9,13 +9,13 @@ import numpy as np
 
 from wingfit.diagnosis.finding import Interval, RecordingMisfit
 from wingfit.diagnosis.verdict.build_finding import _worsened
-from wingfit.diagnosis.verdict.proof import Predicted, _misfits
+from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits
 
 
 def test_forces_are_drawn_in_stretches_of_time_however_many_there_are() -> None:
     """Both axes of both recordings are off alike, at one time more than at another: drawing axes would tell nothing."""
     off = np.repeat(np.linspace(1.0, 3.0, 48)[:, None], 2, axis=1)
-    pair = Predicted(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
+    pair = ResidualPair(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
     before, after, better = _misfits(pair, [np.ones(2, bool)] * 2, ["forces", "forces"])
     assert before.value == 2.0 * after.value
     assert better
@@ -28,7 +28,7 @@ def test_forces_are_drawn_in_stretches_of_time_however_many_there_are() -> None:
 def test_tracks_are_drawn_marker_by_marker() -> None:
     rng = np.random.default_rng(1)
     off = np.repeat(rng.uniform(1.0, 3.0, 20), 3) * np.ones((30, 60))
-    before, _, _ = _misfits(Predicted(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
+    before, _, _ = _misfits(ResidualPair(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
     assert before.low is not None
     assert before.high is not None
     assert before.low < before.value < before.high
