@@ -1,4 +1,4 @@
-"""The search for what is lacking: nominal fit, score tests, refits alone and together."""
+"""The search for missing physics: nominal fit, score tests, refits of single effects and of several together."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ from wingfit.diagnosis.subject import Subject, Suspect
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 
-MAX_CONTINUED = 2  # of the best refits, if they have not converged
-MAX_RESTARTED = 3  # suspects that are fitted from the estimates
-MAX_PARTNERS = 3  # of the best explanation
-MAX_RIVALS = 3  # explanations to which a partner is sought
-MAX_SUBSTITUTES = 2  # tried in place of each part of an explanation of several
+MAX_CONTINUED = 2  # best refits that are continued until they converge
+MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
+MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
+MAX_RIVALS = 3  # hypotheses for which a second effect is tried
+MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
 def search_missing_physics(
     state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
-    """Fill ``state``; yields the part of the work done and what comes next."""
+    """Fill ``state``; yields the fraction of the work done and the next stage."""
     data, fixed = state.data, spec.calibration.fixed
     yield 0.0, "fitting the nominal model"
     if spec.start:
@@ -60,7 +60,7 @@ def search_missing_physics(
     for k, fit in enumerate(fit_nominal(state.subject, data, evaluator, free, spec.start, fixed)):
         state.initial_fit = state.initial_fit or (state.subject, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
-    yield 0.25, "comparing with a finer division"
+    yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
     for fraction, stage in _search_per_discretisation(state, spec, fit, suspects, evaluator):
         yield 0.3 + 0.55 * fraction, stage
@@ -70,7 +70,7 @@ def search_missing_physics(
         state.restart_from(replace(state.fitted_nominal, refit=better))
         for fraction, stage in _test_and_refit_suspects(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
-    yield 0.92, "comparing with a finer division"
+    yield 0.92, "comparing with a finer discretisation"
     for stage in _refine_and_extend(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
@@ -83,7 +83,7 @@ def search_missing_physics(
 def _search_per_discretisation(
     state: SearchState, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
-    """Suspects beside the nominal ``fit``; where a finer division does better than all of these, beside that one's."""
+    """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
     nominal = choose_discretisation(state.subject, state.data, evaluator, fit, refine=spec.refine)
     if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
         state.restart_from(choose_discretisation(state.subject, state.data, evaluator, fit, refine=False))
@@ -96,10 +96,10 @@ def _search_per_discretisation(
 
 
 def _final_fits(state: SearchState, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
-    """Weigh what there is, with the best explanation fitted to its end, and what is hard to tell from it as well."""
+    """Weigh the hypotheses, with the best one and those indistinguishable from it fitted until they converge."""
     known = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
     yield from _compete(state, evaluator, _indistinguishable(known) or _look_alikes(state, decide(known).best))
-    yield "fitting the best explanation to its end"
+    yield "fitting the best hypothesis until it converges"
     for _ in range(MAX_CONTINUED):
         state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
         unended = _unconverged(state.weights)
@@ -110,7 +110,7 @@ def _final_fits(state: SearchState, evaluator: Evaluator, floor: float, suspects
 
 
 def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
-    """Suspects that explain nearly as well each by itself, if several do: the right one's fit may have been caught."""
+    """Start points of single suspects that explain nearly equally well: the right one may be in a local minimum."""
     evidence = weights.evidence[1:]
     least = max(evidence.max(initial=0.0) - weights.policy.overtake, 0.0)
     close = [one for one, found in zip(weights.refits[1:], evidence, strict=True) if found > least]
@@ -119,10 +119,10 @@ def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
 
 
 def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
-    """An explanation that leaves more than noise, with what is known to look like a part of it in its place.
+    """Start points in which an effect of the best hypothesis is replaced by one known to look similar.
 
-    A score test cannot tell what the nominal genes, and a look-alike, have taken up: of two that look alike the first
-    to be fitted may hide the other.
+    Only where the hypothesis leaves more than noise. A score test does not see what the nominal genes, or a similar
+    effect, have already absorbed; of two similar effects the first one fitted may hide the other.
     """
     if best.excess <= tolerated_excess(state.data, 0.0, 0.0):
         return []
@@ -137,7 +137,7 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
 
 
 def _unconverged(weights: HypothesisWeights) -> Refit | None:
-    """The best explanation if its fit has not ended, else the first such rival that might overtake it."""
+    """The best hypothesis if its fit has not converged, else the first such rival that could overtake it."""
     best = decide(weights).best
     if best.trials and not (best.fit.converged and best.fit.jacobian_measured):
         return best
@@ -150,9 +150,9 @@ def _unconverged(weights: HypothesisWeights) -> Refit | None:
 
 
 def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> None:
-    """Go to the finer division with all explanations where that does better with the best of them.
+    """Take a finer discretisation for all hypotheses where the best hypothesis fits better with it.
 
-    Beside a large effect a division's own misfit does not show before the effect is in the model.
+    The error of a discretisation may become visible only after a large effect is in the model.
     """
     data = state.data
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
@@ -182,14 +182,15 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
     followed = [_follow_to_finer(finer, data, evaluator, one, better) for one in others]
-    remark = f"the division limits the model beside the effect: {finer.description} was taken instead of {state.subject.description}"
-    remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
+    before = state.subject.description
+    remark = f"with the effect added, the discretisation limits the model: {finer.description} replaces {before}"
+    remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
     state.nominal = Nominal(finer, first, None, "", remarks)
     state.subject, state.refits = finer, [one for one in (*known, *followed) if one is not None]
 
 
 def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
-    """``refit`` at a finer division, fitted where that promises to do better; None where it cannot be simulated."""
+    """``refit`` with a finer discretisation, fitted if that is promising; None where it cannot be simulated."""
     changes, takes = finer_change(finer, data, evaluator, refit)
     if not changes:
         return None
@@ -204,7 +205,7 @@ def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refi
 def _follow_to_finer(
     finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit
 ) -> Refit | None:
-    """``refit`` at a finer division; to its end where it is part of the ``best``, lest it lose for want of steps."""
+    """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
     found = refit_with_subject(finer, data, evaluator, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
@@ -218,10 +219,10 @@ def _test_and_refit_suspects(
     evaluator: Evaluator,
     at_least: Refit | None = None,
 ) -> Iterator[tuple[float, str]]:
-    """Score tests about the nominal fit, then refits; yields the part of that done.
+    """Score tests with the nominal fit, then refits; yields the fraction done and the stage.
 
-    Few or no refits where none does, or promises to do, better than the nominal model of a finer division
-    (``at_least``): a division may take up what an effect leaves, as an effect may take up what a division leaves.
+    There are few or no refits where none is, or is predicted to be, better than ``at_least``, the nominal model with a
+    finer discretisation: an effect and a discretisation error may each absorb the other's residual.
     """
     nominal = state.fitted_nominal
     for k, (suspect, trials) in enumerate(
@@ -237,9 +238,9 @@ def _test_and_refit_suspects(
 
 
 def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None:
-    """The nominal model fitted from where the best explanation ended, if it does much better there.
+    """The nominal model fitted from the genes of the best hypothesis, if that is clearly better; else None.
 
-    An explanation may lead out of a minimum in which the nominal fit was caught, and is not the cause then.
+    If so, the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
     """
     nominal = state.fitted_nominal.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
@@ -252,7 +253,7 @@ def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None
 def _refits(
     state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
 ) -> Iterator[tuple[float, str]]:
-    """Suspects one by one, from the estimates where none could be named, and together where that is not enough."""
+    """Refit single suspects, then some from the estimates and several together while the residual is not explained."""
     yield from _single_refits(state, nominal, spec, evaluator)
     yield 0.72, "continuing the best refits"
     if _continue_best(state, nominal, evaluator):
@@ -270,6 +271,7 @@ def _refits(
 def _single_refits(
     state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
+    """Refit the suspects with the strongest score tests one at a time."""
     data, fit = state.data, nominal.refit.fit
     chosen = strongest_trials(state.data, state.trials, spec.refits)
     for k, trial in enumerate(chosen):
@@ -282,9 +284,9 @@ def _single_refits(
 def _refits_from_estimates(
     state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
-    """Suspects that explain most about the estimates, from there.
+    """Refit suspects from the genes' estimates, those whose score tests are strongest there.
 
-    About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
+    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
     """
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
@@ -292,13 +294,13 @@ def _refits_from_estimates(
     found = []
     for suspect, trials in score_tests(subject, state.data, initial, evaluator, select_suspects(subject, spec)):
         found.append(trials)
-        yield 0.74, f"score test of {suspect.name} about the estimates"
+        yield 0.74, f"score test of {suspect.name} at the estimates"
     every = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
     yield from ((0.77, stage) for stage in _compete(state, evaluator, every))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
-    """The strongest, and all that act at a place: a score test at a few places tells little of these."""
+    """The strongest trials, and those of all suspects with a location: a few tested locations say little of these."""
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     placed = [
         trials[0]
@@ -309,26 +311,25 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
 
 
 def _compete(state: SearchState, evaluator: Evaluator, every: Sequence[StartPoint]) -> Iterator[str]:
-    """Keep what is in front when all have been fitted from the estimates."""
+    """Fit all start points in competition and store the best."""
     if not every or state.initial_fit is None:
         return
+    policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
     best = min(one.excess for one in state.refits)
-    noisy = tolerated_excess(state.data, 0.0, 0.0)
-    most = max(
-        min(state.data.policy.hopeful * state.fitted_nominal.refit.excess, state.data.policy.rivalry * best), noisy
-    )
-    wanted = max(state.data.policy.unknown_residual**2 * state.fitted_nominal.refit.excess, noisy)
-    front: list[tuple[StartPoint, Fit]] = []
-    for front in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], every, most, wanted):
-        yield f"refit with {' and '.join(front[0][0].names)} from the estimates"
-    for entry, fit in front:
+    by_noise = tolerated_excess(state.data, 0.0, 0.0)
+    limit = max(min(policy.worth_continuing * nominal, policy.rivalry * best), by_noise)
+    target = max(policy.unknown_residual**2 * nominal, by_noise)
+    rivals: list[tuple[StartPoint, Fit]] = []
+    for rivals in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], every, limit, target):
+        yield f"refit with {' and '.join(rivals[0][0].names)} from the estimates"
+    for entry, fit in rivals:
         state.add(make_refit(state.data, fit, entry.trials))
 
 
 def _refine_and_extend(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """The best explanation at a division that does not limit it, and what else is lacking if it leaves little then.
+    """Refine the discretisation of the best hypothesis, then try second effects.
 
-    In this order: what a division leaves beside an effect may pass for a second one.
+    In this order, because a discretisation error may look like a second effect.
     """
     coarse = state.subject
     if spec.refine:
@@ -340,19 +341,19 @@ def _refine_and_extend(state: SearchState, spec: DiagnosisSpec, evaluator: Evalu
 
 
 def _second_effects(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """Partners of the best explanation, by score tests about it."""
+    """Refit the best hypothesis with second effects chosen by score tests at its fit."""
     best, data = min(state.refits, key=lambda one: one.excess), state.data
     others, found = [one for one in select_suspects(state.subject, spec) if one.name not in best.names], []
     for suspect, trials in score_tests(state.subject, data, best.fit, evaluator, others, best.names):
         found.append(trials)
-        yield f"score test of {suspect.name} beside {' and '.join(best.names)}"
+        yield f"score test of {suspect.name} together with {' and '.join(best.names)}"
     for trial in partner_trials(data, best, found)[:MAX_PARTNERS]:
         yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
         state.add(refit_with_suspects(state.subject, data, best.fit, evaluator, [*best.trials, trial], best.fit))
 
 
 def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
-    """Several at once: partners of the best, pairs of which neither explains much, and each part exchanged."""
+    """Refit combinations: the best hypotheses with a second effect, pairs of weak effects, and substitutes."""
     data, fit = state.data, nominal.refit.fit
     tried = {frozenset(one.names) for one in state.refits}
     best = sorted(state.refits, key=lambda one: one.excess)[:MAX_RIVALS]
@@ -374,7 +375,7 @@ def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator)
 
 
 def _substituted_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
-    """Each part of the best explanation exchanged for what can do the same: one of two may have been found first."""
+    """Replace each effect of the best combination by effects that can reproduce its contribution."""
     best = min(state.refits, key=lambda one: one.excess)
     if len(best.trials) < 2:
         return
@@ -391,27 +392,28 @@ def _substituted_refits(state: SearchState, nominal: Nominal, evaluator: Evaluat
 
 
 def _continue_best(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> bool:
-    """Whether an explanation leaves so little that none needs a partner; the best are continued until one does."""
+    """Continue the best refits until one needs no second effect; return whether one does not."""
     enough = state.partner_threshold(nominal)
     for k in np.argsort([one.excess for one in state.refits])[:MAX_CONTINUED]:
         one = state.refits[k]
-        if not one.fit.converged and enough < one.excess < state.data.policy.hopeful * nominal.refit.excess:
+        if not one.fit.converged and enough < one.excess < state.data.policy.worth_continuing * nominal.refit.excess:
             state.refits[k] = continue_fit(state.subject, state.data, evaluator, one)
     return state.is_explained(nominal)
 
 
 def _is_outperformed(state: SearchState, nominal: Nominal, trial: Trial, best: Trial) -> bool:
-    """Whether a refit has explained so much already that a trial so much weaker in its score test cannot compete."""
-    if not state.refits or trial.gain > state.data.policy.weaker * best.gain:
+    """Whether ``trial`` is too weak to compete with a refit that has already explained the residual."""
+    policy = state.data.policy
+    if not state.refits or trial.gain > policy.weak_after_success * best.gain:
         return False
-    left = min(one.excess for one in state.refits)
-    return left <= max(state.data.policy.solved * nominal.refit.excess, tolerated_excess(state.data, 0.0, 0.0))
+    least = min(one.excess for one in state.refits)
+    return least <= max(policy.explained_excess * nominal.refit.excess, tolerated_excess(state.data, 0.0, 0.0))
 
 
 def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
-    """The suspects that ``spec`` asks for; ValueError for one that the rig has not."""
+    """The suspects that ``spec`` requests; ValueError for one that the rig does not have."""
     known = {suspect.name: suspect for suspect in subject.suspects}
     for name in spec.suspects:
         if name not in known:
-            raise ValueError(f"unknown suspect {name!r}: take it out; for this rig there are {', '.join(known)}")
+            raise ValueError(f"unknown suspect {name!r}: remove it; this rig has {', '.join(known)}")
     return [suspect for name, suspect in known.items() if not spec.suspects or name in spec.suspects]

@@ -1,4 +1,4 @@
-"""What is known so far in the search for what is lacking."""
+"""State of the search for missing physics."""
 
 from __future__ import annotations
 
@@ -20,10 +20,7 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolera
 
 @dataclass
 class SearchState:
-    """What is known so far; ``evaluations`` counts individuals.
-
-    ``begun`` is the nominal model at the estimates.
-    """
+    """Results so far. ``trials``: score tests by suspect; ``initial_fit``: nominal model at the estimates."""
 
     subject: Subject
     data: WhitenedData
@@ -36,18 +33,18 @@ class SearchState:
 
     @property
     def fitted_nominal(self) -> Nominal:
-        """The nominal model; ValueError before it has been fitted."""
+        """The fitted nominal model; ValueError before it has been fitted."""
         if self.nominal is None:
             raise ValueError("the nominal model has not been fitted")
         return self.nominal
 
     def restart_from(self, nominal: Nominal) -> None:
-        """Go on with a nominal fit; nothing is known of suspects beside it yet."""
+        """Continue with another nominal fit; earlier score tests and refits no longer hold."""
         self.nominal, self.subject = nominal, nominal.subject
         self.trials, self.refits = [], []
 
     def add(self, refit: Refit | None) -> None:
-        """Keep ``refit``, or the better of two with the same suspects."""
+        """Store ``refit``; of two with the same suspects, store the one with the lower cost."""
         if refit is None:
             return
         for k, fitted_nominal in enumerate(self.refits):
@@ -59,31 +56,31 @@ class SearchState:
         self.refits.append(refit)
 
     def partner_threshold(self, nominal: Nominal) -> float:
-        """What an explanation may leave that needs no partner, m^2 or N^2."""
+        """Excess (m^2 or N^2) of a hypothesis above which a second effect is tried."""
         return tolerated_excess(self.data, self.data.policy.partner_form * nominal.refit.excess, 0.0)
 
     def is_explained(self, nominal: Nominal) -> bool:
-        """Whether nothing more is to be gained: an explanation leaves what one may, or there is none."""
+        """Whether no second effect is needed: the best hypothesis is below the threshold, or there is none."""
         return not self.refits or min(one.excess for one in self.refits) <= self.partner_threshold(nominal)
 
     @property
     def beats_unknown_law(self) -> bool:
-        """Whether an explanation leaves less than a law would that is not in the library."""
+        """Whether a hypothesis has less excess than the assumed law outside the library."""
         least = min((one.excess for one in self.refits), default=np.inf)
         return least <= self.data.policy.unknown_residual**2 * self.fitted_nominal.refit.excess
 
 
 @dataclass(frozen=True)
 class CountingEvaluator:
-    """An evaluator that counts the individuals it is given in ``of``."""
+    """An evaluator that adds the number of individuals to the state ``of``."""
 
     inner: Evaluator
     of: SearchState
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """As the inner one."""
+        """Evaluate ``values`` with the inner evaluator."""
         self.of.evaluations += len(np.atleast_2d(values))
         return self.inner.evaluate(problem, values, residuals=residuals)
 
     def close(self) -> None:
-        """Nothing: the inner one is its owner's."""
+        """Do nothing: the owner closes the inner evaluator."""

@@ -1,4 +1,4 @@
-"""Fits of suspects from the estimates: several run a race, and those that may still win go on."""
+"""Competing fits of suspects from the genes' estimates: those that can no longer win are stopped."""
 
 from __future__ import annotations
 
@@ -21,25 +21,28 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
 Array = npt.NDArray[np.float64]
 
 MAX_STEPS = 14  # of a fit
-FIRST_STEPS = 5  # of each, its start among them, before those that leave least go on
-SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects as near as this are one
+FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
+SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this near are the same
 
 
 @dataclass(frozen=True)
 class StartPoint:
-    """The nominal model with the suspects of ``trials``, whose genes begin at ``unit`` [E] in parts of their boxes."""
+    """The nominal model with the suspects of ``trials``, their genes at ``unit`` [E] in unit coordinates."""
 
     trials: tuple[Trial, ...]
     unit: Array
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the suspects."""
+        """Names of the suspects."""
         return tuple(trial.suspect.name for trial in self.trials)
 
 
 def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
-    """A suspect of typical size where ``trial`` is, and at the typical place; ``beside`` it those of a ``refit``."""
+    """A suspect of typical size at the location of ``trial`` and at its typical location.
+
+    It is combined with the suspects ``others`` of ``refit``, which keep their fitted genes.
+    """
     suspect = trial.suspect
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     size = size_columns(suspect)
@@ -60,14 +63,18 @@ def fit_from_estimates(
     max_excess: float,
     target_excess: float = np.inf,
 ) -> Iterator[list[tuple[StartPoint, Fit]]]:
-    """``every`` entry fitted from the estimates, where ``begun`` is.
+    """Fit all ``starts`` from the estimates, the genes of ``initial``; yields the rivals of the best after every step.
 
-    Where the nominal fit ended its genes have taken up what they could of a suspect, and may not find back. All run for
-    RACE steps; then each that may still overtake the best goes on to its end. A fit ends early where it crawls and
-    leaves far more than the best (`Policy.rivalry`), or more than ``most`` (m^2 or N^2 beyond the noise). One that does
-    not lead also ends where it would leave as much, or more than is ``wanted``, even if it went on faster than it does
-    (`Policy.speed`); and where another has come to the same.
-    Yields all that do not leave as much after every step, the best first; nothing where none can be simulated.
+    At the nominal fit the genes have absorbed what they could of a suspect, and may not return. Every fit runs for
+    FIRST_STEPS; then each that can still overtake the best continues. A fit is stopped
+
+    - where it gains little and has far more excess than the best (`Policy.rivalry`), or more than ``max_excess`` (m^2
+      or N^2);
+    - where it does not lead and would end above one of these, or above ``target_excess``, even with faster progress
+      (`Policy.acceleration`);
+    - where a fit of the same suspects has come to the same genes.
+
+    Yields nothing where none can be simulated.
     """
     fits = _CompetingFits(data, max_excess, target_excess)
     for entry in starts:
@@ -77,18 +84,18 @@ def fit_from_estimates(
 
 
 class _CompetingFits:
-    """Fits that compete: each is given up where it crawls and leaves far more than the best, or than ``most``."""
+    """Fits that compete; hopeless ones are stopped."""
 
     def __init__(self, data: WhitenedData, max_excess: float, target_excess: float) -> None:
         self.data, self.max_excess, self.target_excess = data, max_excess, target_excess
         self.fits = list[_CompetingFit]()
 
     def add(self, entry: StartPoint, steps: Iterator[Fit]) -> None:
-        """One more."""
+        """Add the fit from ``entry``."""
         self.fits.append(_CompetingFit(entry, steps))
 
     def run(self, steps: int) -> Iterator[list[tuple[StartPoint, Fit]]]:
-        """All to as many ``steps``, those that leave least first; yields what is in front after each."""
+        """Run all fits to ``steps`` steps, those with the lowest cost first; yields the rivals after each step."""
         for fit in sorted(self.fits, key=lambda one: one.cost):
             while fit.steps_taken < steps and not self._should_stop(fit) and fit.step():
                 yield self._rivals()
@@ -108,17 +115,17 @@ class _CompetingFits:
         )
 
     def _extrapolated_excess(self, fit: _CompetingFit) -> float:
-        """What a fit leaves in the end if it goes on faster than in its last step (`Policy.speed`)."""
+        """Excess at the last step if the fit progresses faster than in its latest step (`Policy.acceleration`)."""
         before, now = (self.data.excess(fit.coefficients) for fit in fit.last_fits)
         if now <= 0.0 or now >= before:
             return now
-        return float(now * (now / before) ** (self.data.policy.speed * (MAX_STEPS + 1 - fit.steps_taken)))
+        return float(now * (now / before) ** (self.data.policy.acceleration * (MAX_STEPS + 1 - fit.steps_taken)))
 
     def _excess(self, fit: _CompetingFit) -> float:
         return self.data.excess(fit.last_fits[-1].coefficients) if fit.last_fits else np.inf
 
     def _rivalry_limit(self) -> float:
-        """What leaves more is no rival of the best; above what noise may make of nothing."""
+        """Excess above which a fit is no rival of the best, and at least what noise may produce."""
         return max(
             self.data.policy.rivalry * min(self._excess(one) for one in self.fits),
             tolerated_excess(self.data, 0.0, 0.0),
@@ -135,7 +142,7 @@ class _CompetingFits:
 
 @dataclass
 class _CompetingFit:
-    """A fit on its way, with its last two steps."""
+    """A running fit with its last two steps."""
 
     entry: StartPoint
     steps: Iterator[Fit]
@@ -144,17 +151,17 @@ class _CompetingFit:
 
     @property
     def cost(self) -> float:
-        """Of the last step; infinite before the first."""
+        """Cost at the last step; infinite before the first."""
         return self.last_fits[-1].cost if self.last_fits else np.inf
 
     def same_as(self, other: _CompetingFit) -> bool:
-        """Whether two fits of the same suspects, each begun, have come to the same."""
+        """Whether two fits of the same suspects have come to the same genes."""
         if self is other or self.entry.names != other.entry.names:
             return False
         return bool(np.abs(self.last_fits[-1].unit - other.last_fits[-1].unit).max() <= SAME_FIT_DISTANCE)
 
     def step(self) -> bool:
-        """Whether there was another step."""
+        """Take a step; return whether there was one."""
         try:
             self.last_fits = [*self.last_fits[-1:], next(self.steps)]
         except (StopIteration, *FIT_ERRORS):
@@ -166,7 +173,7 @@ class _CompetingFit:
 def _from_estimates(
     subject: Subject, data: WhitenedData, evaluator: Evaluator, initial: Fit, entry: StartPoint
 ) -> Iterator[Fit]:
-    """Fits of the nominal model with the suspects of ``entry``; CannotBeginError where they cannot begin."""
+    """Fits of the nominal model with the suspects of ``entry``; InitialSimulationError where it cannot be simulated."""
     suspects = [trial.suspect for trial in entry.trials]
     model = subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))

@@ -1,8 +1,8 @@
-"""Fits in coefficients of the beat: Gauss-Newton in the box of the genes, with a Jacobian that learns on its way.
+"""Gauss-Newton fits of Fourier coefficients in the box of the genes, with a Jacobian that is updated or measured.
 
-A diagnosis refits a dozen extended models that differ little from the nominal one. Their Jacobian is taken over from
-it; only the columns of what was added are measured. Every step then improves it by what the step has shown (Broyden
-1965), and it is measured anew where it no longer foretells what a step does.
+A diagnosis refits a dozen extended models that differ little from the nominal one. They take over its Jacobian; only
+the columns of added genes are measured. Each step updates it (Broyden 1965), and it is measured again where it no
+longer predicts what a step does.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from wingfit.inference.gauss_newton import Quadratic, Trials
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-PRIOR_SD = 0.5  # standard deviation of a gene in parts of its box
-# Steps tried at once: a group of lanes. Damping by parts of each gene's own curvature (Marquardt 1963), about
-# the last good part, suits genes that are told one by one; damping by parts of the box (Levenberg 1944) leads along
-# the bent valleys of stiffnesses that make up for each other.
+PRIOR_SD = 0.5  # standard deviation of a gene's prior, unit coordinates
+# Dampings tried at once, a group of lanes. Relative to each gene's own curvature (Marquardt 1963), about the last good
+# factor, they suit genes that are identifiable one by one; relative to the box (Levenberg 1944), they follow the curved
+# valleys of stiffnesses that compensate each other.
 DAMPING_FACTORS = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
-FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # relative to each gene's curvature
 SINGULAR = 1e-12  # of the largest curvature, added to every damping so that no curvature is singular
-GOOD_STEP_RATIO = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
-RELATIVE_TOLERANCE = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
-COST_TOLERANCE = 0.3  # decrease of the cost that is worth another step
-SLOW_FACTOR = 5.0  # times that, below which a step is a small one: the valley is bent, or its slopes are not known well
-ACCELERATION_STEP = 0.02  # of the box: how far along a step its bend is measured
-SAME_MOTION_DISTANCE = 0.05  # of a box: a motion as near as this is near enough to begin beside
-FAILED_COEFFICIENT = 1e12  # coefficients of an individual that cannot be simulated count as this
+GOOD_STEP_RATIO = 0.6  # of the predicted decrease; below it the Jacobian is measured again
+RELATIVE_TOLERANCE = 2e-3  # of the weighted chi-squared; a fit has converged where a step gains less
+COST_TOLERANCE = 0.3  # least decrease of the cost that is worth another step
+SLOW_FACTOR = 5.0  # times that: a step that gains less is small, because the valley is curved or the slopes are inexact
+ACCELERATION_STEP = 0.02  # of the box: length along a step over which the second derivative is measured
+SAME_MOTION_DISTANCE = 0.05  # of the box: an initial motion of genes this near is reused
+FAILED_COEFFICIENT = 1e12  # coefficient of an individual that cannot be simulated
 
 
 class InitialSimulationError(ValueError):
-    """The model cannot be simulated where a fit begins."""
+    """The model cannot be simulated at the start of a fit."""
 
 
-FIT_ERRORS = (InitialSimulationError, np.linalg.LinAlgError)  # ends one fit, and not a diagnosis
+FIT_ERRORS = (InitialSimulationError, np.linalg.LinAlgError)  # end one fit, not the diagnosis
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,15 @@ class Fit:
 
     Attributes:
         problem: the model with its free genes.
-        unit: [F] in parts of the boxes.
-        coefficients: [D] of the residuals there.
-        jacobian: [D, F] of the coefficients, per part of the box.
+        unit: [F] genes in unit coordinates (0 to 1 across each box).
+        coefficients: [D] of the residuals.
+        jacobian: [D, F] derivatives of the coefficients with the unit coordinates.
         residuals: per recording [T, C].
-        cost: surprise at what is left (`Stack.surprise` in `whitened_recordings.py`), and at the genes by their prior.
-        near: [F] whose motion individuals about this fit begin beside: its own, or that of one shortly before.
-        damping: last good one.
-        fresh: whether the Jacobian was measured there.
-        converged: whether it ended because nothing was to be gained.
+        cost: deviance of the coefficients plus the squared distance of the genes from their prior.
+        motion_genes: [F] genes whose motion is the initial motion of simulations near this fit.
+        damping: last good damping factor.
+        jacobian_measured: whether all columns were measured at this fit.
+        converged: whether the fit ended because no step gained enough.
     """
 
     problem: Problem
@@ -77,7 +77,7 @@ class Fit:
 
     @property
     def values(self) -> dict[str, float]:
-        """Of the free genes."""
+        """Values of the free genes by name."""
         found = values_at(free_genes(self.problem), self.unit[None])[0]
         return dict(zip(self.problem.free, found.tolist(), strict=True))
 
@@ -93,10 +93,10 @@ def broyden_fit(
     known: Flags | None = None,
     steps: int = 8,
 ) -> Fit:
-    """Fit the free genes from ``start`` [F]; CannotBeginError where that cannot be simulated.
+    """Fit the free genes from ``start`` [F] with Broyden updates; InitialSimulationError where it cannot be simulated.
 
-    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first, and again where a step
-    does not keep its promise; if that does not help, all are, once.
+    ``jacobian`` [D, F] is used in the columns ``known`` [F]; the others are measured first, and again where a step
+    gains much less than predicted. If that does not help, all columns are measured, once.
     """
     simulator = _Simulator(subject, data, problem, evaluator)
     first = _initial_fit(simulator, start)
@@ -126,10 +126,10 @@ def broyden_fit(
 def gauss_newton_fit(
     subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, steps: int
 ) -> Iterator[Fit]:
-    """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last.
+    """Fit with the Jacobian measured at every step and at the end; yields every step, the final fit last.
 
-    One-sided differences point the way until they lead no further, or hardly. Then they are central, and steps follow
-    the bend of the valley as well (geodesic acceleration: Transtrum and Sethna 2012, Sec. 3).
+    Differences are one-sided until steps gain little. Then they are central, and steps include geodesic acceleration
+    (Transtrum and Sethna 2012, Sec. 3), which follows a curved valley.
     """
     simulator, every, accelerated = _Simulator(subject, data, problem, evaluator), np.ones(len(start), bool), False
     now = _measure_columns(simulator, _initial_fit(simulator, start), every, 1)
@@ -150,19 +150,22 @@ def gauss_newton_fit(
 
 
 def with_measured_jacobian(subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit) -> Fit:
-    """``fit`` with all slopes measured where it ended: those that steps have learnt lead on, and make no intervals."""
+    """``fit`` with all columns of its Jacobian measured.
+
+    Broyden-updated columns are good enough for stepping, but not for confidence intervals.
+    """
     if fit.jacobian_measured:
         return fit
     return _measure_columns(_Simulator(subject, data, fit.problem, evaluator), fit, np.ones(len(fit.unit), bool))
 
 
 def _converges(data: WhitenedData, before: Fit, after: Fit, gain: float) -> bool:
-    """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
+    """Whether a step gained too little, although nearly as much as predicted."""
     return small_gain(data, before, after) and gain > GOOD_STEP_RATIO / 2
 
 
 def small_gain(data: WhitenedData, before: Fit, after: Fit, times: float = 1.0) -> bool:
-    """Whether the step gained no more than some ``times`` what makes one worth its cost."""
+    """Whether a step decreased the cost by at most ``times`` the gain that is worth a step."""
     whole = data.likelihood_weight(before.coefficients) * data.chi_squared(before.coefficients)
     return before.cost - after.cost <= times * max(COST_TOLERANCE, RELATIVE_TOLERANCE * whole)
 
@@ -173,7 +176,7 @@ def _cost(data: WhitenedData, coefficients: Array, unit: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Simulator:
-    """How a fit sees its problem."""
+    """Simulates individuals of a fit's problem."""
 
     subject: Subject
     data: WhitenedData
@@ -181,7 +184,7 @@ class _Simulator:
     evaluator: Evaluator
 
     def at(self, units: Array, motion_genes: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """As :meth:`diagnosis.evidence.whitened_recordings.Stack.evaluate`, for individuals [B, F] near another [F]."""
+        """Evaluate individuals [B, F] from the motion of genes ``near`` [F]; results as WhitenedData.evaluate."""
         problem, genes = self.problem, free_genes(self.problem)
         genome = problem.genomes(values_at(genes, motion_genes[None]))[0]
         model = self.subject.with_initial_motion(problem.model, genome)
@@ -197,8 +200,8 @@ def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
             f"{name} = {value:.4g}" for name, value in zip(simulator.problem.free, values, strict=True)
         )
         raise InitialSimulationError(
-            f"the model cannot be simulated where the fit begins ({values_text}): {reasons[0]}; start from other genes, or "
-            "check the rig's estimates"
+            f"the model cannot be simulated at the start of the fit ({values_text}): {reasons[0]}; "
+            "start from other genes, or check the rig's estimates"
         )
     cost = float(_cost(simulator.data, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
@@ -206,7 +209,7 @@ def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
 
 
 def _measure_columns(simulator: _Simulator, fit: Fit, which: Flags, sides: int = 2) -> Fit:
-    """``fit`` with the columns ``which`` of its Jacobian measured by differences to one or two sides in the box."""
+    """``fit`` with the columns ``which`` of its Jacobian measured by one-sided or central differences in the box."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
@@ -222,9 +225,9 @@ def _measure_columns(simulator: _Simulator, fit: Fit, which: Flags, sides: int =
 
 
 def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tuple[Fit | None, float]:
-    """The best of several damped steps, its Jacobian improved by what they show, and gain over promise.
+    """The best of several damped steps, with its updated Jacobian, and the ratio of actual to predicted decrease.
 
-    ``bent`` asks for steps along the bend of the valley as well.
+    ``accelerated``: try steps with geodesic acceleration as well. (None, 0) where no step decreases the cost.
     """
     damped = _DampedSteps(simulator.data, fit)
     moves = np.array([damped.move(d) for d in damped.dampings])
@@ -248,7 +251,7 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
     if k is None:
         return None, 0.0
     jacobian = fit.jacobian
-    for j in np.argsort(trials.decrease):  # the best last: what it shows holds exactly
+    for j in np.argsort(trials.decrease):  # the best last, so that the Jacobian reproduces it exactly
         if not bad[j]:
             jacobian = _broyden(jacobian, units[j] - fit.unit, found[j] - fit.coefficients)
     better = Fit(
@@ -265,7 +268,7 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
 
 
 class _DampedSteps:
-    """Steps from a fit with several dampings: [S, F] of all, ``own`` by parts of each gene's own curvature."""
+    """Steps from a fit with several ``dampings`` [S, F]; ``own``: factors relative to each gene's own curvature."""
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
         white, self.slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
@@ -279,7 +282,7 @@ class _DampedSteps:
         self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
     def move(self, damping: Array, acceleration: Array | float = 0.0) -> Array:
-        """The step [F] with a ``damping`` [F], where coefficients change by ``bend`` [D] beside its slopes."""
+        """The step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
         accelerated = (
             self.likelihood_weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
         )
@@ -287,7 +290,7 @@ class _DampedSteps:
 
 
 def _accelerations(simulator: _Simulator, fit: Fit, moves: Array) -> Array:
-    """[S, D] of ``moves`` [S, F]: what coefficients change along each beside its slopes, by their second derivative."""
+    """Second-order changes [S, D] of the coefficients along ``moves`` [S, F], by finite differences."""
     part = np.minimum(1.0, ACCELERATION_STEP / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
     found, reasons, _ = simulator.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.motion_genes)
     accelerations = (found - fit.coefficients - part * moves @ fit.jacobian.T) / part**2

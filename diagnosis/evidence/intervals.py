@@ -1,4 +1,4 @@
-"""How well each gene is told: intervals from noise, and from what a model that is not perfect leaves."""
+"""Confidence intervals of genes from noise and from model error."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ CONFIDENCE = 0.9
 
 
 def standard_errors(freedom: float = np.inf) -> float:
-    """Standard errors to either side that an interval of CONFIDENCE has, if they are known with so much ``freedom``."""
+    """Half-width of a CONFIDENCE interval in standard errors, for errors known with ``freedom`` degrees of freedom."""
     return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
 def covariance(data: WhitenedData, fit: Fit) -> Array:
-    """[F, F] of the genes in parts of their boxes.
+    """Covariance [F, F] of the genes in unit coordinates.
 
-    By noise, by what the model misses in a few independent pieces
-    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`), which is taken to be no less than the
-    tolerance, and the box as a weak prior. Of forces also the scatter of what each recording by itself asks for (a
-    sandwich with recordings as clusters: Liang and Zeger 1986).
+    It includes noise; the model error as a few independent samples (:meth:`WhitenedData.likelihood_weight`), no smaller
+    than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores (a sandwich with
+    recordings
+    as clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
     likelihood_weight, recordings = (
@@ -47,12 +47,12 @@ def covariance(data: WhitenedData, fit: Fit) -> Array:
 
 
 def _clustered(data: WhitenedData) -> bool:
-    """Whether recordings are the only independent pieces: beats of a force differ in size with all their harmonics."""
+    """Whether only recordings are independent: beats of a force differ in size with all their harmonics."""
     return any(recording.kind == "forces" for recording in data.recordings)
 
 
 def gene_values(data: WhitenedData, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
-    """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
+    """Values and 90 % intervals of the free genes; ``sizes`` maps size genes to the value that is off."""
     errors = np.sqrt(np.diag(covariance(data, fit)))
     freedom = max(len(data.recordings) - 1, 1) if _clustered(data) else np.inf
     wide = standard_errors(freedom)

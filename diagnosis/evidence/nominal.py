@@ -1,4 +1,4 @@
-"""The nominal model at its best: fitted, at a division that does not limit it."""
+"""The nominal model, fitted with a sufficient discretisation."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from wingfit.diagnosis.subject import Subject
 Array = npt.NDArray[np.float64]
 
 NOMINAL_STEPS = 20
-MAX_REFINEMENTS = 3  # of refinement
+MAX_REFINEMENTS = 3  # successive finer discretisations
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal model fitted.
+    """The fitted nominal model.
 
     Attributes:
-        subject: with the division that was settled on.
+        subject: with the discretisation that was chosen.
         refit: its fit.
-        division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
-        finer: in words.
-        innocent: finer division, in words, that was fitted and hardly did better, so that it is not the division that
-            limits; "" where there is none.
-        remarks: for the reader.
+        discretisation_error: misfit (m or N) by the discretisation, from the next finer one; None where there is none.
+        finer: description of the next finer one.
+        remarks: for the user.
+        ineffective_refinement: description of a finer discretisation that was fitted with little gain; it shows that
+            discretisation is not the cause of the residual. "" where none was fitted.
     """
 
     subject: Subject
@@ -53,7 +53,7 @@ def fit_nominal(
     values: Mapping[str, float],
     fixed: Mapping[str, float],
 ) -> Iterator[Fit]:
-    """Fit the ``free`` genes from ``values``, step by step; ValueError where the model cannot be simulated there."""
+    """Fit the ``free`` genes from ``values``; yields every step. ValueError where that cannot be simulated."""
     base = base_genome(subject.model, {**values, **fixed})
     problem = Problem(subject.model, data.recordings, free, base, data.axes)
     genes = free_genes(problem)
@@ -64,7 +64,7 @@ def fit_nominal(
 def choose_discretisation(
     subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit, *, refine: bool
 ) -> Nominal:
-    """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
+    """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
     now, remarks = make_refit(data, fit), list[str]()
     for _ in range(MAX_REFINEMENTS):
         left, finest, better, tried = 0.0, "", None, ""
@@ -86,27 +86,29 @@ def choose_discretisation(
         if better is None:
             return Nominal(subject, now, left if finest else None, finest, tuple(remarks), tried)
         remarks.append(
-            f"the division limits the model: {finest} leaves {_percent(better.excess, now.excess)} of the excess "
-            f"misfit that {subject.description} leaves, and was taken instead"
+            f"the discretisation limits the model: {finest} replaces {subject.description} and reduces the excess "
+            f"misfit to {_percent(better.excess, now.excess)}"
         )
         subject, now = finer, better
     return Nominal(subject, now, None, "", tuple(remarks))
 
 
 def finer_is_promising(data: WhitenedData, changes: float, takes: float, now: Refit) -> bool:
-    """Whether a division that ``changes`` as much (m or N) and ``takes`` such a part of a misfit is worth a fit.
+    """Whether a finer discretisation is worth a fit.
 
-    Of one that changes more than the whole misfit the linearised model knows nothing.
+    ``changes`` (m or N) is the change that it makes, ``takes`` the fraction of the excess that it is predicted to
+    remove. A linearised prediction does not hold where the change exceeds the whole residual.
     """
     policy = data.policy
     matters = changes >= policy.finer_matters * data.noise and now.excess >= (policy.finer_limit * data.noise) ** 2
-    return matters and (takes > policy.finer_promise or changes**2 >= now.excess)
+    return matters and (takes > policy.finer_predicted_gain or changes**2 >= now.excess)
 
 
 def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
-    """What the finer model says differently and the genes cannot make up for: root mean square (m or N).
+    """Change by a finer model that the genes cannot compensate (root mean square, m or N), and the gain.
 
-    And which part of the misfit that would take away, as far as the linearised model knows; zeros if it fails.
+    The gain is the fraction of the excess that the change removes by the linearised model; zeros where the simulation
+    fails.
     """
     fit = refit.fit
     problem = Problem(finer.extended(refit.names), data.recordings, fit.problem.free, fit.problem.base, data.axes)
@@ -116,14 +118,14 @@ def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit
     nuisance = Nuisance(data, fit)
     rest, left = nuisance.project_out(found[0] - fit.coefficients), nuisance.residual
     power = float(rest @ rest)
-    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, data.policy.division_factor))
+    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, data.policy.discretisation_factor))
     excess = max(float(left @ left) - len(left), 1e-300)
     taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
     return float(np.sqrt(data.weight @ (rest[: len(data.scale)] * data.scale) ** 2)), taken
 
 
 def is_clearly_better(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
-    """Whether a finer division takes away so much of the excess that it is worth its cost."""
+    """Whether ``finer`` removes so much of the excess of ``coarse`` that it is worth its cost."""
     return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
 
 

@@ -1,4 +1,4 @@
-"""Full refits of the strongest suspects, alone and together, and what they predict of recordings left out."""
+"""Full refits of the strongest suspects, alone and together, and their cross-validation."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from wingfit.inference.score_test import explained
 Array = npt.NDArray[np.float64]
 
 REFIT_STEPS = 6  # of a refit
-CONTINUED_STEPS = 10  # of one that is continued
-FINAL_STEPS = 20  # of the best, to its end
-MAX_CANDIDATES = 4  # tried beside the best, and as pairs without it
-MAX_HALVINGS = 3  # of a start that cannot be simulated
+CONTINUED_STEPS = 10  # of a refit that is continued
+FINAL_STEPS = 20  # of the best hypothesis, until it converges
+MAX_CANDIDATES = 4  # second effects, or pairs, that are tried
+MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
 @dataclass(frozen=True)
 class Refit:
-    """The nominal model with suspects put in, fitted in full.
+    """The nominal model with suspects added, fitted in full.
 
     Attributes:
-        trials: the trial that each suspect began from; empty for the nominal model.
+        trials: the trial from which each suspect started; empty for the nominal model.
         fit: the fit.
-        excess: mean square beyond the noise that it leaves, m^2 or N^2.
-        predicted: the same for each recording when the others were fitted, averaged; None with a single recording.
+        excess: mean square beyond the noise, m^2 or N^2.
+        predicted: the same cross-validated, recordings left out one at a time; None with a single recording.
     """
 
     trials: tuple[Trial, ...]
@@ -52,25 +52,25 @@ class Refit:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the suspects."""
+        """Names of the suspects."""
         return tuple(trial.suspect.name for trial in self.trials)
 
     @property
     def freedom(self) -> int:
-        """Genes that the suspects add."""
+        """Number of genes that the suspects add."""
         return sum(trial.freedom for trial in self.trials)
 
 
 def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
-    """``fit`` with what it leaves and predicts."""
+    """``fit`` with its excess, fitted and cross-validated."""
     return Refit(tuple(trials), fit, data.excess(fit.coefficients), cross_validated_excess(data, fit))
 
 
 def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
-    """Mean square beyond the noise in each recording when the others alone were fitted, by the linearised model.
+    """Mean square beyond the noise of each recording when only the others are fitted, by the linearised model.
 
-    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation, nor is what
-    noise in the others makes of a prediction.
+    A prior limits how far genes move, and the move that noise in the other recordings makes is allowed for: neither a
+    gene that only one recording identifies nor noise counts against the hypothesis. None for a single recording.
     """
     if len(data.recordings) < 2:
         return None
@@ -103,9 +103,9 @@ def refit_with_suspects(
     trials: Sequence[Trial],
     base: Fit | None = None,
 ) -> Refit | None:
-    """Fit the nominal model with the suspects of ``trials``, each beginning at its trial's place and size.
+    """Fit the nominal model with the suspects of ``trials``, each from its trial's location and size.
 
-    ``base`` is a fit that contains all but the last of them already. None where no start can be simulated.
+    ``base`` is a fit that contains all but the last of them. None where no start can be simulated.
     """
     before = base or nominal
     model = subject.extended([trial.suspect.name for trial in trials])
@@ -116,13 +116,13 @@ def refit_with_suspects(
         model, data.recordings, (*before.problem.free, *(g for g, _ in genes)), base_genome(model, values), data.axes
     )
     for part in 0.5 ** np.arange(MAX_HALVINGS):
-        start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
+        start = np.concatenate([before.unit, *(_scaled_start(trial, part) for trial in added)])
         try:
             fit = _fit_added_genes(subject, data, problem, evaluator, start, before)
         except FIT_ERRORS:
             continue
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.size_genes for gene, trial in genes])
-        astray = data.chi_squared(fit.coefficients) > data.policy.astray * trials[0].remaining_chi_squared
+        astray = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
         if len(trials) == 1 and astray and not sizes.all():
             with suppress(*FIT_ERRORS):
                 first = _fit_subset(subject, data, problem, evaluator, start, before, sizes)
@@ -135,7 +135,7 @@ def refit_with_suspects(
 def _fit_added_genes(
     subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, before: Fit
 ) -> Fit:
-    """Fit all genes of ``problem``; the slopes of the first of them are those of ``before``."""
+    """Fit all genes of ``problem``; the first columns of the Jacobian are those of ``before``."""
     known = np.arange(len(start)) < before.jacobian.shape[1]
     jacobian = np.zeros((len(before.jacobian), len(start)))
     jacobian[:, known] = before.jacobian[:, : known.sum()]
@@ -151,9 +151,9 @@ def _fit_subset(
     before: Fit,
     which: npt.NDArray[np.bool_],
 ) -> Fit:
-    """Fit the genes ``which`` [F] of ``problem`` alone; the others stay where they start, with slopes of zero.
+    """Fit the genes ``which`` [F] of ``problem`` only; the others stay at ``start``, with zero slopes.
 
-    A shape that moves before its size is known may be led astray.
+    Shape genes that move before the size is known may diverge.
     """
     genes = free_genes(problem)
     base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
@@ -166,7 +166,7 @@ def _fit_subset(
 
 
 def refit_with_subject(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
-    """The same fitted with another subject's model, from where it ended; None where that cannot be simulated."""
+    """``refit`` fitted with the model of ``subject`` from its current genes; None where that cannot be simulated."""
     before = refit.fit
     model = subject.extended(refit.names)
     problem = Problem(model, data.recordings, before.problem.free, before.problem.base, data.axes)
@@ -183,9 +183,9 @@ def refit_with_subject(subject: Subject, data: WhitenedData, evaluator: Evaluato
 def continue_fit(
     subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, steps: int = CONTINUED_STEPS
 ) -> Refit:
-    """``refit`` fitted further, with all slopes measured at every step; as it is where that cannot be simulated.
+    """``refit`` fitted further with the Jacobian measured at every step; unchanged where that cannot be simulated.
 
-    An individual that was reached beside another may flutter when it begins from rest.
+    An individual that was reached from a nearby motion may flutter when it is simulated from rest.
     """
     fit = refit.fit
     try:
@@ -197,14 +197,14 @@ def continue_fit(
 
 
 def fit_to_convergence(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit:
-    """``refit`` to its end, with all slopes measured there: what suspects are tried about."""
+    """``refit`` fitted until it converges, with a measured Jacobian; score tests need that."""
     if not refit.fit.converged:
         refit = continue_fit(subject, data, evaluator, refit)
     return make_refit(data, with_measured_jacobian(subject, data, evaluator, refit.fit), refit.trials)
 
 
 def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
-    """``refit`` fitted anew from other genes ``start`` [F]; None where these cannot be simulated."""
+    """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
     try:
         return make_refit(
             data, broyden_fit(subject, data, refit.fit.problem, evaluator, start, steps=REFIT_STEPS), refit.trials
@@ -214,7 +214,7 @@ def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refi
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], max_count: int) -> list[Trial]:
-    """The best trial of each suspect worth a refit (`Policy.worth_refit`), strongest first."""
+    """The best trial of each suspect that is worth a refit (`Policy.worth_refit`), strongest first."""
     policy = data.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
     return [trial for trial in best[:max_count] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
@@ -223,7 +223,7 @@ def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], max_count
 def partner_trials(
     data: WhitenedData, base: Refit, found: Sequence[list[Trial]], max_count: int = MAX_CANDIDATES
 ) -> list[Trial]:
-    """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
+    """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
     nuisance = Nuisance(data, base.fit)
     left = nuisance.residual
     worth = data.policy.partner_gain * (float(left @ left) - len(left))
@@ -233,9 +233,9 @@ def partner_trials(
 def effect_contribution(
     data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()
 ) -> Array | None:
-    """What switching off the suspects of ``trials`` (all, if none is given) changes of the coefficients [D].
+    """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
 
-    All other genes stay as they are. None where that cannot be simulated.
+    All other genes stay the same. None where that cannot be simulated.
     """
     fit, off = refit.fit, dict(refit.fit.values)
     for trial in trials or refit.trials:
@@ -247,7 +247,7 @@ def effect_contribution(
 def substitute_trials(
     data: WhitenedData, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], max_count: int
 ) -> list[Trial]:
-    """Trials of other suspects that can do nearly all of what one of those of ``refit`` does; the likest first."""
+    """Trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``, best first."""
     change = effect_contribution(data, evaluator, refit, [trial])
     if change is None:
         return []
@@ -262,7 +262,7 @@ def substitute_trials(
 def _rank_by_explained(
     nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
 ) -> list[tuple[float, Trial]]:
-    """Of each suspect but the ``known`` the trial that takes most of a ``misfit``, with how much; strongest first."""
+    """The trial of each suspect not ``known`` that explains most of ``misfit``, with the decrease; strongest first."""
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
@@ -275,7 +275,7 @@ def _rank_by_explained(
 def suspect_pairs(
     data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, max_count: int = MAX_CANDIDATES
 ) -> Iterator[tuple[Trial, Trial]]:
-    """Pairs of suspects that together would leave less than a chi-squared of ``beyond``, best first."""
+    """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
     nuisance = Nuisance(data, nominal)
     left = nuisance.residual
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
@@ -289,7 +289,7 @@ def suspect_pairs(
             yield (one, other) if one.gain >= other.gain else (other, one)
 
 
-def _scaled(trial: Trial, part: float) -> Array:
+def _scaled_start(trial: Trial, part: float) -> Array:
     """Start of the suspect's genes with its size at ``part`` of what the trial says."""
     start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
     start[size] = off[size] + part * (start[size] - off[size])

@@ -1,8 +1,8 @@
-"""The score test of every suspect: how much of the misfit it would take, the nominal genes free to adapt.
+"""The score test of every suspect: how much of the residual it would explain, the nominal genes free to adapt.
 
-A suspect is put in at the sizes at which it is met in practice, at several places and shapes, and the changes that this
-makes to the simulated recordings are fitted to what is left, after what the nominal genes can do has been taken out of
-both (a score test with nuisance parameters: Rao 1948; here with finite sizes: many effects have no slope at zero).
+A suspect is added at typical sizes, at several locations and shapes. The changes that it makes to the simulated
+recordings are fitted to the residual, after what the nominal genes can explain has been projected out of both (a score
+test with nuisance parameters: Rao 1948; with finite sizes, because many effects have zero slope at zero size).
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from wingfit.inference.score_test import amounts, remaining, spread
 
 Array = npt.NDArray[np.float64]
 
-LOCATION_SAMPLES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
-SHAPE_SAMPLES = 7  # of one with other shape genes
-VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
+LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
+SHAPE_SAMPLES = 7  # for a suspect with other shape genes
+VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that changes less in all is not visible
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One size (or several, one by one) of a suspect at one place: what it does.
+    """A suspect with one or several sizes at one location and shape: what it changes.
 
     Attributes:
         suspect: which.
-        unit: [S, E] its genes in parts of their boxes, one row for each size.
-        fields: [S, D] what each changes of the coefficients.
+        unit: [S, E] its genes in unit coordinates, one row for each size.
+        fields: [S, D] change of the coefficients by each size.
         gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
-        amounts: [S] by how much each must be multiplied.
-        freedom: degrees of freedom, genes of place and shape included.
-        leaves: chi-squared that is then left, by the linearised model.
+        amounts: [S] fitted multiples of the sizes.
+        freedom: degrees of freedom, location and shape genes included.
+        remaining_chi_squared: after that fit, by the linearised model.
     """
 
     suspect: Suspect
@@ -53,7 +53,7 @@ class Trial:
 
     @property
     def start(self) -> Array:
-        """Genes [E] of the suspect, in parts of their boxes, where the fit puts them."""
+        """Genes [E] of the suspect in unit coordinates, at the fitted sizes."""
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
         start = self.unit[0].copy()
@@ -62,11 +62,10 @@ class Trial:
 
 
 class Nuisance:
-    """What the nominal genes can do about a fit; their prior counts as F further samples.
+    """The nominal genes as nuisance parameters; their prior counts as F further samples.
 
-    The prior counts as much as it does beside the misfit
-    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`). ``left`` [D + F] is the whitened residual that
-    they cannot make up for.
+    The prior is weighted against the likelihood at this fit (:meth:`WhitenedData.likelihood_weight`). ``residual`` [D +
+    F] is the whitened residual that the genes cannot explain.
     """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
@@ -77,17 +76,17 @@ class Nuisance:
         self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
     def project_out(self, changes: Array) -> Array:
-        """Whitened changes [..., D + F] of coefficients [..., D], without what the genes can make up for."""
+        """Whitened changes [..., D + F] of coefficients [..., D] without what the genes can explain."""
         return self.genes.rest(changes / self.scale)
 
 
 def off_units(suspect: Suspect) -> Array:
-    """Genes [E] in parts of their boxes with the suspect switched off."""
+    """Genes [E] in unit coordinates with the suspect switched off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
 
 
 def size_columns(suspect: Suspect) -> list[int]:
-    """Columns of the genes that are its size."""
+    """Columns of the suspect's size genes."""
     return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]
 
 
@@ -99,9 +98,9 @@ def score_tests(
     suspects: Sequence[Suspect],
     known: Sequence[str] = (),
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
-    """Try every suspect about a fit; yields its trials, best first (none where it cannot be simulated).
+    """Test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
 
-    The fit is the nominal one, or has in it the suspects that are ``known``; all its genes may adapt.
+    ``nominal`` is the nominal fit, or a fit with the suspects ``known`` added; all its genes may adapt.
     """
     nuisance = Nuisance(data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
@@ -146,7 +145,7 @@ def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) ->
 
 
 def _multiple_limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
-    """Least and largest multiples [S] of each size that stay in the box."""
+    """Smallest and largest multiples [S] of each size that stay in the box."""
     off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
     for row, unit in enumerate(block):
         column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
@@ -157,7 +156,7 @@ def _multiple_limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
 
 
 def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
-    """Shapes [E'] in parts of their boxes to be tried: its spots if it has any, else the ``typical`` one and others."""
+    """Shapes [E'] in unit coordinates: the suspect's candidate shapes, else ``typical`` and an even spread."""
     if suspect.candidate_shapes:
         genes = [gene for gene in suspect.genes if gene.name in suspect.shape_genes]
         return [unit_at(genes, np.array(spot)) for spot in suspect.candidate_shapes]
@@ -166,7 +165,7 @@ def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
 
 
 def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
-    """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
+    """Genes [S, E] in unit coordinates, one row for each size, at one location and shape."""
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]

@@ -1,4 +1,4 @@
-"""Recordings stacked into one vector of coefficients, whitened, and the misfit that is left beyond the noise."""
+"""Recordings as one whitened vector of Fourier coefficients, and the excess of a residual beyond the noise."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Array = npt.NDArray[np.float64]
 class WhitenedData:
     """Recordings with their noise.
 
-    A stacked vector [D] holds the coefficients of all used channels, recording by recording, channel by channel.
+    A coefficient vector [D] holds the coefficients of all used channels, recording by recording, channel by channel.
 
     Attributes:
         recordings: R of them.
-        views: each as coefficients of its beat.
-        axes: force axes that are compared; of tracks nothing.
-        tolerance: root mean square that no model is asked to be better than, m or N.
+        beat_fits: the harmonic fit of each recording.
+        axes: force axes that are compared; empty for tracks.
+        tolerance: root mean square (m or N) below which no model is required to be.
     """
 
     recordings: tuple[Recording, ...]
@@ -40,7 +40,7 @@ class WhitenedData:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> WhitenedData:
-        """Reduce ``recordings``; ValueError for one that is of no use, or for none."""
+        """Reduce ``recordings`` to coefficients; ValueError for one that cannot be used, or for none."""
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
         beat_fits = tuple(
@@ -52,7 +52,7 @@ class WhitenedData:
 
     @cached_property
     def noiseless(self) -> WhitenedData:
-        """For coefficients that a simulation made, of which noise has no part."""
+        """The same with zero noise variance, for coefficients that were simulated."""
         beat_fits = tuple(replace(beat_fit, variance=np.zeros_like(beat_fit.variance)) for beat_fit in self.beat_fits)
         return replace(self, beat_fits=beat_fits)
 
@@ -64,12 +64,12 @@ class WhitenedData:
 
     @cached_property
     def recording_ends(self) -> npt.NDArray[np.int64]:
-        """[R], where each recording ends in the stacked vector."""
+        """[R] index at which each recording ends in the coefficient vector."""
         return np.asarray(np.cumsum([beat_fit.used.sum() * len(beat_fit.order) for beat_fit in self.beat_fits]))
 
     @cached_property
     def recording_slices(self) -> tuple[slice, ...]:
-        """Each recording's part of the stacked vector."""
+        """Slice of each recording in the coefficient vector."""
         return tuple(
             slice(a, b)
             for a, b in zip([0, *self.recording_ends[:-1].tolist()], self.recording_ends.tolist(), strict=True)
@@ -77,12 +77,12 @@ class WhitenedData:
 
     @cached_property
     def variance(self) -> Array:
-        """[D] of the noise of each coefficient."""
+        """[D] noise variance of the coefficients."""
         return np.concatenate([beat_fit.variance[beat_fit.used].ravel() for beat_fit in self.beat_fits])
 
     @cached_property
     def weight(self) -> Array:
-        """[D]: part of a coefficient's square in the mean square over all samples of all channels."""
+        """[D] weight of a coefficient's square in the mean square over all samples of all channels."""
         channels = sum(int(beat_fit.used.sum()) for beat_fit in self.beat_fits)
         return (
             np.concatenate([np.tile(beat_fit.weight, int(beat_fit.used.sum())) for beat_fit in self.beat_fits])
@@ -91,12 +91,12 @@ class WhitenedData:
 
     @cached_property
     def scale(self) -> Array:
-        """[D] by which coefficients are divided: their noise, and what no model is asked to be better than."""
+        """[D] standard deviation of the coefficients by noise and tolerance together; whitening divides by it."""
         allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.beat_fits]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
     def coefficients_of(self, residuals: Sequence[Array]) -> Array:
-        """Coefficients [..., D] of residuals [..., T, C] of each recording."""
+        """Coefficients [..., D] of the residuals [..., T, C] of each recording."""
         found = [
             beat_fit.of(one)[..., beat_fit.used, :] for beat_fit, one in zip(self.beat_fits, residuals, strict=True)
         ]
@@ -108,43 +108,43 @@ class WhitenedData:
 
     @cached_property
     def effective_samples(self) -> float:
-        """Number of independent pieces that what a model misses has: a few for each recording, however long."""
+        """Number of independent samples of a model's error: a few for each recording, however long it is."""
         return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
 
     def deviance(self, coefficients: Array) -> Array:
-        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise, and beyond it a misfit of unknown size.
+        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise plus a model error of unknown size.
 
-        A misfit far beyond the noise is a model's error, of which ``pieces`` are independent, and not that many samples
-        that each know the genes: sums of squares beyond the noise's count by their logarithm.
+        The chi-squared beyond its expectation D is a model's error, of which only ``effective_samples`` are
+        independent, not as many as there are samples; its logarithm counts (a Student-like likelihood).
         """
         beyond = self._chi_squared_excess(coefficients)
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
         return np.asarray(whole - beyond + self.effective_samples * np.log1p(beyond / self.effective_samples))
 
     def likelihood_weight(self, coefficients: Array) -> float:
-        """How much a unit of chi-squared counts beside these coefficients [D]: the slope of :meth:`surprise`."""
+        """Slope of :meth:`deviance` with chi-squared at coefficients [D], as in iteratively reweighted fits."""
         return float(1.0 / (1.0 + self._chi_squared_excess(coefficients) / self.effective_samples))
 
     @cached_property
     def max_likelihood_weight(self) -> float:
-        """The same beside a misfit as large as the tolerance: no fit ends nearer to the best, and no model is exact."""
+        """The weight at a model error as large as the tolerance; no model is taken to be more exact."""
         return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.effective_samples))
 
     def _chi_squared_excess(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Array) -> float:
-        """Mean square beyond the noise of residuals with these coefficients [D], m^2 or N^2; noise may make it < 0."""
+        """Mean square beyond the noise of residuals with coefficients [D], m^2 or N^2; noise may make it negative."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
     def excess_by_recording(self, coefficients: Array) -> Array:
-        """[R], the same of each recording by itself."""
+        """Excess [R] of each recording."""
         every = self.weight * (coefficients**2 - self.variance)
         return np.array([every[part].sum() / self.recording_weights[r] for r, part in enumerate(self.recording_slices)])
 
     @cached_property
     def recording_weights(self) -> Array:
-        """[R] part of each recording in the mean square."""
+        """[R] weight of each recording in the mean square."""
         used = np.array([int(beat_fit.used.sum()) for beat_fit in self.beat_fits], float)
         return np.asarray(used / used.sum())
 
@@ -152,10 +152,9 @@ class WhitenedData:
     def excess_standard_error(self) -> float:
         """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
-        What noise does to means and trends comes from below the lowest line between harmonics, and is known to a factor
-        only; half of it counts. Else markers are independent of each other. Harmonics are not: where beats differ in
-        size or timing, all of them do together; so each marker, and a recording of forces as a whole, counts as one
-        sample of its noise.
+        The noise of means and trends lies below the lowest line between harmonics and is known up to a factor only;
+        half of it counts. Markers are independent of each other. Harmonics are not, since beats differ in size or
+        timing as a whole; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
         """
         independent = sum(
             1.0 if recording.kind == "forces" else beat_fit.used.sum() / 3.0
@@ -168,7 +167,7 @@ class WhitenedData:
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Array
     ) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """Coefficients [B, D] of the residuals of ``values`` [B, F], why individuals failed, and the residuals."""
+        """Coefficients [B, D] of the residuals of ``values`` [B, F], reasons of failed individuals, and residuals."""
         evaluation = evaluator.evaluate(problem, values, residuals=True)
         residuals = residuals_of(evaluation)
         return self.coefficients_of(residuals), evaluation.reasons, residuals

@@ -1,4 +1,4 @@
-"""Where the nominal model and the recordings differ, in numbers and in words."""
+"""Where the nominal model differs from the recordings, in numbers and as text."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from wingfit.sim.atmosphere import density
 
 Array = npt.NDArray[np.float64]
 
-EXTENT_QUANTILES = (0.05, 0.95)  # of the misfit's mass: the extent that is told
-MIN_PHASE_CONCENTRATION = 0.35  # length of the mean vector of phases from which a misfit lies at a phase
-WHOLE_EXTENT = 0.8  # of the span or chord: a misfit that reaches over as much has no place
-MIN_RATIO = 1.05  # ratio of two values of a variable that differ
+EXTENT_QUANTILES = (0.05, 0.95)  # of the excess: ends of the reported extent
+MIN_PHASE_CONCENTRATION = 0.35  # length of the mean phase vector from which a misfit has a phase
+WHOLE_EXTENT = 0.8  # of the span or chord: a misfit that extends over as much has no location
+MIN_RATIO = 1.05  # of two values of a variable that differ
 
 
 def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Array) -> Where:
-    """Where the misfit [D], cut into ``pieces``, lies."""
+    """Location, phase, axis, harmonics and scaling of coefficients [D], split into ``residuals``."""
     spread = harmonics(data, coefficients)
     span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))
     phase, axis = _phase(residuals), _axis(residuals)
@@ -33,7 +33,7 @@ def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual]
 
 
 def _channel_excess(residuals: Sequence[RecordingResidual]) -> list[Array]:
-    """Excess mean square of each channel of each piece."""
+    """Excess of each channel of each recording."""
     return [
         np.maximum((residual.coefficients**2 - residual.variance) @ residual.beat_fit.weight, 0.0)
         for residual in residuals
@@ -41,7 +41,7 @@ def _channel_excess(residuals: Sequence[RecordingResidual]) -> list[Array]:
 
 
 def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval | None:
-    """Middle and extent of the misfit along the span or the chord, by markers; None for forces."""
+    """Median and extent of the misfit along the span or the chord, from markers; None for forces."""
     at, mass = [], []
     for residual, masses in zip(residuals, _channel_excess(residuals), strict=True):
         for place, one in zip(residual.locations, masses, strict=True):
@@ -62,7 +62,7 @@ def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval
 
 
 def _cell_edges(places: Array) -> Array:
-    """Edges [n + 1] of the parts of the span or chord for which markers at ``places`` [n] stand, in order."""
+    """Edges [n + 1] of the cells of the span or chord that markers at sorted ``places`` [n] represent."""
     if len(places) < 2:
         return np.repeat(places, 2)
     half = 0.5 * (places[1:] + places[:-1])
@@ -71,9 +71,9 @@ def _cell_edges(places: Array) -> Array:
 
 
 def _phase(residuals: Sequence[RecordingResidual]) -> Interval | None:
-    """Middle and extent of the misfit in the beat; None where it is spread over all of it.
+    """Centre and extent of the misfit in the beat; None where it is spread over the whole beat.
 
-    The middle is that of what is larger than half of the most: a fit smears a misfit over the beat.
+    The centre is that of the misfit above half of its maximum, because a fit spreads a misfit over the beat.
     """
     mass = np.sum([(residual.beat**2).mean(axis=1) for residual in residuals], axis=0)
     peak = np.where(mass > 0.5 * mass.max(), mass, 0.0)
@@ -101,7 +101,7 @@ def _axis(residuals: Sequence[RecordingResidual]) -> str:
 
 
 def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
-    """Powers with which the misfit grows with what differs between the recordings."""
+    """Exponents with which the misfit scales with each variable that differs between the recordings."""
     excess = data.excess_by_recording(coefficients)
     level = 0.02 * max(float(excess.max()), 0.0)
     if len(excess) < 3 or level <= 0.0:
@@ -128,7 +128,7 @@ def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
 
 
 def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[float, float], Array]]:
-    """Name, unit, range and values of what may matter, all above zero."""
+    """Name, unit, range and values of the variables, all positive."""
     f = np.array([c.flap_frequency for c in conditions])
     rho = np.array([density(c.pressure, c.temperature) for c in conditions])
     speed = np.array([c.airspeed for c in conditions])
@@ -160,9 +160,9 @@ def _sentence(
 def cause_location(
     span: Interval | None, chord: Interval | None, phase: Interval | None, *, driven: bool = False
 ) -> str:
-    """Where the cause of a misfit acts, in words that follow those of the misfit; "" where that is not known.
+    """Where the cause of a misfit acts, as text that continues the misfit's location; "" where it is not known.
 
-    ``driven``: rods that move otherwise than they are said to.
+    ``driven``: the cause is an error of the drive rods.
     """
     parts = [
         f"{100 * one.value:.0f} % of the {name}{_range_text(one, 100, 0, ' %')}"
@@ -172,7 +172,7 @@ def cause_location(
     if phase is not None:
         parts.append(f"{phase.value % 1.0:.2f} of the beat{_range_text(phase, 1, 2, '', -(phase.value // 1.0))}")
     if driven:
-        return "; as a drive that moves otherwise than it is said to" + (f", most at {parts[-1]}" if phase else "")
+        return "; its cause is an error of the drive's motion" + (f", largest at {parts[-1]}" if phase else "")
     return f"; its cause acts at {', '.join(parts)}" if parts else ""
 
 
@@ -211,7 +211,7 @@ def _scaling_text(one: Exponent) -> str:
         return ""
     if low <= 0.0 <= high:
         return f"independent of {one.variable}" if high - low < 1.0 else ""
-    name = {1: f"{one.variable}", 2: f"{one.variable} squared"}.get(round(power), f"{one.variable} to the {power:.1f}")
+    name = {1: f"{one.variable}", 2: f"{one.variable} squared"}.get(round(power), f"{one.variable}^{power:.1f}")
     return (
         f"grows with {name}"
         if power > 0.5

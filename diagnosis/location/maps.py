@@ -1,4 +1,4 @@
-"""Where a misfit lies: by marker, over the beat, along the span, in which harmonics and directions."""
+"""Maps of a misfit: by marker, over the beat, along the span, by harmonic and direction."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ BANDS = 6  # along the span
 
 @dataclass(frozen=True)
 class RecordingResidual:
-    """One recording's part of a misfit.
+    """Residual of one recording.
 
-    ``coefficients`` and ``variance`` [C, P] of its used channels, ``places`` of these, ``beat`` [PHASES, C] the
-    periodic misfit from the start of the beat on.
+    ``coefficients`` and ``variance`` [C, P] of its used channels, their ``locations``, and ``beat`` [PHASES, C], the
+    periodic residual from the start of the beat.
     """
 
     beat_fit: HarmonicFit
@@ -35,7 +35,7 @@ class RecordingResidual:
 
 
 def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Array) -> list[RecordingResidual]:
-    """A stacked misfit [D] cut into its recordings."""
+    """Split a coefficient vector [D] by recording."""
     found = []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
         own = coefficients[part].reshape(-1, len(beat_fit.order))
@@ -46,7 +46,7 @@ def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Arra
 
 
 def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Array:
-    """[count, P] of the coefficients at equal steps of the beat; slow trends are left out."""
+    """[count, P] value of each coefficient's basis function at equal steps of the beat; zero for slow trends."""
     psi = origin + 2 * np.pi * np.arange(count) / count
     columns = []
     sine = np.zeros(len(beat_fit.order), bool)
@@ -58,7 +58,7 @@ def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Ar
 
 
 def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> tuple[MarkerMisfit, ...]:
-    """Misfit of each marker, or force axis, over all recordings in which it was seen."""
+    """Misfit of each marker, or force axis, over all recordings that contain it."""
     places: dict[str, ChannelLocation] = {}
     for residual in before:
         for place in residual.locations:
@@ -123,7 +123,7 @@ def _squares(recording_residuals: Sequence[RecordingResidual], edges: Array) -> 
 
 
 def harmonics(data: WhitenedData, coefficients: Array) -> tuple[float, ...]:
-    """Part of the excess mean square in each harmonic of the beat, from the mean on; trends are left out."""
+    """Fraction of the excess in each harmonic of the beat, from 0; trends are ignored."""
     order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in data.beat_fits])
     trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in data.beat_fits])
     every = np.where(trend, 0.0, data.weight * (coefficients**2 - data.variance))
@@ -134,11 +134,10 @@ def harmonics(data: WhitenedData, coefficients: Array) -> tuple[float, ...]:
 def overlays(
     subject: Subject, data: WhitenedData, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
 ) -> Iterator[Overlay]:
-    """Channels in which the two models differ most (one that differs nowhere: that the nominal one misses most).
+    """The channel in which the two models differ most, for the ``most`` recordings that changed most.
 
-    One from each of the recordings that changed most.
-
-    ``before`` and ``after`` are residuals [T, C] of each recording.
+    Where they do not differ, the channel with the largest misfit of the nominal model. ``before`` and ``after`` are
+    residuals [T, C] of each recording.
     """
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:

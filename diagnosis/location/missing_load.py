@@ -1,12 +1,11 @@
-"""The load that a model lacks, from what its tracks answer to known loads: Bayesian linear inversion.
+"""The missing load, inferred from the responses of the tracks to unit loads: Bayesian linear inversion.
 
-A recording shows y = H w + S g + noise: y what was recorded less what the nominal model says, H the responses to unit
-loads (a :class:`wingfit.sim.effects.probe.Probe`), w their sizes under this condition, S the sensitivities to the
-nominal genes and g what the genes are wrong by, the same for all recordings. Tracks tell well when a load acts, and its
-moment about the root, but hardly how it is spread along the span. So several kinds of load are possible a priori,
-smooth ones and those of one place, of free shape in the beat; the evidence (MacKay, Neural Computation 4, 1992, Eqs.
-2.8-2.14) says how probable each kind is and how strong the load under each condition, and all that is told is averaged
-over the kinds. Genes may be wrong by a good part of their box.
+A recording is y = H w + S g + noise: y recorded minus simulated by the nominal model, H the responses to unit loads (a
+:class:`wingfit.sim.effects.probe.Probe`), w the load's sizes under this condition, S the sensitivities to the nominal
+genes and g their errors, the same for all recordings. Tracks identify well when a load acts and its moment about the
+root, but hardly its distribution along the span. So several kinds of load are considered, smooth and localised, with
+free time courses. The evidence (MacKay, Neural Computation 4, 1992, Eqs. 2.8-2.14) gives the probability of each kind
+and the strength of the load under each condition; results are averaged over the kinds.
 """
 
 from __future__ import annotations
@@ -24,28 +23,28 @@ from wingfit.sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
 
-PHASES = 36  # instants of a beat that loads are told at
-GENE_ERROR_SD = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
-NONLINEARITY = 0.03  # of a response: what is not proportional to the load
-MIN_EVIDENCE = 5.0  # natural logarithm of the evidence for a load over none: less is none
-_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
-_MIN_RELATIVE_PROBABILITY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
-_MAX_KINDS = 60  # kinds to average over
-RESPONSE_ERROR = (
+PHASES = 36  # instants of a beat at which loads are reported
+GENE_ERROR_SD = 0.3  # standard deviation of the nominal genes' errors, unit coordinates
+NONLINEARITY = 0.03  # of a response: the part that is not proportional to the load
+MIN_EVIDENCE = 5.0  # log evidence relative to no load; below it there is none
+_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m, or the unit of the responses
+_MIN_RELATIVE_PROBABILITY = 0.005  # relative to the most probable kind; less probable kinds are ignored
+_MAX_KINDS = 60  # that are averaged
+RESPONSE_ERROR = (  # fraction by which errors of the model's responses may change the evidence
     0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
 )
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
-MIN_PHASE_CONCENTRATION = 0.3  # mean direction of the phase: less, and the load is spread over the beat
+MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the load is spread over the beat
 
 
 @dataclass(frozen=True)
 class Case:
-    """One recording, whitened: every number in standard deviations of independent noise.
+    """One recording, whitened: all numbers in standard deviations of independent noise.
 
     Attributes:
         name: of the recording.
-        lacking: [D] recorded less simulated by the refitted nominal model.
+        residual: [D] recorded minus simulated by the refitted nominal model.
         responses: [D, P] to unit loads, in the order of the probe's genes.
         sensitivities: [D, F] to the nominal genes, unit coordinates.
         crossing: drive phase (beats) at which the recorded beat starts.
@@ -59,7 +58,7 @@ class Case:
 
 
 def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
-    """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
+    """Whiten rows [n, ...] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
     if not len(values):
         return values
     kept = lag1 ** np.diff(place)[:, None]
@@ -68,10 +67,10 @@ def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P].
+    """A kind of load and its posterior: ``probability``, mean sizes [R, P], covariance [R, P, P].
 
-    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span, and where along the chord
-    they act; None for smooth loads, and without a probe that turns. ``driven``: a motion of the rods instead.
+    ``centre``, ``width`` (standard deviation) and ``chord`` (0 to 1) of localised loads; None for smooth loads, and
+    ``chord`` for a probe without moments. ``driven``: turns of the rods instead.
     """
 
     probability: float
@@ -88,12 +87,12 @@ class Inferred:
     """Loads under each of R conditions.
 
     Attributes:
-        probe: whose unit loads they are made of.
+        probe: its unit loads.
         names: of the recordings.
         crossings: of the recordings, :attr:`Case.crossing`.
         kinds: of load, the most probable first.
-        evidence: [R] natural logarithm, for a load in this recording over none.
-        floor: [R], by which the noise was taken to be larger than told, because no load explains the rest.
+        evidence: [R] log evidence for a load in this recording relative to none.
+        floor: [R] factor by which the noise was raised to the residual that no load explains.
     """
 
     probe: Probe
@@ -105,18 +104,18 @@ class Inferred:
 
     @property
     def placed(self) -> float:
-        """Probability of loads of one place."""
+        """Probability of localised loads."""
         return sum(kind.probability for kind in self.kinds if kind.centre is not None)
 
     @property
     def driven(self) -> bool:
-        """Whether the rods move otherwise, and no load acts."""
+        """Whether the drive rods are in error, and no load acts."""
         return self.kinds[0].driven
 
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
-        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat.
+        """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
 
-        Of rods that move otherwise their turns, deg, [R, 2, phase].
+        For errors of the drive, the rods' turns, deg, [R, 2, phase].
         """
         values, errors = [], []
         weight = np.array([kind.probability for kind in self.kinds])
@@ -134,24 +133,23 @@ class Inferred:
 
     @property
     def reported(self) -> slice:
-        """The forces among the sizes, or the turns of the rods."""
+        """The sizes that are reported: forces, or turns of the rods."""
         return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
 
     @property
     def noise_inflation(self) -> float:
-        """Mean square of what is left, in parts of the noise's: of two models, the one with less is nearer."""
+        """Mean square of the remaining residual divided by the noise variance; of two models the lower is better."""
         return float(np.mean(self.floor**2))
 
 
 @dataclass(frozen=True)
 class LoadPlace:
-    """Where and when the missing load acts: centres with 90 % intervals, and the parts in which it mostly acts.
+    """Where and when the missing load acts: centres with 90 % intervals, and extents.
 
-    ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
-    the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
-    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start); ``chord`` in parts of
-    it from the leading edge, None where the load is spread smoothly, or the probe does not turn. Of rods that move
-    otherwise there is a phase only.
+    ``span`` and ``extent``, which holds 90 % of the load, from 0 to 1; ``phase`` in beats from the start of the beat,
+    None where the load is spread over the beat; ``duration``, which holds 90 % of the load above half of its maximum
+    (it may start below 0 or end beyond 1); ``chord`` from the leading edge, None for a smooth load or a probe without
+    moments. Errors of the drive have a phase only.
     """
 
     span: Interval | None
@@ -162,15 +160,17 @@ class LoadPlace:
 
 
 class _NormalEquations:
-    """Normal equations of one recording, the noise raised to what no load and no gene explains."""
+    """Normal equations of one recording, with the noise raised to the residual that no load and no gene explains."""
 
     def __init__(self, case: Case) -> None:
         H, S, y = case.responses, case.sensitivities, case.residual
         both = np.concatenate([H, S], axis=1)
         remainder = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
         size, left_over = both.shape[1], float(remainder @ remainder)
-        told = max(float(y @ y) - left_over - size, 0.0) / size  # mean square, in the directions of loads and genes
-        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + NONLINEARITY**2 * told))
+        explained = (
+            max(float(y @ y) - left_over - size, 0.0) / size
+        )  # mean square, in the directions of loads and genes
+        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + NONLINEARITY**2 * explained))
         scale = self.floor**-2
         self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
         self.h, self.s = scale * (H.T @ y), scale * (S.T @ y)
@@ -179,10 +179,10 @@ class _NormalEquations:
         self.load_score = self.h - self.B @ genes @ self.s
 
     def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
-        """Logarithm of the evidence over that of no load, [K, strengths].
+        """Log evidence relative to no load, [K, strengths].
 
-        Of loads that are sums of ``shapes``, K times [Z, stations], each times independent normal numbers for every one
-        of M terms, with standard deviations ``spread`` [M] times the strength.
+        A load is the sum of one of K ``shapes``, [Z, stations] each, times independent normal numbers for each of M
+        terms, with standard deviations ``spread`` [M] times the strength.
         """
         return np.concatenate(
             [self._evidence(np.array(list(alike)), spread) for _, alike in groupby(shapes, key=len)]
@@ -199,19 +199,18 @@ class _NormalEquations:
         whole = (blocks * spread[:, None, None] * spread).reshape(K, Z * M, Z * M)
         along = ((shapes @ self.load_score.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
         size, turn = np.linalg.eigh(whole)
-        told = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
+        power = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
         along = (along @ turn) * _STRENGTHS[:, None]
-        return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
+        return np.asarray(0.5 * (along**2 / (1.0 + power) - np.log1p(power)).sum(axis=2))
 
 
 def infer(
     cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
 ) -> Inferred:
-    """Invert ``cases``, which share the nominal genes; ValueError where there is none.
+    """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 
-    Kinds of load are averaged over; rods that move otherwise are told where nothing else does as well.
-    ``chord`` [stations] of the wing at the probe's (m), for one that turns; ``doubt`` about the model's responses, as a
-    part of the evidence.
+    Averages over kinds of load; errors of the drive are reported where no load explains as much. ``chord`` [stations]
+    (m) of the wing, for a probe with moments; ``response_error``: uncertainty of the evidence by the model's responses.
     """
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
@@ -230,7 +229,7 @@ def infer(
     total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
     weight = np.exp((total - total.max()) / max(response_error * float(total.max()), 1.0))
     driving = np.array([form.family.driven for form in forms])
-    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that do as well as rods are huge ones at the root
+    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that imitate rods are huge ones at the root
     kept = [int(k) for k in np.argsort(-weight)[:_MAX_KINDS] if weight[k] >= _MIN_RELATIVE_PROBABILITY]
     kinds = []
     for k in kept:
@@ -249,7 +248,7 @@ def infer(
 
 
 def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> tuple[Array, Array]:
-    """Loads [R, P] and their covariance [R, P, P], the genes free: the loads are eliminated first."""
+    """Loads [R, P] and their covariance [R, P, P] with free genes; the loads are eliminated first."""
     F = len(normals[0].s)
     precision, slope = np.eye(F) / GENE_ERROR_SD**2, np.zeros(F)
     inner = []
@@ -266,9 +265,9 @@ def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> t
 
 
 def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
-    """The load under each condition at the probe's stations and PHASES instants from the start of the beat on.
+    """The load under each condition at the probe's stations and PHASES instants from the start of the beat.
 
-    Of rods that move otherwise, what each of these turns further, rad.
+    For errors of the drive, the additional turn of each rod, rad.
     """
     phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
     values, errors = inferred.fields(np.array(stations), phase)
@@ -286,9 +285,9 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
 
 
 def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
-    """Where and when the load acts, over all recordings that show one; None where none does.
+    """Where and when the load acts, over all recordings with one; None where there is none.
 
-    From draws of what the data leave possible. The centre in the beat is that of what is larger than half of the most.
+    From posterior draws. The centre in the beat is that of the load above half of its maximum.
     """
     shown = np.flatnonzero(inferred.evidence > MIN_EVIDENCE)
     if not len(shown):
@@ -316,7 +315,7 @@ def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
     span, extent = _span_location(np.concatenate(along))
     likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
-    if likeliest is not None and inferred.placed > 0.5:  # the mean of all places lies between root and tip
+    if likeliest is not None and inferred.placed > 0.5:  # the mean over all locations would lie between root and tip
         span = _with_interval(likeliest.centre, span)
         chord = (
             _with_interval(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
@@ -327,7 +326,7 @@ def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
 
 
 def _with_interval(value: float | None, draws: Interval) -> Interval:
-    """``value`` with the interval of draws, which it may lie at an end of."""
+    """``value`` with the interval of the draws, extended to contain it."""
     if value is None or draws.low is None or draws.high is None:
         return draws
     return Interval(value, min(draws.low, value), max(draws.high, value))
@@ -336,9 +335,9 @@ def _with_interval(value: float | None, draws: Interval) -> Interval:
 def _posterior_draws(
     inferred: Inferred, kind: Kind, shown: npt.NDArray[np.int64], phase: Array, count: int, rng: np.random.Generator
 ) -> Array:
-    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square.
+    """Draws of the loads [shown, count, span, phase], divided by each recording's root mean square.
 
-    Of rods that move otherwise [shown, count, 2, phase].
+    For errors of the drive [shown, count, 2, phase].
     """
     places, found = np.eye(2) if kind.driven else inferred.probe.hats(_SPAN), []
     for r in shown:
@@ -352,7 +351,7 @@ def _posterior_draws(
 
 
 def _span_location(size: Array) -> tuple[Interval, tuple[float, float]]:
-    """Centre of loads of sizes [draws, span] with its interval, and the part of the span with 90 % of them."""
+    """Centre with interval of loads of sizes [draws, span], and the range that holds 90 % of them."""
     share = size / size.sum(axis=1, keepdims=True)
     centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
     total = np.cumsum(share.mean(axis=0))

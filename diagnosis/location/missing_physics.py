@@ -1,4 +1,4 @@
-"""What the nominal model lacks, as a load or a motion of its drive: where it acts, and a free-form law for a load."""
+"""The missing load, or error of the drive, of the nominal model: where it acts, and a free-form law for a load."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ Array = npt.NDArray[np.float64]
 
 PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 MAX_INERTIA_RATIO = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
-MAX_RECORDINGS = 3  # recordings that are probed: those with the largest misfit
+MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
 
 
 @dataclass(frozen=True)
 class MissingPhysics:
-    """What is lacking: per recording, its place, and a law; nothing where the rig cannot be probed.
+    """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
 
-    ``driven``: it is no load, but rods that move otherwise. ``pulse``: when a force acts, where forces were recorded.
+    ``driven``: the drive rods are in error, and no load acts. ``pulse``: instant of a force, for recordings of forces.
     """
 
     loads: tuple[MissingLoad, ...] = ()
@@ -48,23 +48,23 @@ class MissingPhysics:
 
     @property
     def span(self) -> Interval | None:
-        """Where along the span it acts."""
+        """Location along the span."""
         return None if self.place is None else self.place.span
 
     @property
     def chord(self) -> Interval | None:
-        """Where along the chord."""
+        """Location along the chord."""
         return None if self.place is None else self.place.chord
 
     @property
     def phase(self) -> Interval | None:
-        """When in the beat it acts."""
+        """Instant in the beat."""
         return self.pulse if self.place is None else self.place.phase
 
 
 @dataclass(frozen=True)
 class LoadEstimate:
-    """What is ``inferred`` to be lacking from ``cases``: recordings, with one model's responses and ``motions``."""
+    """The load ``inferred`` from ``cases`` (recordings with one model's responses), and the model's ``motions``."""
 
     cases: tuple[Case, ...]
     motions: tuple[StationMotion, ...]
@@ -72,14 +72,14 @@ class LoadEstimate:
 
 
 def largest_residuals(data: WhitenedData, nominal: Refit) -> list[int]:
-    """Numbers of the recordings that are probed."""
+    """Indices of the recordings that are probed."""
     return [int(r) for r in np.argsort(-data.excess_by_recording(nominal.fit.coefficients))[:MAX_RECORDINGS]]
 
 
 def load_estimates(
     models: Sequence[tuple[Subject, Refit]], data: WhitenedData, which: Sequence[int]
 ) -> Iterator[tuple[str, LoadEstimate | None]]:
-    """What is lacking by each of ``models``, which are fitted; before each recording ``which`` is probed, its name."""
+    """The load that each of the fitted ``models`` is missing; yields the name of each recording before it is probed."""
     for subject, nominal in models:
         fit = nominal.fit
         genome, found = fit.problem.genomes(np.array(list(fit.values.values())))[0], []
@@ -94,7 +94,7 @@ def load_estimates(
 
 
 def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysics:
-    """What is lacking by the model that leaves least, of those that could be probed most; ``law`` asks for one."""
+    """The estimate of the model with the smallest residual among those probed most; ``law``: fit a free-form law."""
     if not found:
         return MissingPhysics()
     whole = max(len(guess.cases) for guess in found)
@@ -109,7 +109,7 @@ def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysi
 
 
 def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:
-    """Whether the loads are no larger than some times the wing's own inertia: what is lacking may be no load at all."""
+    """Whether the loads are at most MAX_INERTIA_RATIO times the wing's inertia; larger ones are no loads."""
     size = np.sqrt(np.mean([np.mean(np.square(load.values)) for load in loads]))
     own = np.sqrt(np.mean([np.mean((motion.mass[:, None] * motion.acceleration) ** 2) for motion in motions]))
     return bool(size <= MAX_INERTIA_RATIO * own)
@@ -129,7 +129,7 @@ def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
 
 
 def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tuple[MissingLoad, ...]:
-    """Of recordings of forces, the missing force along the axis in which most is missing."""
+    """For recordings of forces, the missing force along the axis with the largest residual."""
     found = []
     for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
         power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
@@ -144,10 +144,10 @@ def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tupl
 def missing_force(
     name: str, residuals: Array, phase: Array, noise: float, lag1: float, harmonics: int = 8
 ) -> MissingLoad:
-    """Of a recording of forces, the missing force itself: what the mean beat of one axis lacks, N.
+    """For a recording of forces, the missing force: the mean beat of one axis' residual, N.
 
     ``residuals`` [T] simulated minus recorded (N, NaN where missing) at ``phase`` [T] (beats from the start of the
-    beat); ``noise`` its standard deviation (N) with correlation ``memory`` from sample to sample.
+    beat); ``noise`` its standard deviation (N) with lag-1 autocorrelation ``lag1``.
     """
     seen = np.isfinite(residuals)
     series = Probe((0.0, 1.0), harmonics).terms

@@ -1,10 +1,10 @@
-"""When in the beat a force acts that a model lacks: a pulse that does so, the nominal genes free.
+"""The instant of a missing force: the pulse that explains most of the residual, the nominal genes free.
 
-The misfit that is left by a fit is not the force that lacks: genes have taken up what they can, and a low-pass has
-spread the rest. So a short pulse is put at every instant of the beat, with a size of its own in every channel of every
-recording; where it takes most away, with what the genes can do taken out of both, it acts. A matched filter (Turin, IRE
-Transactions on Information Theory 6, 311, 1960) would put the pulse through the low-pass as well; that would as soon
-fit what swings back, and errs by twice as much. How much a pulse there explains is told by one that went through it.
+The residual of a fit is not the missing force: genes have absorbed what they can, and a low-pass has spread the rest.
+So a short pulse is placed at every instant of the beat, with an independent size in every channel of every recording;
+the force acts where the pulse explains most, after the genes are projected out of both. A matched filter (Turin, IRE
+Transactions on Information Theory 6, 311, 1960) would low-pass the pulse as well; it would equally fit the ringing of
+the filter, and its error is twice as large. The significance of the pulse is tested with a low-passed one.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ Array = npt.NDArray[np.float64]
 
 INSTANTS = 144
 WIDTH = 0.015  # of a beat, standard deviation
-MIN_EXPLAINED = 0.1  # of the misfit: a pulse that takes less tells no instant
-FALSE_ALARM_PROBABILITY = 0.01  # that noise alone makes one take as much at any of them
+MIN_EXPLAINED = 0.1  # of the residual: a pulse that explains less has no instant
+FALSE_ALARM_PROBABILITY = 0.01  # that noise alone explains as much at any instant
 
 
 def locate_pulse(subject: Subject, data: WhitenedData, fit: Fit) -> Interval | None:
-    """Instant (beats) of the pulse that takes most of what ``fit`` leaves; None where none takes much.
+    """Instant (beats) of the pulse that explains most of the residual of ``fit``; None where none is significant.
 
-    Its interval holds the instants at which it would take nearly as much, a misfit counting as a model's error.
+    Its interval contains the instants at which it would explain nearly as much, given the model error.
     """
     nuisance = Nuisance(data, fit)
     left, white = nuisance.residual, fit.coefficients / data.scale
@@ -55,16 +55,16 @@ def locate_pulse(subject: Subject, data: WhitenedData, fit: Fit) -> Interval | N
 
 
 def _extent(near: npt.NDArray[np.bool_], apart: Array, sign: int) -> float:
-    """How far the instants that are ``near`` reach to one side without a gap, and half an instant beyond."""
+    """Distance to which the instants ``near`` extend on one side without a gap, plus half an instant."""
     order = np.argsort(np.where(sign * apart >= 0, sign * apart, np.inf))[: INSTANTS // 2]
     ends = np.flatnonzero(~near[order])
     return float(sign * apart[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
 
 
 def _pulses(subject: Subject, data: WhitenedData, at: float, *, low_passed: bool = False) -> Array:
-    """[channels, D]: a pulse ``at`` an instant (beats) in every channel of every recording, by itself.
+    """Coefficients [channels, D] of a pulse ``at`` an instant (beats) in each channel of each recording separately.
 
-    Sharp, or ``passed`` through the low-pass of the recording.
+    Sharp, or ``low_passed`` like the recording.
     """
     rows = []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):

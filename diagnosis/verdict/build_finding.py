@@ -1,4 +1,4 @@
-"""From an assessment to a finding: what was decided, where, how sure, the proof, and what to record next."""
+"""From a finished search to a finding: verdict, location, validation, and the next experiment."""
 
 from __future__ import annotations
 
@@ -35,23 +35,24 @@ from wingfit.records import Recording
 Array = npt.NDArray[np.float64]
 Step = tuple[float, str, Finding | None]
 
-WORSE_FACTOR = 1.1  # times the misfit before: a recording that is fitted worse is told
+WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
 def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], evaluator: Evaluator) -> Iterator[Step]:
-    """Make the finding of an assessment that has ended; yields the part of the work done and what comes next."""
+    """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last."""
     if state.nominal is None or state.weights is None:
-        raise ValueError("a finding needs an assessment that has ended")
+        raise ValueError("a finding needs a search that has ended")
     decision = decide(state.weights)
     best = state.nominal.refit if decision.verdict == "adequate" else decision.best
-    yield 0.0, "measuring how well genes are told", None
+    yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
     yield 0.05, "predicting the held-out recordings", None
     seen, failed = predict_held_out(held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit)
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
-        for fraction, stage, texts in _locate_missing_physics(state, evaluator, unnamed=decision.verdict == "unnamed"):
-            missing = texts
+        unnamed = decision.verdict == "unnamed"
+        for fraction, stage, located in _locate_missing_physics(state, evaluator, unnamed=unnamed):
+            missing = located
             yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
     if decision.verdict != "adequate":
@@ -66,7 +67,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
 
 
 def _is_load(decision: Decision, best: Refit) -> bool:
-    """Whether what was named acts as a load: a drive or a camera that is off moves markers without any."""
+    """Whether the named effects act as loads: faults of a drive or camera move markers without a load."""
     families = {trial.suspect.family for trial in best.trials}
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
@@ -74,7 +75,7 @@ def _is_load(decision: Decision, best: Refit) -> bool:
 def _locate_missing_physics(
     state: SearchState, evaluator: Evaluator, *, unnamed: bool
 ) -> Iterator[tuple[float, str, MissingPhysics]]:
-    """What is lacking, recording by recording; of what is ``unnamed`` by a finer division as well, and with a law."""
+    """Locate the missing physics recording by recording; where it is ``unnamed``, also with a finer model and a law."""
     data, nominal = state.data, state.fitted_nominal.refit
     if data.recordings[0].kind == "forces":
         when = locate_pulse(state.subject, data, nominal.fit) if unnamed else None
@@ -90,17 +91,17 @@ def _locate_missing_physics(
     for k, (name, guess) in enumerate(load_estimates(models, data, which)):
         yield k / ((len(which) + 1.0) * len(models)), f"probing the wing under {name}", MissingPhysics()
         found += [guess] if guess is not None else []
-    yield 1.0, "locating what is missing", missing_physics(found, law=unnamed)
+    yield 1.0, "locating the missing physics", missing_physics(found, law=unnamed)
 
 
 def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics, evaluator: Evaluator) -> Where:
-    """Where the misfit lies; of an effect that is named, where this acts: the fit smears a misfit over the beat."""
+    """Where the misfit lies; for a named effect, where the effect acts: a fit spreads a misfit over the beat."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
         acts = effect_contribution(data, evaluator, best)
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
-    held = state.fitted_nominal.refit if decision.verdict == "unnamed" else best  # the nearest is not what is lacking
+    held = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
     own = {gene.name: gene.value for gene in all_genes(state.data, held)}
     span, chord = (
         _effect_location(held, own, "span") or missing.span,
@@ -119,7 +120,7 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
 
 
 def _effect_location(best: Refit, genes: Mapping[str, Interval], along: Literal["span", "chord"]) -> Interval | None:
-    """Where the effect itself says that it acts, by its own ``genes``; None where it has no place."""
+    """Location of the effect by its own ``genes``; None where it has none."""
     return next(
         (genes[one.suspect.location_genes[along]] for one in best.trials if along in one.suspect.location_genes), None
     )
@@ -137,7 +138,7 @@ def _finding(
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.weights
     if state.nominal is None or weights is None:
-        raise ValueError("a finding needs an assessment that has ended")
+        raise ValueError("a finding needs a search that has ended")
     nominal, division = state.nominal.refit, _discretisation_error(state)
     own = ResidualPair(data, nominal.fit.residuals, best.fit.residuals)
     rows = recording_misfits(own, held_out=False, floor=division)
@@ -188,9 +189,9 @@ def _finding(
 
 
 def _discretisation_error(state: SearchState) -> float:
-    """Misfit that the model's division leaves: what a finer one says, but no more than the best explanation leaves.
+    """Misfit by the discretisation, from a finer one, at most the residual of the best hypothesis.
 
-    None of it where a finer division fits no better.
+    Zero where a finer discretisation fits no better.
     """
     if (
         state.nominal is None
@@ -214,7 +215,7 @@ def _floors(state: SearchState, division: float) -> Floors:
 def _summary_texts(
     data: WhitenedData, nominal: Refit, best: Refit, place: str, proved: Proof | None
 ) -> Mapping[str, str]:
-    """What the summary is made of, in words."""
+    """The parts of the summary as text."""
     unit = "mm" if data.recordings[0].kind == "tracks" else "mN"
 
     def size(excess: float) -> str:
@@ -227,47 +228,45 @@ def _summary_texts(
         "where": place,
         "held_out": f"On {proved.words}."
         if proved
-        else "No held-out recording could be predicted, so that nothing proves it.",
+        else "No held-out recording could be predicted, so the result is not validated.",
     }
 
 
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
     if not nominal.ineffective_refinement:
         return ()
-    return (
-        f"a finer division ({nominal.ineffective_refinement}) was fitted and hardly did better: the division is not what limits",
-    )
+    return (f"a finer discretisation ({nominal.ineffective_refinement}) hardly fits better: the cause is another",)
 
 
 def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
-    untold = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
+    within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
     still = {r.name: still_markers(r) for r in data.recordings}
-    doubts = [
-        f"{name}: the recorded place of {', '.join(markers)} never changes; left out: check how tracks are exported"
+    remarks = [
+        f"{name}: the recorded position of {', '.join(markers)} never changes; ignored: check how tracks are exported"
         for name, markers in still.items()
         if markers
     ]
-    if untold:
-        doubts.append(
-            f"{', '.join(untold)}: less than two beats in the order of the frames, so that noise is known only from "
-            "what no harmonic of the beat explains; slow noise may pass for misfit"
+    if within_beats:
+        remarks.append(
+            f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
+            "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
         )
-    return tuple(doubts)
+    return tuple(remarks)
 
 
 def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, ...]:
-    """Sizes of what was put in that may lie anywhere in their boxes."""
+    """Remark on sizes of added effects that the data do not bound."""
     sizes = {name for trial in best.trials for name in trial.suspect.size_genes}
     open_ = [one.name for one in genes if one.name in sizes and one.value.low is None and one.value.high is None]
-    return (f"these recordings do not tell how large {', '.join(open_)} is",) if open_ else ()
+    return (f"these recordings do not identify {', '.join(open_)}: its interval is not bounded",) if open_ else ()
 
 
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
-    """Recordings that what was put in makes worse."""
+    """Remark on recordings that fit worse with the added effects."""
     name = "mm" if unit == "m" else "mN"
     worse = [
         f"{row.name} from {1e3 * row.before.value:.3g} to {1e3 * row.after.value:.3g} {name}"
         for row in rows
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]
-    return (f"with what was found the misfit grows in {', '.join(worse)}",) if worse else ()
+    return (f"with the added effects the misfit increases in {', '.join(worse)}",) if worse else ()

@@ -1,4 +1,4 @@
-"""What to record next: the condition under which the explanations that are still alive differ most."""
+"""The next experiment: the condition under which the remaining hypotheses differ most."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from wingfit.records import Condition, Recording
 
 Array = npt.NDArray[np.float64]
 
-MIN_PROBABILITY = 0.02  # probability from which an explanation is alive
-MAX_RIVALS = 3
-MAX_ADVICE = 5  # conditions
-NEARLY_CERTAIN = 0.9  # probability from which few conditions are compared: there is little to separate
-MAX_CONDITIONS_IF_CERTAIN = 8
+MIN_PROBABILITY = 0.02  # of a hypothesis that is compared
+MAX_RIVALS = 3  # hypotheses that are compared
+MAX_ADVICE = 5  # conditions that are reported
+NEARLY_CERTAIN = 0.9  # probability from which fewer conditions are compared
+MAX_CONDITIONS_IF_CERTAIN = 8  # conditions
 
 
 def rival_refits(weights: HypothesisWeights) -> list[Refit]:
-    """The explanations that are still alive, most probable first; a single one with the next. None where none is."""
+    """Hypotheses that are still probable, most probable first; a single one with the next; else empty."""
     order = np.argsort(-weights.probabilities, kind="stable")
     rivals = [k for k in order if weights.probabilities[k] >= MIN_PROBABILITY]
     return [weights.refits[k] for k in (order[:2] if len(rivals) == 1 else rivals)[:MAX_RIVALS]]
@@ -39,11 +39,11 @@ def rival_refits(weights: HypothesisWeights) -> list[Refit]:
 def separations(
     subject: Subject, data: WhitenedData, weights: HypothesisWeights, evaluator: Evaluator
 ) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
-    """How far explanations would lie apart under conditions that might be recorded, with the part that is done.
+    """Separation of the hypotheses under candidate conditions; yields the fraction done and each result.
 
-    First as they were fitted, then, where that is far, by what a rival cannot make up for, which is never more: until
-    no other condition can be among the best TOLD. Nothing where no two explanations are left or no other condition can
-    be run.
+    Conditions are ordered by the separation with fixed genes, an upper bound; then rivals may adapt their genes, until
+    no other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no
+    conditions.
     """
     rivals, able = rival_refits(weights), subject.candidate_conditions()
     if len(rivals) < 2:
@@ -79,7 +79,7 @@ def rank_conditions(
 
 @dataclass(frozen=True)
 class _PredictedCondition:
-    """A condition with what the first explanation, of ``genome`` [G], shows under it."""
+    """The ``recording`` that the first hypothesis, with ``genome`` [G], predicts under a condition."""
 
     genome: Array
     recording: Recording
@@ -102,7 +102,7 @@ def _smallest_separation(
     *,
     refit_genes: bool,
 ) -> float | None:
-    """Of several rivals; None where one of them cannot be simulated."""
+    """Smallest separation of several rivals; None where one of them cannot be simulated."""
     every = [
         separation(subject, data, scene.genome, scene.recording, one.fit, evaluator, refit_genes=refit_genes)
         for one in others
@@ -121,11 +121,11 @@ def separation(
     *,
     refit_genes: bool,
 ) -> float | None:
-    """Root mean square difference (in noises) of a rival from what the first explanation foretells.
+    """Root mean square difference (in noises) of a rival from the first hypothesis' prediction ``recording``.
 
-    Where it ``adapts``, with its genes moved as far as the recordings that there are allow. What makes two explanations
-    alike is that their genes differ: where these alone set them apart, a new recording is met by other genes (Atkinson
-    and Fedorov 1975: T-optimality; here with what is known of the genes already).
+    With ``refit_genes`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
+    can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
+    the genes). None where the rival cannot be simulated.
     """
     problem = Problem(
         subject.with_initial_motion(rival.problem.model, genome),
@@ -153,14 +153,14 @@ def separation(
 
 
 def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
-    """Of the square of a ``difference`` [n] (in noises): what genes with ``slopes`` [F, n] take, and cost elsewhere."""
-    memory = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
+    """Part of the square of ``difference`` [n] (in noises) that genes with ``slopes`` [F, n] explain, less its cost."""
+    lag1 = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
     likelihood_weight = data.likelihood_weight(rival.coefficients)
-    counts = likelihood_weight * (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
+    counts = likelihood_weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
     known = rival.jacobian / data.scale[:, None]
-    titles = likelihood_weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
+    information = likelihood_weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
     score = slopes @ difference
-    return float(counts * score @ np.linalg.solve(titles + counts * slopes @ slopes.T, score))
+    return float(counts * score @ np.linalg.solve(information + counts * slopes @ slopes.T, score))
 
 
 def _advice(
@@ -176,10 +176,11 @@ def _advice(
     where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
-    names = tuple(" and ".join(one.names) or "nothing lacking" for one in rivals)
-    titles = [" with ".join(trial.suspect.title.lower() for trial in one.trials) or "nothing lacking" for one in rivals]
+    between = tuple(" and ".join(one.names) or "no missing physics" for one in rivals)
+    suspects = [[trial.suspect.title.lower() for trial in one.trials] for one in rivals]
+    titles = [" with ".join(names) or "no missing physics" for names in suspects]
     return Advice(
-        f"record at {where}: {' or '.join(titles)} would differ by {apart:.2g} times the noise",
+        f"record {where}: there the predictions of {' and '.join(titles)} differ by {apart:.2g} sigma",
         condition.flap_frequency,
         lag,
         condition.pressure / 100.0,
@@ -187,5 +188,5 @@ def _advice(
         incidence,
         apart,
         resolves,
-        names,
+        between,
     )

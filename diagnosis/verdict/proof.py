@@ -18,15 +18,15 @@ from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
 
-BOOTSTRAP_DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
-MIN_MARKERS = 4  # markers to draw from
+BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
+MIN_MARKERS = 4  # for a bootstrap over markers
 
 
 @dataclass(frozen=True)
 class ResidualPair:
-    """Residuals [T, C] of each recording of a stack, with the nominal model and with what was found.
+    """Residuals [T, C] of each recording of ``data``, with the nominal model and with the added effects.
 
-    ``broken``: what was found could not be simulated under every recording; those are not among the stack's.
+    ``incomplete``: the model with the effects could not be simulated for every recording; those are not in ``data``.
     """
 
     data: WhitenedData
@@ -38,7 +38,10 @@ class ResidualPair:
 def predict_held_out(
     recordings: Sequence[Recording], axes: tuple[str, ...], evaluator: Evaluator, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
-    """Predict recordings that neither model was fitted to, and say which cannot be; None where none can by both."""
+    """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
+
+    None where no recording can be simulated with both models.
+    """
     kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
         one, found, reasons = WhitenedData.of([recording], axes), [], []
@@ -49,8 +52,8 @@ def predict_held_out(
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
         if any(reasons):
-            which = "the nominal model" if reasons[0] else "what was found"
-            failed.append(f"{recording.name} was not predicted: {which} fails there: {reasons[0] or reasons[1]}")
+            which = "the nominal model" if reasons[0] else "the model with the added effects"
+            failed.append(f"{recording.name} was not predicted: {which} fails: {reasons[0] or reasons[1]}")
         else:
             kept.append(recording)
             pairs.append((found[0], found[1]))
@@ -61,7 +64,7 @@ def predict_held_out(
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
-    """Misfit to each recording; ``floor`` (m or N) is what the model's division leaves beside the noise."""
+    """Misfit to each recording; ``floor`` (m or N) is the discretisation error."""
     rows = []
     for r, recording in enumerate(predicted.data.recordings):
         beat_fit, condition = predicted.data.beat_fits[r], recording.condition
@@ -85,9 +88,9 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
 
 
 def proof(predicted: ResidualPair, floor: float, unit: str, *, put_in: bool) -> Proof:
-    """What the held-out recordings say of both models together; ``floor`` as in :func:`recording_misfits`.
+    """Misfit of both models over all held-out recordings; ``floor`` as in :func:`recording_misfits`.
 
-    ``put_in``: whether the models differ.
+    ``put_in``: whether effects were added, so that the models differ.
     """
     data = predicted.data
     used, kinds = [beat_fit.used for beat_fit in data.beat_fits], [one.kind for one in data.recordings]
@@ -101,7 +104,7 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, put_in: bool) -> 
     several = "s" if len(data.recordings) > 1 else ""
     words = f"{len(data.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
     if put_in and not better:
-        words += "; that it is better is not sure"
+        words += "; the improvement is not significant"
     return Proof(_relative_to_floor(before, least), _relative_to_floor(after, least), least, better, words)
 
 
@@ -113,7 +116,7 @@ def _relative_to_floor(interval: Interval, floor: float) -> Interval:
 def _misfits(
     predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
 ) -> tuple[Interval, Interval, bool]:
-    """Root mean squares before and after with intervals, and whether after is surely less."""
+    """Root mean squares before and after with intervals, and whether the decrease is significant."""
     groups: list[Array] = []
     for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
         width = 3 if kind == "tracks" else 1
@@ -123,7 +126,7 @@ def _misfits(
         rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
         groups.append(rows[:, rows[2] > 0])
     every = np.concatenate(groups, axis=1)
-    if "forces" in kinds or every.shape[1] < MIN_MARKERS:  # stretches of time instead of markers
+    if "forces" in kinds or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
         every = _time_blocks(predicted, used)
     drawn = np.random.default_rng(0).integers(0, every.shape[1], (BOOTSTRAP_DRAWS, every.shape[1]))
     sums = every[:, drawn].sum(axis=2)
@@ -135,6 +138,7 @@ def _misfits(
 
 
 def _time_blocks(predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+    """Sums of squares before and after and counts [3, N] over blocks of time."""
     rows = []
     for before, after, own in zip(predicted.before, predicted.after, used, strict=True):
         for part in np.array_split(np.arange(len(before)), count):

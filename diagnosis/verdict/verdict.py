@@ -1,4 +1,4 @@
-"""From weighed hypotheses to a verdict, in words and with genes."""
+"""From the probabilities of hypotheses to a verdict, its summary and its genes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from wingfit.diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from wingfit.diagnosis.subject import Suspect
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 
-MAX_SCREENED_LISTED = 12  # suspects that were not refitted and are told all the same
+MAX_SCREENED_LISTED = 12  # suspects that were only score-tested and are still listed
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict, probabilities of all verdicts, the effects it names, and the best refit."""
+    """The verdict, the probabilities of all verdicts, named effects, ``alike`` hypotheses, and the best refit."""
 
     verdict: Verdict
     probabilities: dict[str, float]
@@ -30,7 +30,7 @@ class Decision:
 
 
 def decide(weights: HypothesisWeights) -> Decision:
-    """Which verdict the probabilities of the hypotheses make."""
+    """The verdict that the probabilities of the hypotheses imply."""
     policy = weights.policy
     nominal, effects = float(weights.probabilities[0]), weights.probabilities[1:]
     refits = weights.refits[1:]
@@ -56,7 +56,7 @@ def decide(weights: HypothesisWeights) -> Decision:
         verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
-        if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # the nearest is put in if it earns it
+        if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # worth its genes
             best = refits[int(np.argmax(weights.evidence[1:]))]
     weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
     alike = tuple(refit.names for refit in possible) if weighing else ()
@@ -68,14 +68,14 @@ def decide(weights: HypothesisWeights) -> Decision:
 
 
 def _common_subset(possible: Sequence[Refit]) -> Refit | None:
-    """The one of them that all others only add to: it is what lacks, whether or not more does. None without one."""
+    """The hypothesis contained in all others: it is missing whether or not more is. None where there is none."""
     return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 
 def hypotheses(
     data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]]
 ) -> tuple[Hypothesis, ...]:
-    """All that was weighed, most probable first, then what was only tested, by score."""
+    """All weighed hypotheses, most probable first, then those that were only score-tested, by score."""
     order = np.argsort(-weights.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
     texts = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
@@ -95,7 +95,7 @@ def _refitted_hypothesis(
         predicted = _explained_fraction(refit.predicted, nominal.predicted)
     return Hypothesis(
         effects=refit.names,
-        title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
+        title=" and ".join(s.title for s in suspects) or "No missing physics",
         family=suspects[0].family if suspects else "",
         source="; ".join(s.source for s in suspects),
         signature="; ".join(s.signature for s in suspects),
@@ -112,7 +112,7 @@ def _refitted_hypothesis(
 
 
 def _explained_fraction(left: float, before: float) -> float:
-    """Which part of a mean square beyond the noise is gone; of nothing, nothing."""
+    """Fraction of the excess ``before`` that is removed; zero where there was none."""
     return float(np.clip(1.0 - max(left, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
@@ -157,32 +157,32 @@ def _is_measurement_fault(refit: Refit) -> bool:
 
 
 def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[str, str]) -> str:
-    """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
+    """The verdict in a few sentences; ``texts`` has "before", "after", "noise", "where" and "held_out"."""
     names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
-    start = f"After the best refit the nominal model leaves {texts['before']}; the noise is {texts['noise']}."
+    start = f"The misfit of the refitted nominal model is {texts['before']}; the noise is {texts['noise']}."
     if decision.verdict == "adequate":
-        return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
+        return f"The model is adequate: these recordings show no missing physics. {start}"
     if decision.verdict == "unnamed":
-        return f"Something is lacking that nothing in the library explains: {texts['where']}. {start} " + (
-            f"The nearest that there is, {nearest}, leaves {texts['after']}."
+        return f"Physics is missing that no effect of the library explains: {texts['where']}. {start} " + (
+            f"The best effect, {nearest}, reduces the misfit to {texts['after']}."
             if nearest
-            else "No effect takes as much of it as it costs, and none was put in."
+            else "No effect explains enough to be worth its genes, and none was added."
         )
     if decision.verdict == "ambiguous":
         either = " or ".join(_titles(suspects, found, " with ") for found in decision.alike) or names
         return (
-            f"Something is lacking, and these recordings cannot tell which: {either}. {start} The best leaves "
-            f"{texts['after']}. {texts['held_out']}"
+            f"Physics is missing, and these recordings cannot distinguish: {either}. {start} "
+            f"With the most probable the misfit is {texts['after']}. {texts['held_out']}"
         )
-    kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
+    kind = "The recordings have a fault" if decision.verdict == "measurement fault" else "The model is missing"
     link = ": " if decision.verdict == "measurement fault" else " "
     wider, others = (
         [one for one in decision.alike if (set(decision.named) <= set(one)) is holds] for holds in (True, False)
     )
     besides = dict.fromkeys(name for one in wider for name in one if name not in decision.named)
     instead = [_titles(suspects, one, " with ") for one in others]
-    more = f" Whether {_titles(suspects, list(besides), ' or ')} is lacking besides is open." if besides else ""
-    more += f" Less probable, but possible instead: {' or '.join(instead)}." if instead else ""
+    more = f" Whether {_titles(suspects, list(besides), ' or ')} is missing as well is undecided." if besides else ""
+    more += f" Less probable alternatives: {' or '.join(instead)}." if instead else ""
     return f"{kind}{link}{names}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
 
 

@@ -1,17 +1,16 @@
-"""The verdict: which explanation holds, if any, with probabilities.
+"""Probabilities of the fitted hypotheses.
 
-Recordings hold so many samples that noise decides nothing: a law of the right kind, written a little differently than
-nature does, is refuted by thousands of units of chi-squared. What decides is how much of the misfit an explanation
-takes away. So hypotheses are weighed by the mean square that they leave, above what no model can be expected to
-explain: a likelihood in which the misfit of a law that is right but for its form counts as noise of unknown size,
+Recordings have so many samples that noise decides nothing: thousands of units of chi-squared refute a law of the right
+kind in a slightly different form. The fraction of the residual that a hypothesis explains decides instead. Hypotheses
+are weighed by their excess above a floor tau that no model is required to undercut, the residual of a right law in
+another form being noise of unknown size:
 
     ln p = -nu/2 ln(tau^2 + E) - genes c,
 
-E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
-nu the number of independent pieces that such misfits have (a few for each recording). Beforehand each effect is as
-unlikely as the suspects are many. Two hypotheses always compete beside the effects: *nothing is lacking*, and
-*something that is not in the library*, which is taken to explain all but a part of the misfit
-(`Policy.unknown_residual`) at the price of the genes that a law of its own would need.
+E the excess divided by the noise variance, from the fit and cross-validated, and nu the effective number of samples.
+The prior probability of each effect is one over the number of suspects. Two hypotheses always compete with the effects:
+*no physics is missing*, and *physics outside the library*, which is assumed to explain all but a fraction of the
+residual (`Policy.unknown_residual`) at the cost of the genes of a new law.
 """
 
 from __future__ import annotations
@@ -31,7 +30,10 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HypothesisWeights:
-    """Hypotheses with probabilities: of each refit (the first is the nominal model), and of an unknown law."""
+    """Evidence and probability of each refit (the nominal model first), and probability of an ``unknown`` law.
+
+    ``left``: excess of each divided by the noise variance.
+    """
 
     refits: tuple[Refit, ...]
     evidence: Array
@@ -46,8 +48,8 @@ def weigh(
 ) -> HypothesisWeights:
     """Weigh ``refits`` against the nominal model.
 
-    ``floor`` (m or N) is what the model's division leaves; ``suspects`` how many were considered: each of them is as
-    unlikely beforehand as they are many.
+    ``floor`` (m or N) is the discretisation error; ``suspects`` the number of effects considered, which sets their
+    prior.
     """
     policy = data.policy
     every = (nominal, *refits)
@@ -70,23 +72,23 @@ def weigh(
 
 
 def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
-    """Whether the nominal model leaves so much that neither noise nor a division (m or N) can be what makes it.
+    """Whether the nominal excess is too large for noise and discretisation error (``floor``, m or N) alone.
 
-    However few the pieces of it are: it is not known what is lacking then, but that something is.
+    It does not depend on the number of samples: physics is missing then, even if it is not known which.
     """
     made = (data.policy.negligible * data.noise) ** 2 + floor**2
-    return excess - made > data.policy.nominal_refuted * data.excess_standard_error
+    return excess - made > data.policy.refuting_excess * data.excess_standard_error
 
 
 def _evidence(data: WhitenedData, left: Array, genes: Array, named: Array, suspects: int) -> Array:
-    """Logarithm of the evidence, for mean squares ``left`` in parts of the noise's, the floor included."""
+    """Log evidence for mean squares ``left`` divided by the noise variance, floor included."""
     return np.asarray(
         -0.5 * data.effective_samples * np.log(left) - data.policy.gene_cost * genes - np.log(max(suspects, 2)) * named
     )
 
 
 def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
-    """Whether the nominal model leaves so little that no explanation could be worth its price, were it perfect."""
+    """Whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
     if nominal_refuted(data, nominal.excess, 0.0):
         return False
     tau = tolerated_excess(data, nominal.excess, 0.0)
@@ -96,7 +98,7 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
 
 
 def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
-    """Mean square (m^2 or N^2) that a right explanation may leave of the nominal model's ``excess``."""
+    """Mean square (m^2 or N^2) that a right hypothesis may leave of the nominal model's ``excess``."""
     policy = data.policy
     return (
         (policy.negligible * data.noise) ** 2
@@ -107,9 +109,9 @@ def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
 
 
 def _misfit(data: WhitenedData, refit: Refit, tau: float) -> float:
-    """Mean square beyond the noise: fitted and predicted, averaged in their logarithms (`Policy.predicted_weight`).
+    """Excess, fitted and cross-validated, averaged in the logarithm (`Policy.predicted_weight`).
 
-    What a linearised model foretells of a recording left out may be wrong by any factor.
+    A cross-validation by a linearised model may be wrong by any factor.
     """
     policy = data.policy
     fitted = max(refit.excess, 0.0)

@@ -50,14 +50,14 @@ def problem(data: WhitenedData, values: Mapping[str, float] | None = None) -> Pr
     return Problem(RIG.model, data.recordings, RIG.model.searched, base_genome(RIG.model, values or {}), data.axes)
 
 
-def start(problem_: Problem) -> Array:
-    genes = free_genes(problem_)
-    return unit_at(genes, np.array([problem_.base[gene.name] for gene in genes]))
+def start(own: Problem) -> Array:
+    genes = free_genes(own)
+    return unit_at(genes, np.array([own.base[gene.name] for gene in genes]))
 
 
 def fit(data: WhitenedData, values: Mapping[str, float] | None = None) -> Fit:
-    problem_ = problem(data, values)
-    *_, found = gauss_newton_fit(RIG, data, problem_, EVALUATOR, start(problem_), 20)
+    fitted_problem = problem(data, values)
+    *_, found = gauss_newton_fit(RIG, data, fitted_problem, EVALUATOR, start(fitted_problem), 20)
     return found
 
 
@@ -125,8 +125,8 @@ def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the
 
 def test_slopes_to_one_side_and_to_both_and_at_the_end_of_the_box() -> None:
     data = one()
-    problem_ = problem(data)
-    simulator, every = _Simulator(RIG, data, problem_, EVALUATOR), np.ones(len(problem_.free), bool)
+    fitted_problem = problem(data)
+    simulator, every = _Simulator(RIG, data, fitted_problem, EVALUATOR), np.ones(len(fitted_problem.free), bool)
     middle = fit(data)
     one_sided, central = (_measure_columns(simulator, middle, every, sides).jacobian for sides in (1, 2))
     assert np.linalg.norm(one_sided - central) < 0.05 * np.linalg.norm(central)
@@ -202,11 +202,11 @@ def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
 
 
 @pytest.mark.parametrize(
-    ("coarse", "asked", "taken"),
+    ("coarse", "expected", "taken"),
     [(0.1, ["coarse"], "coarse"), (0.9, ["coarse", "fine"], "fine"), (None, ["coarse", "fine"], "fine")],
 )
 def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
-    monkeypatch: pytest.MonkeyPatch, coarse: float | None, problem_: list[str], taken: str
+    monkeypatch: pytest.MonkeyPatch, coarse: float | None, expected: list[str], taken: str
 ) -> None:
     """Suspects are tried at the coarse one first, and it stays where one of them does better than the finer one."""
 
@@ -214,19 +214,19 @@ def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
         return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess))
 
     def tried(state: Any, *_: Any, **__: Any) -> Iterator[Any]:
-        begun.append(state.subject)
+        searched.append(state.subject)
         if coarse is not None:
             state.refits.append(SimpleNamespace(excess=coarse))
         yield 1.0, "tried"
 
-    begun: list[str] = []
+    searched: list[str] = []
     fits = {False: found("coarse", 1.0), True: found("fine", 0.7)}
     monkeypatch.setattr("wingfit.diagnosis.search.choose_discretisation", lambda *_, refine: fits[refine])
     monkeypatch.setattr("wingfit.diagnosis.search._test_and_refit_suspects", tried)
     monkeypatch.setattr("wingfit.diagnosis.search.nominal_suffices", lambda *_: False)
     state = SearchState(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
     parts = [part for part, _ in _search_per_discretisation(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
-    assert begun == problem_
+    assert searched == expected
     assert cast("Any", state.nominal).subject == taken
     assert cast("Any", state.subject) == taken
     assert parts == sorted(parts)
@@ -275,13 +275,13 @@ def test_a_way_round_that_cannot_be_simulated_ends_no_refit(monkeypatch: pytest.
     ((_, trials),) = score_tests(
         RIG, data, nominal, EVALUATOR, [one for one in RIG.suspects if one.name == "point_mass"]
     )
-    problem_ = []
+    calls = []
 
     def fails(*arguments: Any) -> Fit:
-        problem_.append(arguments)
+        calls.append(arguments)
         raise InitialSimulationError("it flutters")
 
-    data = replace(data, policy=replace(POLICY, astray=0.0))
+    data = replace(data, policy=replace(POLICY, diverged=0.0))
     monkeypatch.setattr("wingfit.diagnosis.evidence.refit._fit_subset", fails)
     assert refit_with_suspects(RIG, data, nominal, EVALUATOR, trials[:1]) is not None
-    assert problem_
+    assert calls

@@ -174,7 +174,7 @@ def test_a_second_effect_must_earn_its_place() -> None:
     assert set(found[1]) == {"a", "b"}
 
 
-@pytest.mark.parametrize(("uncertainty", "expected"), [(0.4, "named"), (1.2, "adequate")])
+@pytest.mark.parametrize(("excess_standard_error", "expected"), [(0.4, "named"), (1.2, "adequate")])
 def test_few_recordings_do_not_make_a_misfit_none_that_is_far_beyond_what_noise_makes(
     excess_standard_error: float, expected: str
 ) -> None:
@@ -218,7 +218,7 @@ def test_a_single_suspect_is_no_likelier_beforehand_than_one_of_two() -> None:
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
-@pytest.mark.parametrize(("nominal", "uncertainty"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
+@pytest.mark.parametrize(("nominal", "excess_standard_error"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
 def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, excess_standard_error: float) -> None:
     def outcome(unit: float) -> tuple[list[float], bool, bool]:
         scaled = cast(
