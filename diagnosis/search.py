@@ -127,13 +127,13 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     if best.excess <= tolerated_excess(state.data, 0.0, 0.0):
         return []
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
-    every = []
+    starts = []
     for part in best.trials:
-        beside = [trial for trial in best.trials if trial is not part]
+        others = [trial for trial in best.trials if trial is not part]
         for name in part.suspect.confused_with:
             if name in found and name not in best.names:
-                every += start_points(found[name], beside, best)
-    return every
+                starts += start_points(found[name], others, best)
+    return starts
 
 
 def _unconverged(weights: HypothesisWeights) -> Refit | None:
@@ -158,11 +158,11 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    ineffective_refinement, most = (
+    ineffective_refinement, limit = (
         nominal.ineffective_refinement,
         data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0),
     )
-    leading = sorted((one for one in state.refits if one.excess <= most), key=lambda one: one.excess)[:MAX_CONTINUED]
+    leading = sorted((one for one in state.refits if one.excess <= limit), key=lambda one: one.excess)[:MAX_CONTINUED]
     for finer in nominal.subject.finer_subjects():
         tried = [(one, _fit_at_finer(finer, data, evaluator, one)) for one in leading]
         if any(found is not None and found is not one for one, found in tried):
@@ -178,8 +178,8 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     if first is None:
         return
     first = fit_to_convergence(finer, data, evaluator, first)
-    most = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
-    near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
+    limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
+    near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
     followed = [_follow_to_finer(finer, data, evaluator, one, better) for one in others]
     before = state.subject.description
@@ -191,10 +191,10 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
 
 def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
     """``refit`` with a finer discretisation, fitted if that is promising; None where it cannot be simulated."""
-    changes, takes = finer_change(finer, data, evaluator, refit)
+    changes, gain = finer_change(finer, data, evaluator, refit)
     if not changes:
         return None
-    if not finer_is_promising(data, changes, takes, refit):
+    if not finer_is_promising(data, changes, gain, refit):
         return refit
     found = refit_with_subject(finer, data, evaluator, refit)
     if found is None or found.fit.converged or is_clearly_better(data, found, refit) or found.excess >= refit.excess:
@@ -295,8 +295,8 @@ def _refits_from_estimates(
     for suspect, trials in score_tests(subject, state.data, initial, evaluator, select_suspects(subject, spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
-    every = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
-    yield from ((0.77, stage) for stage in _compete(state, evaluator, every))
+    starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
+    yield from ((0.77, stage) for stage in _compete(state, evaluator, starts))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
@@ -310,9 +310,9 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     return [*strongest, *(trial for trial in placed if all(trial is not one for one in strongest))]
 
 
-def _compete(state: SearchState, evaluator: Evaluator, every: Sequence[StartPoint]) -> Iterator[str]:
+def _compete(state: SearchState, evaluator: Evaluator, starts: Sequence[StartPoint]) -> Iterator[str]:
     """Fit all start points in competition and store the best."""
-    if not every or state.initial_fit is None:
+    if not starts or state.initial_fit is None:
         return
     policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
     best = min(one.excess for one in state.refits)
@@ -320,7 +320,7 @@ def _compete(state: SearchState, evaluator: Evaluator, every: Sequence[StartPoin
     limit = max(min(policy.worth_continuing * nominal, policy.rivalry * best), by_noise)
     target = max(policy.unknown_residual**2 * nominal, by_noise)
     rivals: list[tuple[StartPoint, Fit]] = []
-    for rivals in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], every, limit, target):
+    for rivals in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], starts, limit, target):
         yield f"refit with {' and '.join(rivals[0][0].names)} from the estimates"
     for entry, fit in rivals:
         state.add(make_refit(state.data, fit, entry.trials))

@@ -49,8 +49,8 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
     own = trial.unit[0].copy()
     own[size] = typical[size]
     starts = [own, typical] if suspect.location_genes and not np.allclose(own, typical) else [own]
-    kept = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
-    known = [kept[gene.name] for one in others for gene in one.suspect.genes]
+    fitted = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
+    known = [fitted[gene.name] for one in others for gene in one.suspect.genes]
     return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]
 
 
@@ -77,8 +77,8 @@ def fit_from_estimates(
     Yields nothing where none can be simulated.
     """
     fits = _CompetingFits(data, max_excess, target_excess)
-    for entry in starts:
-        fits.add(entry, _from_estimates(subject, data, evaluator, initial, entry))
+    for start in starts:
+        fits.add(start, _from_estimates(subject, data, evaluator, initial, start))
         yield from fits.run(FIRST_STEPS)
     yield from fits.run(MAX_STEPS + 1)  # the last is where it ended, with its slopes
 
@@ -90,9 +90,9 @@ class _CompetingFits:
         self.data, self.max_excess, self.target_excess = data, max_excess, target_excess
         self.fits = list[_CompetingFit]()
 
-    def add(self, entry: StartPoint, steps: Iterator[Fit]) -> None:
-        """Add the fit from ``entry``."""
-        self.fits.append(_CompetingFit(entry, steps))
+    def add(self, start: StartPoint, steps: Iterator[Fit]) -> None:
+        """Add the fit from ``start``."""
+        self.fits.append(_CompetingFit(start, steps))
 
     def run(self, steps: int) -> Iterator[list[tuple[StartPoint, Fit]]]:
         """Run all fits to ``steps`` steps, those with the lowest cost first; yields the rivals after each step."""
@@ -134,7 +134,7 @@ class _CompetingFits:
     def _rivals(self) -> list[tuple[StartPoint, Fit]]:
         initial = sorted((one for one in self.fits if one.last_fits), key=lambda one: one.cost)
         return [
-            (one.entry, one.last_fits[-1])
+            (one.start, one.last_fits[-1])
             for one in initial
             if one is initial[0] or self._excess(one) <= self._rivalry_limit()
         ]
@@ -144,7 +144,7 @@ class _CompetingFits:
 class _CompetingFit:
     """A running fit with its last two steps."""
 
-    entry: StartPoint
+    start: StartPoint
     steps: Iterator[Fit]
     last_fits: list[Fit] = field(default_factory=list)
     steps_taken: int = 0
@@ -156,7 +156,7 @@ class _CompetingFit:
 
     def same_as(self, other: _CompetingFit) -> bool:
         """Whether two fits of the same suspects have come to the same genes."""
-        if self is other or self.entry.names != other.entry.names:
+        if self is other or self.start.names != other.start.names:
             return False
         return bool(np.abs(self.last_fits[-1].unit - other.last_fits[-1].unit).max() <= SAME_FIT_DISTANCE)
 
@@ -171,11 +171,11 @@ class _CompetingFit:
 
 
 def _from_estimates(
-    subject: Subject, data: WhitenedData, evaluator: Evaluator, initial: Fit, entry: StartPoint
+    subject: Subject, data: WhitenedData, evaluator: Evaluator, initial: Fit, start: StartPoint
 ) -> Iterator[Fit]:
-    """Fits of the nominal model with the suspects of ``entry``; InitialSimulationError where it cannot be simulated."""
-    suspects = [trial.suspect for trial in entry.trials]
+    """Fits of the nominal model with the suspects of ``start``; InitialSimulationError where it cannot be simulated."""
+    suspects = [trial.suspect for trial in start.trials]
     model = subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
     problem = Problem(model, data.recordings, free, base_genome(model, initial.problem.base.as_dict()), data.axes)
-    return gauss_newton_fit(subject, data, problem, evaluator, np.concatenate([initial.unit, entry.unit]), MAX_STEPS)
+    return gauss_newton_fit(subject, data, problem, evaluator, np.concatenate([initial.unit, start.unit]), MAX_STEPS)

@@ -65,43 +65,43 @@ def choose_discretisation(
     subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit, *, refine: bool
 ) -> Nominal:
     """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
-    now, remarks = make_refit(data, fit), list[str]()
+    current, remarks = make_refit(data, fit), list[str]()
     for _ in range(MAX_REFINEMENTS):
-        left, finest, better, tried = 0.0, "", None, ""
+        error, finest, better, ineffective = 0.0, "", None, ""
         for finer in subject.finer_subjects():
-            changes, takes = finer_change(finer, data, evaluator, now)
-            if changes <= left:
+            changes, gain = finer_change(finer, data, evaluator, current)
+            if changes <= error:
                 continue
-            left, finest, tried = changes, finer.description, ""
-            if refine and finer_is_promising(data, changes, takes, now):
-                found = refit_with_subject(finer, data, evaluator, now)
+            error, finest, ineffective = changes, finer.description, ""
+            if refine and finer_is_promising(data, changes, gain, current):
+                found = refit_with_subject(finer, data, evaluator, current)
                 better = (
                     fit_to_convergence(finer, data, evaluator, found)
-                    if found and is_clearly_better(data, found, now)
+                    if found and is_clearly_better(data, found, current)
                     else None
                 )
-                tried = finer.description if found is not None else ""
+                ineffective = finer.description if found is not None else ""
             if better is not None:
                 break
         if better is None:
-            return Nominal(subject, now, left if finest else None, finest, tuple(remarks), tried)
+            return Nominal(subject, current, error if finest else None, finest, tuple(remarks), ineffective)
         remarks.append(
             f"the discretisation limits the model: {finest} replaces {subject.description} and reduces the excess "
-            f"misfit to {_percent(better.excess, now.excess)}"
+            f"misfit to {_percent(better.excess, current.excess)}"
         )
-        subject, now = finer, better
-    return Nominal(subject, now, None, "", tuple(remarks))
+        subject, current = finer, better
+    return Nominal(subject, current, None, "", tuple(remarks))
 
 
-def finer_is_promising(data: WhitenedData, changes: float, takes: float, now: Refit) -> bool:
+def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:
     """Whether a finer discretisation is worth a fit.
 
-    ``changes`` (m or N) is the change that it makes, ``takes`` the fraction of the excess that it is predicted to
+    ``changes`` (m or N) is the change that it makes, ``gain`` the fraction of the excess that it is predicted to
     remove. A linearised prediction does not hold where the change exceeds the whole residual.
     """
     policy = data.policy
-    matters = changes >= policy.finer_matters * data.noise and now.excess >= (policy.finer_limit * data.noise) ** 2
-    return matters and (takes > policy.finer_predicted_gain or changes**2 >= now.excess)
+    matters = changes >= policy.finer_matters * data.noise and current.excess >= (policy.finer_limit * data.noise) ** 2
+    return matters and (gain > policy.finer_predicted_gain or changes**2 >= current.excess)
 
 
 def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
@@ -116,12 +116,12 @@ def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit
     if reasons[0] is not None:
         return 0.0, 0.0
     nuisance = Nuisance(data, fit)
-    rest, left = nuisance.project_out(found[0] - fit.coefficients), nuisance.residual
-    power = float(rest @ rest)
-    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, data.policy.discretisation_factor))
-    excess = max(float(left @ left) - len(left), 1e-300)
-    taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
-    return float(np.sqrt(data.weight @ (rest[: len(data.scale)] * data.scale) ** 2)), taken
+    change, residual = nuisance.project_out(found[0] - fit.coefficients), nuisance.residual
+    power = float(change @ change)
+    amount = float(np.clip(-(change @ residual) / max(power, 1e-300), 0.0, data.policy.discretisation_factor))
+    excess = max(float(residual @ residual) - len(residual), 1e-300)
+    gain = (float(residual @ residual) - float(np.sum((residual + amount * change) ** 2))) / excess
+    return float(np.sqrt(data.weight @ (change[: len(data.scale)] * data.scale) ** 2)), gain
 
 
 def is_clearly_better(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:

@@ -122,8 +122,8 @@ def refit_with_suspects(
         except FIT_ERRORS:
             continue
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.size_genes for gene, trial in genes])
-        astray = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
-        if len(trials) == 1 and astray and not sizes.all():
+        diverged = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
+        if len(trials) == 1 and diverged and not sizes.all():
             with suppress(*FIT_ERRORS):
                 first = _fit_subset(subject, data, problem, evaluator, start, before, sizes)
                 first = _fit_added_genes(subject, data, problem, evaluator, first.unit, first)
@@ -225,9 +225,13 @@ def partner_trials(
 ) -> list[Trial]:
     """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
     nuisance = Nuisance(data, base.fit)
-    left = nuisance.residual
-    worth = data.policy.partner_gain * (float(left @ left) - len(left))
-    return [trial for gain, trial in _rank_by_explained(nuisance, left, found, base.names)[:max_count] if gain > worth]
+    residual = nuisance.residual
+    least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
+    return [
+        trial
+        for gain, trial in _rank_by_explained(nuisance, residual, found, base.names)[:max_count]
+        if gain > least_gain
+    ]
 
 
 def effect_contribution(
@@ -255,8 +259,10 @@ def substitute_trials(
     kept = np.array([name not in own for name in refit.fit.problem.free])
     nuisance = Nuisance(data, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
     done = nuisance.project_out(change)
-    worth = data.policy.substitute * float(done @ done)
-    return [one for gain, one in _rank_by_explained(nuisance, done, found, refit.names)[:max_count] if gain > worth]
+    least_gain = data.policy.substitute * float(done @ done)
+    return [
+        one for gain, one in _rank_by_explained(nuisance, done, found, refit.names)[:max_count] if gain > least_gain
+    ]
 
 
 def _rank_by_explained(
@@ -266,7 +272,7 @@ def _rank_by_explained(
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
-            gains = [explained(nuisance.project_out(trial.fields), misfit) for trial in trials]
+            gains = [explained(nuisance.project_out(trial.changes), misfit) for trial in trials]
             k = int(np.argmax(gains))
             best.append((gains[k], trials[k]))
     return sorted(best, key=lambda pair: -pair[0])
@@ -277,15 +283,15 @@ def suspect_pairs(
 ) -> Iterator[tuple[Trial, Trial]]:
     """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
     nuisance = Nuisance(data, nominal)
-    left = nuisance.residual
+    residual = nuisance.residual
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
-    own = [nuisance.project_out(trial.fields) for trial in best]
+    own = [nuisance.project_out(trial.changes) for trial in best]
     scored = [
-        (explained(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)
+        (explained(np.vstack([own[i], own[j]]), residual), best[i], best[j]) for i in range(len(best)) for j in range(i)
     ]
     scored.sort(key=lambda triple: -triple[0])
     for gain, one, other in scored[:max_count]:
-        if float(left @ left) - gain < beyond:
+        if float(residual @ residual) - gain < beyond:
             yield (one, other) if one.gain >= other.gain else (other, one)
 
 

@@ -36,18 +36,18 @@ class Trial:
     Attributes:
         suspect: which.
         unit: [S, E] its genes in unit coordinates, one row for each size.
-        fields: [S, D] change of the coefficients by each size.
+        changes: [S, D] change of the coefficients by each size.
         gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
-        amounts: [S] fitted multiples of the sizes.
+        multiples: [S] fitted multiples of the sizes.
         freedom: degrees of freedom, location and shape genes included.
         remaining_chi_squared: after that fit, by the linearised model.
     """
 
     suspect: Suspect
     unit: Array
-    fields: Array
+    changes: Array
     gain: float
-    amounts: Array
+    multiples: Array
     freedom: int
     remaining_chi_squared: float
 
@@ -57,7 +57,7 @@ class Trial:
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
         start = self.unit[0].copy()
-        start[size] = off[size] + self.amounts @ (self.unit[:, size] - off[size])
+        start[size] = off[size] + self.multiples @ (self.unit[:, size] - off[size])
         return np.asarray(np.clip(start, 0.0, 1.0), float)
 
 
@@ -115,28 +115,28 @@ def score_tests(
 def _suspect_trials(
     data: WhitenedData, problem: Problem, nominal: Fit, evaluator: Evaluator, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
-    blocks = list(_genes_to_try(suspect))
-    units = np.concatenate(blocks)
+    groups = list(_genes_to_try(suspect))
+    units = np.concatenate(groups)
     found, reasons, _ = data.evaluate(problem, evaluator, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
     trials, row = [], 0
-    for block in blocks:
-        rows = slice(row, row + len(block))
-        row += len(block)
+    for genes in groups:
+        rows = slice(row, row + len(genes))
+        row += len(genes)
         if not bad[rows].any():
-            trials.append(_trial(suspect, block, changes[rows], nuisance))
+            trials.append(_trial(suspect, genes, changes[rows], nuisance))
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
-def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
-    own, residual = nuisance.project_out(fields), nuisance.residual
-    found = amounts(own, residual, _multiple_limits(suspect, block), VISIBLE_CHANGE * np.sqrt(len(residual)))
+def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -> Trial:
+    own, residual = nuisance.project_out(changes), nuisance.residual
+    found = amounts(own, residual, _multiple_limits(suspect, genes), VISIBLE_CHANGE * np.sqrt(len(residual)))
     remaining_chi_squared = remaining(own, residual, found)
     return Trial(
         suspect,
-        block,
-        fields,
+        genes,
+        changes,
         max(float(residual @ residual) - remaining_chi_squared, 0.0),
         found,
         len(suspect.genes),
@@ -144,10 +144,10 @@ def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) ->
     )
 
 
-def _multiple_limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
+def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
     """Smallest and largest multiples [S] of each size that stay in the box."""
-    off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
-    for row, unit in enumerate(block):
+    off, low, high = off_units(suspect), np.zeros(len(genes)), np.zeros(len(genes))
+    for row, unit in enumerate(genes):
         column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
         move = unit[column] - off[column]
         ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
@@ -171,12 +171,12 @@ def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
     shape = [k for k in range(len(off)) if k not in size]
     for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
-            block = []
+            genes = []
             for k in size:
                 row = off.copy()
                 row[shape] = spot
                 row[k] = np.clip(off[k] + part * (typical[k] - off[k]), 0.0, 1.0)
                 if row[k] != off[k]:
-                    block.append(row)
-            if len(block) == len(size):
-                yield np.array(block)
+                    genes.append(row)
+            if len(genes) == len(size):
+                yield np.array(genes)

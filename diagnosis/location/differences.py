@@ -50,24 +50,25 @@ def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval
                 return None
             at.append(value)
             mass.append(one)
-    places, which = np.unique(at, return_inverse=True)
+    positions, which = np.unique(at, return_inverse=True)
     weight = np.bincount(which, weights=mass)
     if weight.sum() <= 0:
         return None
     total = np.concatenate([[0.0], np.cumsum(weight)]) / weight.sum()
     low, middle, high = (
-        float(np.interp(part, total, _cell_edges(places))) for part in (EXTENT_QUANTILES[0], 0.5, EXTENT_QUANTILES[1])
+        float(np.interp(part, total, _cell_edges(positions)))
+        for part in (EXTENT_QUANTILES[0], 0.5, EXTENT_QUANTILES[1])
     )
     return Interval(middle, low, high)
 
 
-def _cell_edges(places: Array) -> Array:
+def _cell_edges(positions: Array) -> Array:
     """Edges [n + 1] of the cells of the span or chord that markers at sorted ``places`` [n] represent."""
-    if len(places) < 2:
-        return np.repeat(places, 2)
-    half = 0.5 * (places[1:] + places[:-1])
-    ends = np.clip([2 * places[0] - half[0], 2 * places[-1] - half[-1]], 0.0, 1.0)
-    return np.array([min(ends[0], places[0]), *half, max(ends[1], places[-1])])
+    if len(positions) < 2:
+        return np.repeat(positions, 2)
+    half = 0.5 * (positions[1:] + positions[:-1])
+    ends = np.clip([2 * positions[0] - half[0], 2 * positions[-1] - half[-1]], 0.0, 1.0)
+    return np.array([min(ends[0], positions[0]), *half, max(ends[1], positions[-1])])
 
 
 def _phase(residuals: Sequence[RecordingResidual]) -> Interval | None:
@@ -118,8 +119,8 @@ def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
     if not variables:
         return ()
     best, *_ = np.linalg.lstsq(design, size, rcond=None)
-    left, freedom = size - design @ best, len(size) - design.shape[1]
-    cover = np.linalg.inv(design.T @ design) * max(float(left @ left) / freedom, 0.05**2)
+    remainder, freedom = size - design @ best, len(size) - design.shape[1]
+    cover = np.linalg.inv(design.T @ design) * max(float(remainder @ remainder) / freedom, 0.05**2)
     errors = standard_errors(freedom) * np.sqrt(np.diag(cover))
     return tuple(
         Exponent(name, Interval(float(b), float(b - d), float(b + d)), *ends, unit)

@@ -36,29 +36,29 @@ def locate_pulse(subject: Subject, data: WhitenedData, fit: Fit) -> Interval | N
     Its interval contains the instants at which it would explain nearly as much, given the model error.
     """
     nuisance = Nuisance(data, fit)
-    left, white = nuisance.residual, fit.coefficients / data.scale
+    residual, whitened = nuisance.residual, fit.coefficients / data.scale
     phase = np.arange(INSTANTS) / INSTANTS
-    gains = np.array([explained(nuisance.project_out(_pulses(subject, data, at)), left) for at in phase])
+    gains = np.array([explained(nuisance.project_out(_pulses(subject, data, at)), residual) for at in phase])
     best = int(np.argmax(gains))
-    there = _pulses(subject, data, phase[best], low_passed=True)
+    low_passed_pulse = _pulses(subject, data, phase[best], low_passed=True)
     decrease, by_noise = (
-        explained(nuisance.project_out(there), left),
-        float(chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(there))),
+        explained(nuisance.project_out(low_passed_pulse), residual),
+        float(chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(low_passed_pulse))),
     )
-    if decrease < max(MIN_EXPLAINED * float(left @ left), by_noise):
+    if decrease < max(MIN_EXPLAINED * float(residual @ residual), by_noise):
         return None
-    beyond = max(float(white @ white) - decrease - len(white), 0.0)
+    beyond = max(float(whitened @ whitened) - decrease - len(whitened), 0.0)
     near = gains[best] - gains < standard_errors() ** 2 * (1.0 + beyond / data.effective_samples)
-    apart = (phase - phase[best] + 0.5) % 1.0 - 0.5
-    low, high = (_extent(near, apart, sign) for sign in (-1, 1))
+    distance = (phase - phase[best] + 0.5) % 1.0 - 0.5
+    low, high = (_extent(near, distance, sign) for sign in (-1, 1))
     return Interval(float(phase[best]), float(phase[best] - low), float(phase[best] + high))
 
 
-def _extent(near: npt.NDArray[np.bool_], apart: Array, sign: int) -> float:
+def _extent(near: npt.NDArray[np.bool_], distance: Array, sign: int) -> float:
     """Distance to which the instants ``near`` extend on one side without a gap, plus half an instant."""
-    order = np.argsort(np.where(sign * apart >= 0, sign * apart, np.inf))[: INSTANTS // 2]
+    order = np.argsort(np.where(sign * distance >= 0, sign * distance, np.inf))[: INSTANTS // 2]
     ends = np.flatnonzero(~near[order])
-    return float(sign * apart[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
+    return float(sign * distance[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
 
 
 def _pulses(subject: Subject, data: WhitenedData, at: float, *, low_passed: bool = False) -> Array:

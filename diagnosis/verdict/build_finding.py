@@ -47,7 +47,9 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    seen, failed = predict_held_out(held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit)
+    held_out_residuals, failed = predict_held_out(
+        held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit
+    )
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
         unnamed = decision.verdict == "unnamed"
@@ -62,7 +64,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
         advice = rank_conditions(state.data, state.weights, apart)
     location = _where(state, decision, best, missing, evaluator)
-    found = _finding(state, name, decision, best, seen, missing, advice, location)
+    found = _finding(state, name, decision, best, held_out_residuals, missing, advice, location)
     yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
 
 
@@ -101,11 +103,11 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
         acts = effect_contribution(data, evaluator, best)
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
-    held = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
-    own = {gene.name: gene.value for gene in all_genes(state.data, held)}
+    shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
+    own = {gene.name: gene.value for gene in all_genes(state.data, shown_refit)}
     span, chord = (
-        _effect_location(held, own, "span") or missing.span,
-        _effect_location(held, own, "chord") or missing.chord,
+        _effect_location(shown_refit, own, "span") or missing.span,
+        _effect_location(shown_refit, own, "chord") or missing.chord,
     )
     phase = missing.phase if decision.verdict != "measurement fault" else None
     return Where(
@@ -131,7 +133,7 @@ def _finding(
     name: str,
     decision: Decision,
     best: Refit,
-    seen: ResidualPair | None,
+    held_out_residuals: ResidualPair | None,
     missing: MissingPhysics,
     advice: tuple[Advice, ...],
     location: Where,
@@ -146,10 +148,12 @@ def _finding(
     kind = data.recordings[0].kind
     unit: Literal["m", "N"] = "m" if kind == "tracks" else "N"
     proved = None
-    if seen is not None:
-        rows += recording_misfits(seen, held_out=True, floor=division)
-        proved = proof(seen, division, unit, put_in=bool(best.names))
-        shown += maps.overlays(subject, seen.data, seen.before, seen.after, held_out=True)
+    if held_out_residuals is not None:
+        rows += recording_misfits(held_out_residuals, held_out=True, floor=division)
+        proved = proof(held_out_residuals, division, unit, put_in=bool(best.names))
+        shown += maps.overlays(
+            subject, held_out_residuals.data, held_out_residuals.before, held_out_residuals.after, held_out=True
+        )
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(data, best)
     texts = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
@@ -206,10 +210,10 @@ def _discretisation_error(state: SearchState) -> float:
 
 def _floors(state: SearchState, division: float) -> Floors:
     data, nominal = state.data, state.fitted_nominal
-    memory = float(np.median([beat_fit.lag1 for beat_fit in data.beat_fits]))
+    lag1 = float(np.median([beat_fit.lag1 for beat_fit in data.beat_fits]))
     total = float(np.sqrt(data.noise**2 + division**2 + data.tolerance**2))
-    left = None if nominal.discretisation_error is None else division
-    return Floors(data.noise, memory, left, nominal.finer, data.tolerance, total)
+    error = None if nominal.discretisation_error is None else division
+    return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total)
 
 
 def _summary_texts(

@@ -45,28 +45,28 @@ def separations(
     no other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no
     conditions.
     """
-    rivals, able = rival_refits(weights), subject.candidate_conditions()
+    rivals, conditions = rival_refits(weights), subject.candidate_conditions()
     if len(rivals) < 2:
         return
     if weights.probabilities.max() >= NEARLY_CERTAIN:
-        able = able[:MAX_CONDITIONS_IF_CERTAIN]
-    scenes = list[tuple[float, _PredictedCondition]]()
-    for k, condition in enumerate(able):
-        scene = _predict_condition(subject, rivals[0], condition)
+        conditions = conditions[:MAX_CONDITIONS_IF_CERTAIN]
+    predicted = list[tuple[float, _PredictedCondition]]()
+    for k, condition in enumerate(conditions):
+        prediction = _predict_condition(subject, rivals[0], condition)
         least = (
             None
-            if scene is None
-            else _smallest_separation(subject, data, scene, rivals[1:], evaluator, refit_genes=False)
+            if prediction is None
+            else _smallest_separation(subject, data, prediction, rivals[1:], evaluator, refit_genes=False)
         )
-        scenes += [] if scene is None or least is None else [(least, scene)]
-        yield 0.5 * (k + 1) / len(able), None
+        predicted += [] if prediction is None or least is None else [(least, prediction)]
+        yield 0.5 * (k + 1) / len(conditions), None
     found = list[float]()
-    for k, (most, scene) in enumerate(sorted(scenes, key=lambda pair: -pair[0])):
+    for k, (most, prediction) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
         if sum(one >= most for one in found) >= MAX_ADVICE:
             return
-        least = _smallest_separation(subject, data, scene, rivals[1:], evaluator, refit_genes=True)
+        least = _smallest_separation(subject, data, prediction, rivals[1:], evaluator, refit_genes=True)
         found += [] if least is None else [least]
-        yield 0.5 + 0.5 * (k + 1) / len(scenes), None if least is None else (least, scene.recording.condition)
+        yield 0.5 + 0.5 * (k + 1) / len(predicted), None if least is None else (least, prediction.recording.condition)
 
 
 def rank_conditions(
@@ -96,18 +96,18 @@ def _predict_condition(subject: Subject, first: Refit, condition: Condition) -> 
 def _smallest_separation(
     subject: Subject,
     data: WhitenedData,
-    scene: _PredictedCondition,
+    prediction: _PredictedCondition,
     others: Sequence[Refit],
     evaluator: Evaluator,
     *,
     refit_genes: bool,
 ) -> float | None:
     """Smallest separation of several rivals; None where one of them cannot be simulated."""
-    every = [
-        separation(subject, data, scene.genome, scene.recording, one.fit, evaluator, refit_genes=refit_genes)
+    values = [
+        separation(subject, data, prediction.genome, prediction.recording, one.fit, evaluator, refit_genes=refit_genes)
         for one in others
     ]
-    known = [one for one in every if one is not None]
+    known = [one for one in values if one is not None]
     return min(known) if len(known) == len(others) else None
 
 
@@ -167,8 +167,8 @@ def _advice(
     data: WhitenedData, weights: HypothesisWeights, rivals: Sequence[Refit], apart: float, condition: Condition
 ) -> Advice:
     share = 1.0 / (len(data.recordings) + 1.0)
-    unit = data.noise**2
-    tau = tolerated_excess(data, weights.left[0] * unit, 0.0) / unit + float(weights.left.min())
+    noise_variance = data.noise**2
+    tau = tolerated_excess(data, weights.excess[0] * noise_variance, 0.0) / noise_variance + float(weights.excess.min())
     gain = 0.5 * data.effective_samples / (1.0 - share) * np.log1p(share * apart**2 / tau)
     odds = np.log(data.policy.single / (1.0 - data.policy.single))
     resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))

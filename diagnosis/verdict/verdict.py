@@ -42,24 +42,24 @@ def decide(weights: HypothesisWeights) -> Decision:
     if len(effects):
         top = int(np.argmax(effects))
         possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= policy.possible * max(total, 1e-300)]
-        sure = refits[top] if effects[top] >= policy.single * total else _common_subset(possible)
-        one: Verdict = "measurement fault" if sure and _is_measurement_fault(sure) else "named"
-        if sure:
-            holds = [set(sure.names) <= set(refit.names) for refit in refits]
-            probability[one] = float(effects[holds].sum())
+        certain = refits[top] if effects[top] >= policy.single * total else _common_subset(possible)
+        one: Verdict = "measurement fault" if certain and _is_measurement_fault(certain) else "named"
+        if certain:
+            contained = [set(certain.names) <= set(refit.names) for refit in refits]
+            probability[one] = float(effects[contained].sum())
         probability["ambiguous"] = total - probability[one]
     missing = total + weights.unknown
     verdict: Verdict
     if nominal >= missing:
         verdict = "adequate"
     elif total >= policy.listed * missing:
-        verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
+        verdict, best = (one, certain) if certain else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
         if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # worth its genes
             best = refits[int(np.argmax(weights.evidence[1:]))]
-    weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
-    alike = tuple(refit.names for refit in possible) if weighing else ()
+    distinguishing = verdict not in ("adequate", "unnamed") and len(possible) > 1
+    alike = tuple(refit.names for refit in possible) if distinguishing else ()
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
@@ -80,9 +80,9 @@ def hypotheses(
     gains = {one[0].suspect.name: one[0] for one in trials if one}
     texts = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
     known = {refit.names for refit in weights.refits}
-    rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
+    screened = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
     start = max(weights.refits[0].excess, 0.0) / data.noise**2
-    return (*texts, *(_screened_hypothesis(trial, start, data) for trial in rest[:MAX_SCREENED_LISTED]))
+    return (*texts, *(_screened_hypothesis(trial, start, data) for trial in screened[:MAX_SCREENED_LISTED]))
 
 
 def _refitted_hypothesis(
@@ -111,9 +111,9 @@ def _refitted_hypothesis(
     )
 
 
-def _explained_fraction(left: float, before: float) -> float:
+def _explained_fraction(remaining: float, before: float) -> float:
     """Fraction of the excess ``before`` that is removed; zero where there was none."""
-    return float(np.clip(1.0 - max(left, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
+    return float(np.clip(1.0 - max(remaining, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
 def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypothesis:
@@ -122,7 +122,7 @@ def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypo
     explained = float(
         np.clip(trial.gain / max(trial.gain + trial.remaining_chi_squared - samples, by_chance), 0.0, 1.0)
     )
-    left = max(start * (1.0 - explained), 0.0)
+    remaining = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),
         suspect.title,
@@ -135,7 +135,7 @@ def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypo
         trial.freedom,
         explained,
         None,
-        float(data.noise * np.sqrt(1.0 + left)),
+        float(data.noise * np.sqrt(1.0 + remaining)),
         False,
     )
 
@@ -176,13 +176,15 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
         )
     kind = "The recordings have a fault" if decision.verdict == "measurement fault" else "The model is missing"
     link = ": " if decision.verdict == "measurement fault" else " "
-    wider, others = (
-        [one for one in decision.alike if (set(decision.named) <= set(one)) is holds] for holds in (True, False)
+    larger, others = (
+        [one for one in decision.alike if (set(decision.named) <= set(one)) is contained] for contained in (True, False)
     )
-    besides = dict.fromkeys(name for one in wider for name in one if name not in decision.named)
-    instead = [_titles(suspects, one, " with ") for one in others]
-    more = f" Whether {_titles(suspects, list(besides), ' or ')} is missing as well is undecided." if besides else ""
-    more += f" Less probable alternatives: {' or '.join(instead)}." if instead else ""
+    additional = dict.fromkeys(name for one in larger for name in one if name not in decision.named)
+    alternatives = [_titles(suspects, one, " with ") for one in others]
+    more = (
+        f" Whether {_titles(suspects, list(additional), ' or ')} is missing as well is undecided." if additional else ""
+    )
+    more += f" Less probable alternatives: {' or '.join(alternatives)}." if alternatives else ""
     return f"{kind}{link}{names}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
 
 

@@ -32,14 +32,14 @@ Array = npt.NDArray[np.float64]
 class HypothesisWeights:
     """Evidence and probability of each refit (the nominal model first), and probability of an ``unknown`` law.
 
-    ``left``: excess of each divided by the noise variance.
+    ``excess``: excess of each divided by the noise variance.
     """
 
     refits: tuple[Refit, ...]
     evidence: Array
     probabilities: Array
     unknown: float
-    left: Array
+    excess: Array
     policy: Policy = POLICY
 
 
@@ -52,23 +52,25 @@ def weigh(
     prior.
     """
     policy = data.policy
-    every = (nominal, *refits)
-    unit = data.noise**2
-    tau = tolerated_excess(data, nominal.excess, floor) / unit
-    left = np.array([_misfit(data, one, tau * unit) / unit for one in every])
-    genes = np.array([one.freedom for one in every], float)
-    named = np.array([len(one.trials) for one in every], float)
-    log = _evidence(data, tau + left, genes, named, suspects)
+    hypotheses = (nominal, *refits)
+    noise_variance = data.noise**2
+    tau = tolerated_excess(data, nominal.excess, floor) / noise_variance
+    excess = np.array([_misfit(data, one, tau * noise_variance) / noise_variance for one in hypotheses])
+    genes = np.array([one.freedom for one in hypotheses], float)
+    effects = np.array([len(one.trials) for one in hypotheses], float)
+    evidence = _evidence(data, tau + excess, genes, effects, suspects)
     unknown = (
-        -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * left[0])
+        -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
         - policy.gene_cost * policy.unknown_genes
     )
-    top = max(log.max(), unknown)
-    weight, other = np.exp(log - top), np.exp(unknown - top)
+    top = max(evidence.max(), unknown)
+    weight, other = np.exp(evidence - top), np.exp(unknown - top)
     if nominal_refuted(data, nominal.excess, floor):
         weight[0] = 0.0
     total = weight.sum() + other
-    return HypothesisWeights(every, log - log[0], weight / total, float(other / total), left, data.policy)
+    return HypothesisWeights(
+        hypotheses, evidence - evidence[0], weight / total, float(other / total), excess, data.policy
+    )
 
 
 def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
@@ -76,14 +78,16 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
 
     It does not depend on the number of samples: physics is missing then, even if it is not known which.
     """
-    made = (data.policy.negligible * data.noise) ** 2 + floor**2
-    return excess - made > data.policy.refuting_excess * data.excess_standard_error
+    explainable = (data.policy.negligible * data.noise) ** 2 + floor**2
+    return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
 
 
-def _evidence(data: WhitenedData, left: Array, genes: Array, named: Array, suspects: int) -> Array:
-    """Log evidence for mean squares ``left`` divided by the noise variance, floor included."""
+def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
+    """Log evidence for mean squares ``excess`` divided by the noise variance, floor included."""
     return np.asarray(
-        -0.5 * data.effective_samples * np.log(left) - data.policy.gene_cost * genes - np.log(max(suspects, 2)) * named
+        -0.5 * data.effective_samples * np.log(excess)
+        - data.policy.gene_cost * genes
+        - np.log(max(suspects, 2)) * effects
     )
 
 
@@ -92,8 +96,8 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
     if nominal_refuted(data, nominal.excess, 0.0):
         return False
     tau = tolerated_excess(data, nominal.excess, 0.0)
-    left = _misfit(data, nominal, tau)
-    ends = _evidence(data, np.array([tau + left, tau]) / data.noise**2, np.arange(2.0), np.arange(2.0), suspects)
+    excess = _misfit(data, nominal, tau)
+    ends = _evidence(data, np.array([tau + excess, tau]) / data.noise**2, np.arange(2.0), np.arange(2.0), suspects)
     return bool(ends[1] < ends[0] - data.policy.least_evidence)
 
 

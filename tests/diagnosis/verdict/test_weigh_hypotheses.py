@@ -232,7 +232,7 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
             for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))
         )
         found = weigh(scaled, before, others, 0.2 * unit, 40)
-        shares = [*found.probabilities, found.unknown, *found.left]
+        shares = [*found.probabilities, found.unknown, *found.excess]
         return shares, nominal_refuted(scaled, before.excess, 0.2 * unit), nominal_suffices(scaled, before, 40)
 
     shares, *flags = outcome(unit)
