@@ -24,15 +24,15 @@ NO_EVALUATOR = cast("Any", None)
 
 @dataclass
 class ClosedForm:
-    """A subject and its stack in one: least squares in genes whose boxes are [0, 1].
+    """A subject and its data in one object: least squares in genes whose boxes are [0, 1].
 
     Attributes:
         residuals: gives [B, D] for genes [B, F].
         size: F.
-        reach: an individual fails where one of its genes is farther than this from the genome that it begins beside.
+        reach: an individual fails where a gene is farther than this from the genome of its initial motion.
         noise: of each residual.
-        batches: genes [B, F] of each batch that was evaluated.
-        near: the genome that each batch began beside.
+        batches: genes [B, F] of each evaluated batch.
+        initial_motions: the genome of the initial motion of each batch.
     """
 
     residuals: Callable[[Array], Array]
@@ -91,10 +91,10 @@ class ClosedForm:
 
     @property
     def simulator(self) -> fit._Simulator:
-        """What a single step is given."""
+        """The simulator of a single step."""
         return fit._Simulator(self.rig, self.rig, self.problem, NO_EVALUATOR)
 
     @property
     def rig(self) -> Any:
-        """Itself, as a subject or a stack: it has what fits use of either."""
+        """Itself: it has what fits use of a subject and of data."""
         return self

@@ -1,4 +1,4 @@
-"""What a fit minimises, how much it trusts it, where it ends, and what it foretells of recordings left out."""
+"""The deviance and its weight, convergence of fits, cross-validation, refits and discretisation."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def one() -> WhitenedData:
     return whitened_pendulum()
 
 
-def test_noise_counts_as_noise_and_a_misfit_beyond_it_by_its_logarithm() -> None:
+def test_deviance_is_chi_squared_within_noise_and_logarithmic_beyond() -> None:
     data = one()
     D, nu = len(data.scale), data.effective_samples
     assert nu == POLICY.effective_samples * len(data.recordings)
@@ -78,7 +78,7 @@ def test_noise_counts_as_noise_and_a_misfit_beyond_it_by_its_logarithm() -> None
         assert data.likelihood_weight(coefficients) == pytest.approx(1.0 / (1.0 + beyond / nu))
 
 
-def test_trust_is_the_slope_of_the_surprise() -> None:
+def test_the_likelihood_weight_is_the_slope_of_the_deviance() -> None:
     data = one()
     direction = data.scale / np.sqrt(len(data.scale))
     for chi in (3.0 * len(data.scale), 40.0 * len(data.scale)):
@@ -87,7 +87,7 @@ def test_trust_is_the_slope_of_the_surprise() -> None:
 
 
 @pytest.mark.parametrize("corner", [0.02, 0.98])
-def test_a_fit_finds_the_truth_from_the_corners_of_the_box(corner: float) -> None:
+def test_a_fit_recovers_the_truth_from_corners_of_the_box(corner: float) -> None:
     data = one()
     genes = [gene for gene in RIG.model.genes if gene.name in RIG.model.searched]
     found = fit(data, {gene.name: float(gene.from_unit(corner)) for gene in genes})
@@ -98,8 +98,8 @@ def test_a_fit_finds_the_truth_from_the_corners_of_the_box(corner: float) -> Non
     assert np.all(np.abs(off) < 4 * errors)
 
 
-def test_a_model_that_lacks_something_keeps_its_genes_within_the_box() -> None:
-    """A spring that hardens, recorded almost without noise: chi-squared is in the thousands for each coefficient."""
+def test_missing_physics_does_not_push_genes_to_their_bounds() -> None:
+    """A hardening spring almost without noise: chi-squared is in the thousands for each coefficient."""
     data = whitened_pendulum(noise=1e-5, cubic_k3=0.6)
     found = fit(data)
     assert data.chi_squared(found.coefficients) > 1000 * len(data.scale)
@@ -107,7 +107,7 @@ def test_a_model_that_lacks_something_keeps_its_genes_within_the_box() -> None:
     assert found.unit.max() < 0.99
 
 
-def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the_tolerance_allows() -> None:
+def test_intervals_include_model_error_and_tolerance() -> None:
     data = one()
     found = fit(data)
     floor = POLICY.tolerance**2 * len(data.scale) / data.effective_samples
@@ -123,7 +123,7 @@ def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the
     np.testing.assert_allclose(covariance(data, worse), np.linalg.inv(likelihood_weight * gram + prior), rtol=1e-6)
 
 
-def test_slopes_to_one_side_and_to_both_and_at_the_end_of_the_box() -> None:
+def test_one_sided_and_central_differences_agree_at_a_bound() -> None:
     data = one()
     fitted_problem = problem(data)
     simulator, every = _Simulator(RIG, data, fitted_problem, EVALUATOR), np.ones(len(fitted_problem.free), bool)
@@ -138,7 +138,7 @@ def test_slopes_to_one_side_and_to_both_and_at_the_end_of_the_box() -> None:
     assert np.linalg.norm(one_sided[:, 0] - central[:, 0]) < 0.05 * np.linalg.norm(central[:, 0])
 
 
-def test_what_the_nominal_genes_can_do_is_taken_out_and_no_more_than_their_prior_lets_them() -> None:
+def test_nuisance_genes_are_projected_out_within_their_prior() -> None:
     data = one()
     found = fit(data)
     nuisance, F = Nuisance(data, found), len(found.unit)
@@ -151,7 +151,7 @@ def test_what_the_nominal_genes_can_do_is_taken_out_and_no_more_than_their_prior
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_noise_alone_predicts_recordings_left_out_to_the_noise(seed: int) -> None:
+def test_noise_alone_cross_validates_to_the_noise(seed: int) -> None:
     data = whitened_pendulum(seed=seed)
     found = fit(data)
     predicted_excess = cross_validated_excess(data, found)
@@ -159,7 +159,7 @@ def test_noise_alone_predicts_recordings_left_out_to_the_noise(seed: int) -> Non
     assert predicted_excess - data.excess(found.coefficients) < 0.02 * data.noise**2
 
 
-def test_what_is_lacking_predicts_worse_than_it_fits() -> None:
+def test_missing_physics_cross_validates_worse_than_it_fits() -> None:
     data = whitened_pendulum(cubic_k3=0.6)
     found = fit(data)
     predicted_excess = cross_validated_excess(data, found)
@@ -167,8 +167,8 @@ def test_what_is_lacking_predicts_worse_than_it_fits() -> None:
     assert predicted_excess > 1.02 * data.excess(found.coefficients)
 
 
-def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
-    """The explanation's own genes do nothing: it ended in the better minimum, and is not the cause."""
+def test_a_nominal_fit_leaves_a_local_minimum_by_a_hypothesis() -> None:
+    """The hypothesis' own genes have no effect: it only reached the better minimum, and is not the cause."""
     data = one()
     good = fit(data)
     bad = replace(good, unit=np.full(len(good.unit), 0.9))
@@ -193,10 +193,10 @@ def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
         (3.0, 0.9, 0.1, False),
     ],
 )
-def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
+def test_a_finer_discretisation_is_fitted_where_promising(
     changes: float, takes: float, left: float, expected: int
 ) -> None:
-    """It takes a part of the misfit; or it changes more than all of that, and the tangent knows nothing of it."""
+    """It explains a fraction of the residual, or changes more than all of it, where the linearisation fails."""
     data, now = SimpleNamespace(noise=1.0, policy=POLICY), SimpleNamespace(excess=left**2)
     assert finer_is_promising(cast("Any", data), changes, takes, cast("Any", now)) == bool(expected)
 
@@ -205,10 +205,10 @@ def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
     ("coarse", "expected", "taken"),
     [(0.1, ["coarse"], "coarse"), (0.9, ["coarse", "fine"], "fine"), (None, ["coarse", "fine"], "fine")],
 )
-def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
+def test_a_finer_discretisation_does_not_hide_an_effect(
     monkeypatch: pytest.MonkeyPatch, coarse: float | None, expected: list[str], taken: str
 ) -> None:
-    """Suspects are tried at the coarse one first, and it stays where one of them does better than the finer one."""
+    """Suspects are tested with the coarse one first, which stays if one of them fits better than the finer one."""
 
     def found(subject: str, excess: float) -> Any:
         return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess))
@@ -232,8 +232,8 @@ def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
     assert parts == sorted(parts)
 
 
-def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
-    """Rosenbrock's valley: its floor is a parabola, and a straight step is only as long as its walls allow."""
+def test_geodesic_acceleration_follows_a_curved_valley() -> None:
+    """Rosenbrock's valley: its floor is a parabola, and its walls limit a straight step."""
 
     def at(units: Array, near: Array) -> tuple[Array, tuple[None, ...], list[Array]]:  # noqa: ARG001
         u, v = units.T
@@ -255,7 +255,7 @@ def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
     assert cost - accelerated.cost > 2.0 * (cost - straight.cost)
 
 
-def test_a_part_of_an_explanation_is_exchanged_only_for_what_can_do_the_same() -> None:
+def test_substitutes_reproduce_the_contribution_of_an_effect() -> None:
     data = whitened_pendulum(friction_torque=2e-3, delay_time=4e-3)
     nominal = fit(data)
     found = [trials for _, trials in score_tests(RIG, data, nominal, EVALUATOR, RIG.suspects)]
@@ -268,8 +268,8 @@ def test_a_part_of_an_explanation_is_exchanged_only_for_what_can_do_the_same() -
     assert substitute_trials(data, EVALUATOR, both, best["friction"], offered, 2) == []
 
 
-def test_a_way_round_that_cannot_be_simulated_ends_no_refit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a refit that went astray the size is fitted first: where that cannot begin, the refit stays as it is."""
+def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A diverged refit is repeated with its size first; where that fails to start, the refit stays."""
     data = whitened_pendulum(point_mass_mass=5e-3, point_mass_station=0.5)
     nominal = fit(data)
     ((_, trials),) = score_tests(

@@ -1,4 +1,4 @@
-"""What separates two explanations under a condition: not what a rival's genes would make up for."""
+"""The separation of two hypotheses under a condition: only the part that a rival's genes cannot compensate."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TRUTH = {"stiffness": 0.2, "damping": 4e-3, "inertia": 1e-3}
 
 
 def fitted_pendulum(data: WhitenedData) -> Fit:
-    """The pendulum fitted from TRUTH; ``gain`` free as well, which is no gene of what is compared with."""
+    """The pendulum with a free ``gain`` fitted from TRUTH; the first hypothesis has no gain."""
     model = Pendulum(("gain",))
     problem = Problem(model, data.recordings, model.searched, base_genome(model, TRUTH), data.axes)
     genes = free_genes(problem)
@@ -28,7 +28,7 @@ def fitted_pendulum(data: WhitenedData) -> Fit:
 
 
 def apart(frequencies: tuple[float, ...], then: float, **missing: float) -> tuple[float, float]:
-    """Of what is ``lacking`` at ``then`` (Hz): what a pendulum with a gain cannot make up for, and as it was fitted."""
+    """Separation at ``then`` (Hz) of a pendulum with a gain, with adapted and with fixed genes, from the truth."""
     truth = {**TRUTH, **missing}
     data = WhitenedData.of(recorded(truth, noise=2e-4, frequencies=frequencies))
     rival = fitted_pendulum(data)
@@ -45,15 +45,15 @@ def apart(frequencies: tuple[float, ...], then: float, **missing: float) -> tupl
     return adapted, plain
 
 
-def test_a_rival_meets_a_new_recording_with_other_genes() -> None:
-    """At one frequency stiffness and inertia make up for each other, so that another frequency is foretold wrongly."""
+def test_a_rival_adapts_its_genes_to_a_new_recording() -> None:
+    """At one frequency stiffness and inertia compensate each other, so another frequency is predicted wrongly."""
     adapted, plain = apart((1.2,), 2.7)
     assert plain > 5.0
     assert adapted < 0.2 * plain
 
 
-def test_genes_that_are_told_do_not_adapt() -> None:
-    """About resonance a spring that hardens is foretold by no gene that the other frequencies have fixed."""
+def test_identified_genes_do_not_adapt() -> None:
+    """Near resonance no gene fixed by the other frequencies imitates a hardening spring."""
     adapted, plain = apart((1.2, 1.7, 2.0, 2.7, 3.4), 2.3, **{"cubic.k3": 0.3})
     assert plain > 5.0
     assert 0.5 * plain < adapted <= plain
