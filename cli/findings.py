@@ -25,8 +25,8 @@ def print_finding(found: Json) -> None:
         say(f"where: {found['where']['words']}")
     say("")
     _ranking(found)
-    if found["alike"]:
-        say(f"these recordings cannot tell apart: {'; '.join(' and '.join(names) for names in found['alike'])}")
+    if alternatives := [" and ".join(names) for names in found["indistinguishable"]]:
+        say(f"these recordings cannot tell apart: {'; '.join(alternatives)}")
     _genes(found)
     if found["law"]:
         say(f"free-form law: {found['law']['words']}")

@@ -275,7 +275,7 @@ class Finding:
         strength: misfit after the best nominal refit divided by the noise.
         floors: the smallest misfit that can be expected.
         hypotheses: most probable first, the nominal model included.
-        alike: hypotheses (each of one or several effects) that these recordings cannot distinguish.
+        indistinguishable: hypotheses (each of one or several effects) that these recordings cannot distinguish.
         where: location, phase, axis, scaling.
         markers, phase_map, missing: the maps.
         recordings: misfit to each.
@@ -301,7 +301,7 @@ class Finding:
     strength: float
     floors: Floors
     hypotheses: tuple[Hypothesis, ...]
-    alike: tuple[tuple[str, ...], ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
     where: Where | None
     markers: tuple[MarkerMisfit, ...]
     phase_map: PhaseMap | None

@@ -170,7 +170,7 @@ def _finding(
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / data.noise**2)),
         floors=_floors(state, division),
         hypotheses=hypotheses(data, texts, state.trials),
-        alike=decision.alike,
+        indistinguishable=decision.alternatives,
         where=location if decision.verdict != "adequate" else None,
         markers=maps.markers(before, after),
         phase_map=maps.phase_map(before, after),

@@ -20,12 +20,12 @@ MAX_SCREENED_LISTED = 12  # suspects that were only score-tested and are still l
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict, the probabilities of all verdicts, named effects, ``alike`` hypotheses, and the best refit."""
+    """The verdict, the probabilities of all verdicts, named effects, ``alternatives``, and the best refit."""
 
     verdict: Verdict
     probabilities: dict[str, float]
     named: tuple[str, ...]
-    alike: tuple[tuple[str, ...], ...]
+    alternatives: tuple[tuple[str, ...], ...]
     best: Refit
 
 
@@ -59,12 +59,12 @@ def decide(weights: HypothesisWeights) -> Decision:
         if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # worth its genes
             best = refits[int(np.argmax(weights.evidence[1:]))]
     distinguishing = verdict not in ("adequate", "unnamed") and len(possible) > 1
-    alike = tuple(refit.names for refit in possible) if distinguishing else ()
+    possible_names = tuple(refit.names for refit in possible) if distinguishing else ()
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
         named = best.names if verdict in ("named", "measurement fault") else ()
-    return Decision(verdict, probability, named, alike, best)
+    return Decision(verdict, probability, named, possible_names, best)
 
 
 def _common_subset(possible: Sequence[Refit]) -> Refit | None:
@@ -169,16 +169,16 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
             else "No effect explains enough to be worth its genes, and none was added."
         )
     if decision.verdict == "ambiguous":
-        either = " or ".join(_titles(suspects, found, " with ") for found in decision.alike) or names
+        either = " or ".join(_titles(suspects, found, " with ") for found in decision.alternatives) or names
         return (
             f"Physics is missing, and these recordings cannot distinguish: {either}. {start} "
             f"With the most probable the misfit is {texts['after']}. {texts['held_out']}"
         )
     kind = "The recordings have a fault" if decision.verdict == "measurement fault" else "The model is missing"
     link = ": " if decision.verdict == "measurement fault" else " "
-    larger, others = (
-        [one for one in decision.alike if (set(decision.named) <= set(one)) is contained] for contained in (True, False)
-    )
+    named = set(decision.named)
+    larger = [one for one in decision.alternatives if named <= set(one)]
+    others = [one for one in decision.alternatives if not named <= set(one)]
     additional = dict.fromkeys(name for one in larger for name in one if name not in decision.named)
     alternatives = [_titles(suspects, one, " with ") for one in others]
     more = (

@@ -191,7 +191,7 @@ def wing_finding() -> Finding:
         strength=5.12,
         floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083),
         hypotheses=hypotheses,
-        alike=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
+        indistinguishable=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
         where=Where(
             "Outer 30 % of the span, during the first third of the downstroke, along the flap normal; grows with the "
             "flap frequency squared.",
@@ -251,7 +251,7 @@ def force_finding() -> Finding:
             hypothesis(("wake_capture",), "Wake capture", "aerodynamics", 0.01, 0.55, predicted=0.31),
             hypothesis((), "Nominal model", "", 0.0, 0.0),
         ),
-        alike=(),
+        indistinguishable=(),
         where=Where(
             "In the first 0.37 of the beat, along x.", None, None, Interval(0.19, 0.04, 0.37), "x", (0.3, 0.4, 0.2, 0.1)
         ),
@@ -293,7 +293,7 @@ def bare(finding: Finding) -> Finding:
         finding,
         named=(),
         hypotheses=(),
-        alike=(),
+        indistinguishable=(),
         where=None,
         markers=(),
         phase_map=None,

@@ -71,7 +71,7 @@ function drawChances() {
 
 function drawRanking() {
   const all = $("ranking-all").checked;
-  const named = (one) => one.effects.length > 0 && (finding.verdict === "ambiguous" ? finding.alike : [finding.named])
+  const named = (one) => one.effects.length > 0 && (finding.verdict === "ambiguous" ? finding.indistinguishable : [finding.named])
     .some((names) => names.length === one.effects.length && names.every((name) => one.effects.includes(name)));
   const shown = finding.hypotheses.filter((one, i) => all || i < RANKED);
   $("ranking-more").hidden = finding.hypotheses.length <= RANKED;
@@ -81,7 +81,7 @@ function drawRanking() {
     el("td", { className: "n" }, chance(one.probability), meter(one.probability)), el("td", { className: "n" }, percent(one.explained), meter(one.explained)),
     el("td", { className: "n" }, percent(one.predicted)), el("td", { className: "n" }, significant(one.evidence, 3)), el("td", { className: "n" }, size(one.misfit),
       one.refitted ? null : el("small", { className: "below" }, "by slopes, not refitted")))));
-  const alike = finding.alike.map((names) => names.map(spoken).join(" with "));
+  const alike = finding.indistinguishable.map((names) => names.map(spoken).join(" with "));
   $("alike").textContent = alike.length > 1 ? `These recordings cannot tell apart: ${alike.join("; ")}.` : "";
 }
 

@@ -73,7 +73,7 @@ def test_the_effect_common_to_all_possible_hypotheses_is_named() -> None:
     both = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
     found = decide(weigh(data(), refit(2.0), both, 0.0, 40))
     assert (found.verdict, found.named) == ("named", ("a",))
-    assert set(found.alike) == {("a",), ("a", "b")}
+    assert set(found.alternatives) == {("a",), ("a", "b")}
     assert found.probabilities["named"] > 0.9
     apart = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
     assert decide(weigh(data(), refit(2.0), apart, 0.0, 40)).verdict == "ambiguous"
@@ -81,8 +81,8 @@ def test_the_effect_common_to_all_possible_hypotheses_is_named() -> None:
 
 def test_alternatives_are_listed_only_for_a_verdict_on_effects() -> None:
     open_ = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
-    assert set(open_.alike) == {("a",), ("b",)}
-    assert decide(weigh(data(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alike == ()
+    assert set(open_.alternatives) == {("a",), ("b",)}
+    assert decide(weigh(data(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alternatives == ()
 
 
 def test_the_summary_lists_alternatives_and_additional_effects() -> None:
