@@ -34,7 +34,7 @@ class Floors:
 
     Attributes:
         noise: root mean square of the measurement noise, from the scatter between beats.
-        memory: lag-1 autocorrelation of the noise.
+        lag1_autocorrelation: of the noise, between successive samples.
         division: misfit by the model's discretisation, from a comparison with a finer one, and at most the residual;
             None where there is no finer one.
         finer: the discretisation that it was compared with.
@@ -43,7 +43,7 @@ class Floors:
     """
 
     noise: float
-    memory: float
+    lag1_autocorrelation: float
     division: float | None
     finer: str
     simulation: float

@@ -109,7 +109,11 @@ def _tiles(finding: Finding) -> Markup:
     scale = channel_scale(finding)
     tiles = [
         ("Strength d", number(finding.strength), "misfit after the best nominal refit, over the noise"),
-        ("Noise", scale.text(finding.floors.noise), f"memory {number(finding.floors.memory, 2)} from sample to sample"),
+        (
+            "Noise",
+            scale.text(finding.floors.noise),
+            f"lag-1 autocorrelation {number(finding.floors.lag1_autocorrelation, 2)}",
+        ),
         ("Floor", scale.text(finding.floors.total), "what a right model would leave"),
     ]
     if finding.proof is not None and "after" in stages(finding):
