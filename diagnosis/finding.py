@@ -35,7 +35,7 @@ class Floors:
     Attributes:
         noise: root mean square of the measurement noise, from the scatter between beats.
         lag1_autocorrelation: of the noise, between successive samples.
-        division: misfit by the model's discretisation, from a comparison with a finer one, and at most the residual;
+        discretisation: misfit by the model's discretisation, from a comparison with a finer one, and at most the residual;
             None where there is no finer one.
         finer: the discretisation that it was compared with.
         simulation: misfit below which no model is required to be: a tenth of the noise.
@@ -44,7 +44,7 @@ class Floors:
 
     noise: float
     lag1_autocorrelation: float
-    division: float | None
+    discretisation: float | None
     finer: str
     simulation: float
     total: float

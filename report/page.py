@@ -136,8 +136,8 @@ def _floors(finding: Finding) -> Markup:
         ("floor: these together", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
-    if floors.division is not None:
-        rows.insert(1, ("division, against a finer one", floors.division, "pale"))
+    if floors.discretisation is not None:
+        rows.insert(1, ("division, against a finer one", floors.discretisation, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
     along = Axis(0, 1.1 * most, 12, 348)
     bottom = 8 + 34.0 * len(rows)
@@ -147,7 +147,7 @@ def _floors(finding: Finding) -> Markup:
         wide = along.at(value * scale.factor) - along.at(0)
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="said"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
-    note = f"The division was compared with: {floors.finer}." if floors.division is not None else None
+    note = f"The division was compared with: {floors.finer}." if floors.discretisation is not None else None
     return figure(_floors_told(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note)
 
 

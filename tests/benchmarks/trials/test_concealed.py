@@ -58,7 +58,8 @@ def finding(
     return Finding(
         dataset="d", kind="tracks", unit="m", model="", verdict=verdict, summary="", probabilities={verdict: 1.0},
         named=named, put_in=named, strength=2.0, floors=Floors(5e-4, 0.5, None, "", 0.0, 5e-4),
-        hypotheses=(hypothesis(probability=0.95), *others, hypothesis("backlash", probability=0.01)), indistinguishable=(),
+        hypotheses=(hypothesis(probability=0.95), *others, hypothesis("backlash", probability=0.01)),
+        indistinguishable=(),
         where=Where("", Interval(0.75, 0.7, 0.8), Interval(0.4, 0.3, 0.5), Interval(0.98, 0.9, 1.0), "z", (1.0,)),
         markers=(), phase_map=None, missing=(), recordings=(held_out("a", 2e-3, 6e-4), held_out("b", 2e-3, 6e-4)),
         proof=None, overlays=(), genes=genes, law=None, advice=(),
@@ -241,7 +242,7 @@ def test_a_place_that_is_not_told_is_far_off() -> None:
 
 def test_what_a_division_is_said_to_leave_is_no_excuse() -> None:
     found = finding("named", ("lumped_mass",))
-    boasting = replace(found, floors=replace(found.floors, division=1e-2))
+    boasting = replace(found, floors=replace(found.floors, discretisation=1e-2))
     assert mark(boasting, answer(MASS)).held_out == mark(found, answer(MASS)).held_out
 
 
