@@ -35,7 +35,7 @@ class Floors:
     Attributes:
         noise: root mean square of the measurement noise, from the scatter between beats.
         lag1_autocorrelation: of the noise, between successive samples.
-        discretisation: misfit by the model's discretisation, from a comparison with a finer one, and at most the residual;
+        discretisation: misfit by the model's discretisation, from a comparison with a finer one; at most the residual;
             None where there is no finer one.
         finer: the discretisation that it was compared with.
         simulation: misfit below which no model is required to be: a tenth of the noise.
@@ -270,7 +270,7 @@ class Finding:
         summary: the verdict in a few sentences.
         probabilities: of every verdict; they sum to one.
         named: effects that the verdict names; for an ambiguous one, all that cannot be distinguished.
-        put_in: effects in the model called "after": those named, the most probable of an ambiguous verdict, the best of
+        added_effects: in the model called "after": those named, the most probable of an ambiguous verdict, the best of
             an unnamed one if its evidence suffices; else empty.
         strength: misfit after the best nominal refit divided by the noise.
         floors: the smallest misfit that can be expected.
@@ -297,7 +297,7 @@ class Finding:
     summary: str
     probabilities: dict[str, float]
     named: tuple[str, ...]
-    put_in: tuple[str, ...]
+    added_effects: tuple[str, ...]
     strength: float
     floors: Floors
     hypotheses: tuple[Hypothesis, ...]

@@ -123,13 +123,13 @@ def listed(items: Iterable[str], last: str = "and") -> str:
 def best_of(finding: Finding) -> Hypothesis | None:
     """The hypothesis that was put in, else the most probable one that is not the nominal model."""
     others = [h for h in finding.hypotheses if h.effects]
-    put_in = [h for h in others if set(h.effects) == set(finding.put_in)]
+    put_in = [h for h in others if set(h.effects) == set(finding.added_effects)]
     return next(iter([*put_in, *others]), None)
 
 
 def stages(finding: Finding) -> dict[str, str]:
     """What is compared with the recordings: "before" and, where anything was put in, "after", with their names."""
-    if not finding.put_in:
+    if not finding.added_effects:
         return {"before": "nominal model, refitted"}
     after = "what was found" if finding.named else "the nearest in the library"  # short: titles of maps
     return {"before": "before: nominal model, refitted", "after": f"after: with {after}"}

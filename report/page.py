@@ -62,7 +62,7 @@ def _parts(finding: Finding) -> list[object]:
     return [
         *_verdict(finding),
         _section(
-            _PROVED if finding.put_in else "How well the model fits",
+            _PROVED if finding.added_effects else "How well the model fits",
             misfits.proof(finding),
             misfits.recordings(finding),
         ),
@@ -121,7 +121,7 @@ def _tiles(finding: Finding) -> Markup:
         tiles.append(("Held-out misfit, over the floor", change, f"nominal model → with {what_was_put_in(finding)}"))
     best = best_of(finding)
     if best is not None and finding.verdict != "adequate":
-        by = best.title if finding.put_in else f"{best.title}, the nearest"
+        by = best.title if finding.added_effects else f"{best.title}, the nearest"
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {by}"))
     shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
     return tag("dl", *shown, class_="tiles")

@@ -150,7 +150,7 @@ def _finding(
     proved = None
     if held_out_residuals is not None:
         rows += recording_misfits(held_out_residuals, held_out=True, floor=division)
-        proved = proof(held_out_residuals, division, unit, put_in=bool(best.names))
+        proved = proof(held_out_residuals, division, unit, effects_added=bool(best.names))
         shown += maps.overlays(
             subject, held_out_residuals.data, held_out_residuals.before, held_out_residuals.after, held_out=True
         )
@@ -166,7 +166,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, location.words, proved)),
         probabilities=decision.probabilities,
         named=decision.named,
-        put_in=best.names,
+        added_effects=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / data.noise**2)),
         floors=_floors(state, division),
         hypotheses=hypotheses(data, texts, state.trials),

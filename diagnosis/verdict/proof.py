@@ -87,10 +87,10 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
     return tuple(rows)
 
 
-def proof(predicted: ResidualPair, floor: float, unit: str, *, put_in: bool) -> Proof:
+def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bool) -> Proof:
     """Misfit of both models over all held-out recordings; ``floor`` as in :func:`recording_misfits`.
 
-    ``put_in``: whether effects were added, so that the models differ.
+    ``effects_added``: whether effects were added, so that the models differ.
     """
     data = predicted.data
     used, kinds = [beat_fit.used for beat_fit in data.beat_fits], [one.kind for one in data.recordings]
@@ -98,12 +98,12 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, put_in: bool) -> 
     least = float(np.hypot(data.noise, floor))
     display = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
     change = f"{display[0] * before.value:.3g} {display[1]}"
-    if put_in:
+    if effects_added:
         change += f" before, {display[0] * after.value:.3g} {display[1]} after"
     better = better and not predicted.incomplete
     several = "s" if len(data.recordings) > 1 else ""
     words = f"{len(data.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
-    if put_in and not better:
+    if effects_added and not better:
         words += "; the improvement is not significant"
     return Proof(_relative_to_floor(before, least), _relative_to_floor(after, least), least, better, words)
 

@@ -119,7 +119,7 @@ def test_of_an_ambiguous_verdict_the_one_that_was_put_in_is_credited() -> None:
         wing_finding(),
         verdict="ambiguous",
         named=BOTH,
-        put_in=BOTH[:1],
+        added_effects=BOTH[:1],
         indistinguishable=tuple((name,) for name in BOTH),
     )
     best = best_of(finding)

@@ -99,7 +99,7 @@ def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:
         summary=f"The hinge is off its place. Started from {len(spec.start)} genes, considered {list(spec.suspects)}.",
         probabilities={"adequate": 0.03, "named": 0.9, "ambiguous": 0.04, "unnamed": 0.02, "measurement fault": 0.01},
         named=("hinge_offset",),
-        put_in=("hinge_offset",),
+        added_effects=("hinge_offset",),
         strength=3.1,
         floors=Floors(0.5e-3, 0.3, None, "", 1e-5, 0.5e-3),
         hypotheses=hypotheses,

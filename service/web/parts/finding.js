@@ -52,7 +52,7 @@ function drawNumbers() {
     cell("floor: what a right model would leave", size(floors.total))];
   if (proof) {
     cells.push(cell("held out, before, over the floor", `${significant(proof.before.value, 3)}×`));
-    if (finding.put_in.length) cells.push(cell("held out, after, over the floor", `${significant(proof.after.value, 3)}×`, true));
+    if (finding.added_effects.length) cells.push(cell("held out, after, over the floor", `${significant(proof.after.value, 3)}×`, true));
   }
   $("finding-numbers").replaceChildren(...cells);
 }
@@ -94,7 +94,7 @@ function drawWhere() {
   document.querySelector("input[name=stage][value=before]").checked = true;
   const placed = finding.markers.some((marker) => marker.x !== null);
   // Curves of forces show both at once.
-  $("stages").hidden = !finding.put_in.length || !(placed || finding.phase_map?.bands.length > 1);
+  $("stages").hidden = !finding.added_effects.length || !(placed || finding.phase_map?.bands.length > 1);
   $("markers-part").hidden = !placed;
   $("phases-part").hidden = !finding.phase_map;
   $("missing-part").hidden = !finding.missing.length;
@@ -105,7 +105,7 @@ function drawMaps() {
   const which = stage();
   const [first] = finding.markers;
   if (first && first.x !== null) drawMarkers($("markers-map"), finding, which, unit()).catch((error) => told("where-note", error));
-  if (finding.phase_map) drawPhases($("phases-map"), finding.phase_map, which, unit(), finding.put_in.length > 0).catch((error) => told("where-note", error));
+  if (finding.phase_map) drawPhases($("phases-map"), finding.phase_map, which, unit(), finding.added_effects.length > 0).catch((error) => told("where-note", error));
   const load = finding.missing[Number($("missing-recording").value)];
   if (!load) return;
   $("missing-title").textContent = load.rod ? `What the ${load.rod} rod turns further than it is said to`
@@ -114,7 +114,7 @@ function drawMaps() {
 }
 
 function drawRecordings() {
-  const after = finding.put_in.length > 0;
+  const after = finding.added_effects.length > 0;
   const largest = Math.max(...finding.recordings.flatMap((one) => [one.before.value, one.after.value, one.floor]), 1e-30);
   const bars = (one) => {
     const twin = el("div", { className: "twin", ariaHidden: "true" }, el("i"), el("i"));
@@ -143,14 +143,14 @@ function drawOverlay() {
   const order = one.phase.map((_, i) => i).sort((a, b) => one.phase[a] - one.phase[b]);
   const pick = (values) => order.map((i) => 1e3 * values[i]);
   const curves = [["recorded", pick(one.recorded)], ["nominal model, refitted", pick(one.before)]];
-  if (finding.put_in.length) curves.push(["with what was found", pick(one.after)]);
+  if (finding.added_effects.length) curves.push(["with what was found", pick(one.after)]);
   lines($("overlay-plot"), order.map((i) => one.phase[i]), curves, { unit: unit(), first: "markers" }).catch((error) => told("overlay-note", error));
 }
 
 function drawGenes() {
   const bounds = ({ low, high }) => (low === null && high === null ? "not bounded" : low === null ? `below ${significant(high, 3)}`
     : high === null ? `above ${significant(low, 3)}` : `${significant(low, 3)} to ${significant(high, 3)}`);
-  const isFound = (gene) => finding.put_in.some((name) => gene.name.startsWith(`${name}.`));
+  const isFound = (gene) => finding.added_effects.some((name) => gene.name.startsWith(`${name}.`));
   const found = finding.genes.filter(isFound);
   $("found-genes-part").hidden = !finding.genes.length;
   $("found-genes").tBodies[0].replaceChildren(...[...found, ...finding.genes.filter((gene) => !isFound(gene))].map((gene) =>

@@ -57,7 +57,7 @@ def finding(
     others = tuple(hypothesis(*top, probability=0.9) for _ in range(bool(top)))
     return Finding(
         dataset="d", kind="tracks", unit="m", model="", verdict=verdict, summary="", probabilities={verdict: 1.0},
-        named=named, put_in=named, strength=2.0, floors=Floors(5e-4, 0.5, None, "", 0.0, 5e-4),
+        named=named, added_effects=named, strength=2.0, floors=Floors(5e-4, 0.5, None, "", 0.0, 5e-4),
         hypotheses=(hypothesis(probability=0.95), *others, hypothesis("backlash", probability=0.01)),
         indistinguishable=(),
         where=Where("", Interval(0.75, 0.7, 0.8), Interval(0.4, 0.3, 0.5), Interval(0.98, 0.9, 1.0), "z", (1.0,)),

@@ -41,6 +41,6 @@ def test_a_recording_that_fits_worse_gets_a_remark() -> None:
         )
 
     rows = [row("good", 5e-3, 1e-3), row("bad", 2e-3, 3e-3)]
-    put_in, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
-    assert _worsened(rows, put_in, "m") == ("with the added effects the misfit increases in bad from 2 to 3 mm",)
+    added, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
+    assert _worsened(rows, added, "m") == ("with the added effects the misfit increases in bad from 2 to 3 mm",)
     assert _worsened(rows, nothing, "m") == ()

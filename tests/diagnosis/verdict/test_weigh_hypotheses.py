@@ -151,10 +151,10 @@ def test_an_effect_that_explains_little_is_not_named() -> None:
     assert verdict(3.0, refit(2.2, ("a",)), refit(2.5, ("b",))) == ("unnamed", ())
 
 
-@pytest.mark.parametrize(("left", "put_in"), [(1.5, ("a",)), (2.9, ())])
-def test_the_best_effect_is_added_only_if_worth_its_genes(left: float, put_in: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(("left", "added"), [(1.5, ("a",)), (2.9, ())])
+def test_the_best_effect_is_added_only_if_worth_its_genes(left: float, added: tuple[str, ...]) -> None:
     found = decide(weigh(data(), refit(3.0), [refit(left, ("a",), 2), refit(2.95, ("b",), 2)], 0.0, 40))
-    assert (found.verdict, found.best.names) == ("unnamed", put_in)
+    assert (found.verdict, found.best.names) == ("unnamed", added)
 
 
 @pytest.mark.parametrize(("left", "ended", "expected"), [(0.5, False, "b"), (0.5, True, None), (2.9, False, None)])
