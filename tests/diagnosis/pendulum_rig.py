@@ -29,10 +29,7 @@ TORQUE = (0.015,)  # N m: cosines of the motor's torque, from the first harmonic
 SLIDING = 0.3  # rad/s: friction is 3/4 of dry friction at this rate
 HARMONICS, SAMPLES = 11, 128
 STEPS, MAX_HALVINGS, TORQUE_TOLERANCE = 12, 6, 1e-11  # N m
-CONTINUATION = (
-    (1.0,),
-    (0.1, 0.25, 0.5, 0.75, 1.0),
-)  # fractions of the nonlinear torques: at once, or step by step
+CONTINUATION = ((1.0,), (0.1, 0.25, 0.5, 0.75, 1.0))  # fractions of the nonlinear torques: at once, or step by step
 FRAMES, FRAMES_PER_BEAT = 124, 30  # strobed: each frame is of another beat
 FREQUENCIES = (1.2, 1.7, 2.0, 2.7, 3.4)  # Hz; the nominal pendulum's own is 2.25 Hz
 
