@@ -14,7 +14,7 @@ from wingfit.calibration.problem import base_genome
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.diagnosis.search import search_missing_physics, select_suspects
+from wingfit.diagnosis.search import run_search, select_suspects
 from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject
@@ -66,7 +66,7 @@ def diagnose_subject(
     held_out, copies = _without_copies(fitted, held_out)
     state = SearchState(subject, WhitenedData.of(fitted, axes, spec.policy))
     counted = CountingEvaluator(evaluator, state)
-    for fraction, stage in search_missing_physics(state, spec, free or tuple(subject.model.searched), counted):
+    for fraction, stage in run_search(state, spec, free or tuple(subject.model.searched), counted):
         yield Progress(SEARCH_FRACTION * fraction, stage, state.evaluations)
     finding: Finding | None = None
     for fraction, stage, found in build_finding(state, name, held_out, counted):

@@ -17,7 +17,7 @@ from wingfit.diagnosis.evidence.nominal import (
     finer_change,
     finer_is_promising,
     fit_nominal,
-    is_clearly_better,
+    improves,
 )
 from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
@@ -26,8 +26,8 @@ from wingfit.diagnosis.evidence.refit import (
     fit_to_convergence,
     make_refit,
     partner_trials,
-    refit_with_subject,
-    refit_with_suspects,
+    refit_at,
+    refit_with,
     restart_fit,
     strongest_trials,
     substitute_trials,
@@ -48,7 +48,7 @@ MAX_RIVALS = 3  # hypotheses for which a second effect is tried
 MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
-def search_missing_physics(
+def run_search(
     state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     """Fill ``state``; yields the fraction of the work done and the next stage."""
@@ -62,13 +62,13 @@ def search_missing_physics(
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
-    for fraction, stage in _search_per_discretisation(state, spec, fit, suspects, evaluator):
+    for fraction, stage in _search_coarse_first(state, spec, fit, suspects, evaluator):
         yield 0.3 + 0.55 * fraction, stage
     yield 0.85, "fitting the nominal model again"
     better = _nominal_from_best(state, evaluator)
     if better is not None:
         state.restart_from(replace(state.fitted_nominal, refit=better))
-        for fraction, stage in _test_and_refit_suspects(state, spec, suspects, evaluator):
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer discretisation"
     for stage in _refine_and_extend(state, spec, evaluator):
@@ -80,18 +80,18 @@ def search_missing_physics(
     yield from ((0.95, stage) for stage in _final_fits(state, evaluator, floor, len(suspects)))
 
 
-def _search_per_discretisation(
+def _search_coarse_first(
     state: SearchState, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
 ) -> Iterator[tuple[float, str]]:
     """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
     nominal = choose_discretisation(state.subject, state.data, evaluator, fit, refine=spec.refine)
     if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
         state.restart_from(choose_discretisation(state.subject, state.data, evaluator, fit, refine=False))
-        for fraction, stage in _test_and_refit_suspects(state, spec, suspects, evaluator, at_least=nominal.refit):
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator, at_least=nominal.refit):
             yield 0.3 * fraction, stage
-    if not any(is_clearly_better(state.data, one, nominal.refit) for one in state.refits):
+    if not any(improves(state.data, one, nominal.refit) for one in state.refits):
         state.restart_from(nominal)
-        for fraction, stage in _test_and_refit_suspects(state, spec, suspects, evaluator):
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
             yield 0.3 + 0.7 * fraction, stage
 
 
@@ -158,23 +158,20 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    ineffective_refinement, limit = (
-        nominal.ineffective_refinement,
-        data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0),
-    )
+    tried_finer, limit = (nominal.tried_finer, data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0))
     leading = sorted((one for one in state.refits if one.excess <= limit), key=lambda one: one.excess)[:MAX_CONTINUED]
     for finer in nominal.subject.finer_subjects():
         tried = [(one, _fit_at_finer(finer, data, evaluator, one)) for one in leading]
         if any(found is not None and found is not one for one, found in tried):
-            ineffective_refinement = finer.description
+            tried_finer = finer.description
         known = [found for one, found in tried if found is not None and found is not one]
         better = min(known, key=lambda one: one.excess, default=best)
-        if is_clearly_better(state.data, better, best):
+        if improves(state.data, better, best):
             break
     else:
-        state.nominal = replace(nominal, ineffective_refinement=ineffective_refinement)
+        state.nominal = replace(nominal, tried_finer=tried_finer)
         return
-    first = refit_with_subject(finer, data, evaluator, nominal.refit)
+    first = refit_at(finer, data, evaluator, nominal.refit)
     if first is None:
         return
     first = fit_to_convergence(finer, data, evaluator, first)
@@ -196,8 +193,8 @@ def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refi
         return None
     if not finer_is_promising(data, changes, gain, refit):
         return refit
-    found = refit_with_subject(finer, data, evaluator, refit)
-    if found is None or found.fit.converged or is_clearly_better(data, found, refit) or found.excess >= refit.excess:
+    found = refit_at(finer, data, evaluator, refit)
+    if found is None or found.fit.converged or improves(data, found, refit) or found.excess >= refit.excess:
         return found
     return continue_fit(finer, data, evaluator, found)
 
@@ -206,13 +203,13 @@ def _follow_to_finer(
     finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit
 ) -> Refit | None:
     """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
-    found = refit_with_subject(finer, data, evaluator, refit)
+    found = refit_at(finer, data, evaluator, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
     return continue_fit(finer, data, evaluator, found)
 
 
-def _test_and_refit_suspects(
+def _try_suspects(
     state: SearchState,
     spec: DiagnosisSpec,
     suspects: Sequence[Suspect],
@@ -244,10 +241,10 @@ def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None
     """
     nominal = state.fitted_nominal.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
-    if best is nominal or not is_clearly_better(state.data, best, nominal):
+    if best is nominal or not improves(state.data, best, nominal):
         return None
     found = restart_fit(state.subject, state.data, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
-    return found if found is not None and is_clearly_better(state.data, found, nominal) else None
+    return found if found is not None and improves(state.data, found, nominal) else None
 
 
 def _refits(
@@ -258,7 +255,7 @@ def _refits(
     yield 0.72, "continuing the best refits"
     if _continue_best(state, nominal, evaluator):
         return
-    if at_least is not None and not any(is_clearly_better(state.data, one, at_least) for one in state.refits):
+    if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
         return
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state, spec, evaluator)
@@ -278,7 +275,7 @@ def _single_refits(
         if _is_outperformed(state, nominal, trial, chosen[0]):
             continue
         yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
-        state.add(refit_with_suspects(state.subject, data, fit, evaluator, [trial]))
+        state.add(refit_with(state.subject, data, fit, evaluator, [trial]))
 
 
 def _refits_from_estimates(
@@ -349,7 +346,7 @@ def _second_effects(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluato
         yield f"score test of {suspect.name} together with {' and '.join(best.names)}"
     for trial in partner_trials(data, best, found)[:MAX_PARTNERS]:
         yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
-        state.add(refit_with_suspects(state.subject, data, best.fit, evaluator, [*best.trials, trial], best.fit))
+        state.add(refit_with(state.subject, data, best.fit, evaluator, [*best.trials, trial], best.fit))
 
 
 def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
@@ -363,14 +360,14 @@ def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator)
             if names not in tried:
                 tried.add(names)
                 yield f"refit with {' and '.join(sorted(names))}"
-                state.add(refit_with_suspects(state.subject, data, fit, evaluator, [*one.trials, trial], one.fit))
+                state.add(refit_with(state.subject, data, fit, evaluator, [*one.trials, trial], one.fit))
     least = min(data.chi_squared(one.fit.coefficients) for one in state.refits)
     for two in suspect_pairs(data, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)
             yield f"refit with {' and '.join(sorted(names))}"
-            state.add(refit_with_suspects(state.subject, data, fit, evaluator, two))
+            state.add(refit_with(state.subject, data, fit, evaluator, two))
     yield from _substituted_refits(state, nominal, evaluator)
 
 
@@ -386,9 +383,7 @@ def _substituted_refits(state: SearchState, nominal: Nominal, evaluator: Evaluat
             names = frozenset(one.suspect.name for one in (*others, trial))
             if names not in tried:
                 yield f"refit with {' and '.join(sorted(names))}"
-                state.add(
-                    refit_with_suspects(state.subject, state.data, nominal.refit.fit, evaluator, [*others, trial])
-                )
+                state.add(refit_with(state.subject, state.data, nominal.refit.fit, evaluator, [*others, trial]))
 
 
 def _continue_best(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> bool:

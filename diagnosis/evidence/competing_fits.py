@@ -60,23 +60,23 @@ def fit_from_estimates(
     evaluator: Evaluator,
     initial: Fit,
     starts: Sequence[StartPoint],
-    max_excess: float,
-    target_excess: float = np.inf,
+    limit: float,
+    target: float = np.inf,
 ) -> Iterator[list[tuple[StartPoint, Fit]]]:
     """Fit all ``starts`` from the estimates, the genes of ``initial``; yields the rivals of the best after every step.
 
     At the nominal fit the genes have absorbed what they could of a suspect, and may not return. Every fit runs for
     FIRST_STEPS; then each that can still overtake the best continues. A fit is stopped
 
-    - where it gains little and has far more excess than the best (`Policy.rivalry`), or more than ``max_excess`` (m^2
+    - where it gains little and has far more excess than the best (`Policy.rivalry`), or more than ``limit`` (m^2
       or N^2);
-    - where it does not lead and would end above one of these, or above ``target_excess``, even with faster progress
+    - where it does not lead and would end above one of these, or above ``target``, even with faster progress
       (`Policy.acceleration`);
     - where a fit of the same suspects has come to the same genes.
 
     Yields nothing where none can be simulated.
     """
-    fits = _CompetingFits(data, max_excess, target_excess)
+    fits = _CompetingFits(data, limit, target)
     for start in starts:
         fits.add(start, _from_estimates(subject, data, evaluator, initial, start))
         yield from fits.run(FIRST_STEPS)
@@ -86,8 +86,8 @@ def fit_from_estimates(
 class _CompetingFits:
     """Fits that compete; hopeless ones are stopped."""
 
-    def __init__(self, data: WhitenedData, max_excess: float, target_excess: float) -> None:
-        self.data, self.max_excess, self.target_excess = data, max_excess, target_excess
+    def __init__(self, data: WhitenedData, limit: float, target: float) -> None:
+        self.data, self.limit, self.target = data, limit, target
         self.fits = list[_CompetingFit]()
 
     def add(self, start: StartPoint, steps: Iterator[Fit]) -> None:
@@ -105,16 +105,16 @@ class _CompetingFits:
             return False
         before, now = fit.last_fits
         if small_gain(self.data, before, now, SLOW_FACTOR) and self._excess(fit) > min(
-            self.max_excess, self._rivalry_limit()
+            self.limit, self._rivalry_limit()
         ):
             return True
         if fit.steps_taken < FIRST_STEPS or self._excess(fit) <= min(self._excess(one) for one in self.fits):
             return False
-        return self._extrapolated_excess(fit) > min(self.target_excess, self._rivalry_limit()) or any(
+        return self._expected_excess(fit) > min(self.target, self._rivalry_limit()) or any(
             self._excess(other) <= self._excess(fit) and other.same_as(fit) for other in self.fits
         )
 
-    def _extrapolated_excess(self, fit: _CompetingFit) -> float:
+    def _expected_excess(self, fit: _CompetingFit) -> float:
         """Excess at the last step if the fit progresses faster than in its latest step (`Policy.acceleration`)."""
         before, now = (self.data.excess(fit.coefficients) for fit in fit.last_fits)
         if now <= 0.0 or now >= before:

@@ -234,7 +234,7 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
     accelerations = np.zeros((len(moves), len(fit.coefficients)))
     if accelerated:
         every, accelerations = (
-            _accelerations(simulator, fit, moves[::2]),
+            _second_order(simulator, fit, moves[::2]),
             np.concatenate([accelerations, accelerations[::2]]),
         )
         moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], every, strict=True)]])
@@ -272,24 +272,20 @@ class _DampedSteps:
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
         white, self.slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
-        self.likelihood_weight, self.unit, self.scale = data.likelihood_weight(fit.coefficients), fit.unit, data.scale
-        curvature = self.likelihood_weight * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
-        self.quadratic = Quadratic(
-            curvature, self.likelihood_weight * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR_SD**2
-        )
+        self.weight, self.unit, self.scale = data.likelihood_weight(fit.coefficients), fit.unit, data.scale
+        curvature = self.weight * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
+        self.quadratic = Quadratic(curvature, self.weight * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR_SD**2)
         self.own = np.clip(fit.damping * DAMPING_FACTORS[0], LEAST_DAMPING, LARGEST_DAMPING)
         by_box = np.outer(DAMPING_FACTORS[1] / PRIOR_SD**2, np.ones(len(fit.unit)))
         self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
     def move(self, damping: Array, acceleration: Array | float = 0.0) -> Array:
         """The step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
-        accelerated = (
-            self.likelihood_weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
-        )
+        accelerated = self.weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
         return self.quadratic.step(self.unit, damping, self.quadratic.slope + accelerated)
 
 
-def _accelerations(simulator: _Simulator, fit: Fit, moves: Array) -> Array:
+def _second_order(simulator: _Simulator, fit: Fit, moves: Array) -> Array:
     """Second-order changes [S, D] of the coefficients along ``moves`` [S, F], by finite differences."""
     part = np.minimum(1.0, ACCELERATION_STEP / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
     found, reasons, _ = simulator.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.motion_genes)

@@ -32,15 +32,15 @@ def covariance(data: WhitenedData, fit: Fit) -> Array:
     as clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
-    likelihood_weight, recordings = (
+    weight, recordings = (
         min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight),
         len(data.recordings),
     )
     prior = np.eye(len(fit.unit)) / PRIOR_SD**2
-    meat = likelihood_weight * slopes.T @ slopes + prior
+    meat = weight * slopes.T @ slopes + prior
     bread = np.linalg.inv(meat)
     if _clustered(data) and recordings > 1:
-        scores = likelihood_weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
+        scores = weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
         scores -= scores.mean(axis=0)
         meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
     return np.asarray(bread @ meat @ bread)

@@ -12,7 +12,7 @@ from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
-from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_with_subject
+from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_at
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
@@ -33,7 +33,7 @@ class Nominal:
         discretisation_error: misfit (m or N) by the discretisation, from the next finer one; None where there is none.
         finer: description of the next finer one.
         remarks: for the user.
-        ineffective_refinement: description of a finer discretisation that was fitted with little gain; it shows that
+        tried_finer: description of a finer discretisation that was fitted with little gain; it shows that
             discretisation is not the cause of the residual. "" where none was fitted.
     """
 
@@ -42,7 +42,7 @@ class Nominal:
     discretisation_error: float | None
     finer: str
     remarks: tuple[str, ...]
-    ineffective_refinement: str = ""
+    tried_finer: str = ""
 
 
 def fit_nominal(
@@ -74,10 +74,10 @@ def choose_discretisation(
                 continue
             error, finest, ineffective = changes, finer.description, ""
             if refine and finer_is_promising(data, changes, gain, current):
-                found = refit_with_subject(finer, data, evaluator, current)
+                found = refit_at(finer, data, evaluator, current)
                 better = (
                     fit_to_convergence(finer, data, evaluator, found)
-                    if found and is_clearly_better(data, found, current)
+                    if found and improves(data, found, current)
                     else None
                 )
                 ineffective = finer.description if found is not None else ""
@@ -124,7 +124,7 @@ def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit
     return float(np.sqrt(data.weight @ (change[: len(data.scale)] * data.scale) ** 2)), gain
 
 
-def is_clearly_better(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
+def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
     """Whether ``finer`` removes so much of the excess of ``coarse`` that it is worth its cost."""
     return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
 

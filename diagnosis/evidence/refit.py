@@ -95,7 +95,7 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     return total
 
 
-def refit_with_suspects(
+def refit_with(
     subject: Subject,
     data: WhitenedData,
     nominal: Fit,
@@ -165,7 +165,7 @@ def _fit_subset(
     return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
 
 
-def refit_with_subject(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
+def refit_at(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
     """``refit`` fitted with the model of ``subject`` from its current genes; None where that cannot be simulated."""
     before = refit.fit
     model = subject.extended(refit.names)
@@ -213,30 +213,24 @@ def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refi
         return None
 
 
-def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], max_count: int) -> list[Trial]:
+def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
     """The best trial of each suspect that is worth a refit (`Policy.worth_refit`), strongest first."""
     policy = data.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
-    return [trial for trial in best[:max_count] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
+    return [trial for trial in best[:limit] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
 def partner_trials(
-    data: WhitenedData, base: Refit, found: Sequence[list[Trial]], max_count: int = MAX_CANDIDATES
+    data: WhitenedData, base: Refit, found: Sequence[list[Trial]], limit: int = MAX_CANDIDATES
 ) -> list[Trial]:
     """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
     nuisance = Nuisance(data, base.fit)
     residual = nuisance.residual
     least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
-    return [
-        trial
-        for gain, trial in _rank_by_explained(nuisance, residual, found, base.names)[:max_count]
-        if gain > least_gain
-    ]
+    return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names)[:limit] if gain > least_gain]
 
 
-def effect_contribution(
-    data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()
-) -> Array | None:
+def contribution(data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
     """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
 
     All other genes stay the same. None where that cannot be simulated.
@@ -249,10 +243,10 @@ def effect_contribution(
 
 
 def substitute_trials(
-    data: WhitenedData, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], max_count: int
+    data: WhitenedData, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
 ) -> list[Trial]:
     """Trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``, best first."""
-    change = effect_contribution(data, evaluator, refit, [trial])
+    change = contribution(data, evaluator, refit, [trial])
     if change is None:
         return []
     own = {gene.name for gene in trial.suspect.genes}
@@ -260,12 +254,10 @@ def substitute_trials(
     nuisance = Nuisance(data, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
     done = nuisance.project_out(change)
     least_gain = data.policy.substitute * float(done @ done)
-    return [
-        one for gain, one in _rank_by_explained(nuisance, done, found, refit.names)[:max_count] if gain > least_gain
-    ]
+    return [one for gain, one in _by_explained(nuisance, done, found, refit.names)[:limit] if gain > least_gain]
 
 
-def _rank_by_explained(
+def _by_explained(
     nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
 ) -> list[tuple[float, Trial]]:
     """The trial of each suspect not ``known`` that explains most of ``misfit``, with the decrease; strongest first."""
@@ -279,7 +271,7 @@ def _rank_by_explained(
 
 
 def suspect_pairs(
-    data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, max_count: int = MAX_CANDIDATES
+    data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, limit: int = MAX_CANDIDATES
 ) -> Iterator[tuple[Trial, Trial]]:
     """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
     nuisance = Nuisance(data, nominal)
@@ -290,7 +282,7 @@ def suspect_pairs(
         (explained(np.vstack([own[i], own[j]]), residual), best[i], best[j]) for i in range(len(best)) for j in range(i)
     ]
     scored.sort(key=lambda triple: -triple[0])
-    for gain, one, other in scored[:max_count]:
+    for gain, one, other in scored[:limit]:
         if float(residual @ residual) - gain < beyond:
             yield (one, other) if one.gain >= other.gain else (other, one)
 

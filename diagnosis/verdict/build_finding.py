@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
 from wingfit.diagnosis.evidence.nominal import Nominal
-from wingfit.diagnosis.evidence.refit import Refit, effect_contribution, refit_with_subject
+from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Interval, Proof, RecordingMisfit, Where
 from wingfit.diagnosis.location import maps
@@ -47,13 +47,11 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    held_out_residuals, failed = predict_held_out(
-        held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit
-    )
+    validation, failed = predict_held_out(held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit)
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
         unnamed = decision.verdict == "unnamed"
-        for fraction, stage, located in _locate_missing_physics(state, evaluator, unnamed=unnamed):
+        for fraction, stage, located in _locate(state, evaluator, unnamed=unnamed):
             missing = located
             yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
@@ -64,7 +62,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
         advice = rank_conditions(state.data, state.weights, apart)
     location = _where(state, decision, best, missing, evaluator)
-    found = _finding(state, name, decision, best, held_out_residuals, missing, advice, location)
+    found = _finding(state, name, decision, best, validation, missing, advice, location)
     yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
 
 
@@ -74,9 +72,7 @@ def _is_load(decision: Decision, best: Refit) -> bool:
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
-def _locate_missing_physics(
-    state: SearchState, evaluator: Evaluator, *, unnamed: bool
-) -> Iterator[tuple[float, str, MissingPhysics]]:
+def _locate(state: SearchState, evaluator: Evaluator, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
     """Locate the missing physics recording by recording; where it is ``unnamed``, also with a finer model and a law."""
     data, nominal = state.data, state.fitted_nominal.refit
     if data.recordings[0].kind == "forces":
@@ -87,7 +83,7 @@ def _locate_missing_physics(
     models, which = [(state.subject, nominal)], largest_residuals(data, nominal)
     for finer in state.subject.finer_subjects()[:1] if unnamed else ():
         yield 0.0, f"fitting a {finer.description}", MissingPhysics()
-        fitted = refit_with_subject(finer, data, evaluator, nominal)
+        fitted = refit_at(finer, data, evaluator, nominal)
         models += [(finer, fitted)] if fitted is not None else []
     found = []
     for k, (name, guess) in enumerate(load_estimates(models, data, which)):
@@ -100,7 +96,7 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     """Where the misfit lies; for a named effect, where the effect acts: a fit spreads a misfit over the beat."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        acts = effect_contribution(data, evaluator, best)
+        acts = contribution(data, evaluator, best)
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
     shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
@@ -133,7 +129,7 @@ def _finding(
     name: str,
     decision: Decision,
     best: Refit,
-    held_out_residuals: ResidualPair | None,
+    validation: ResidualPair | None,
     missing: MissingPhysics,
     advice: tuple[Advice, ...],
     location: Where,
@@ -148,12 +144,10 @@ def _finding(
     kind = data.recordings[0].kind
     unit: Literal["m", "N"] = "m" if kind == "tracks" else "N"
     proved = None
-    if held_out_residuals is not None:
-        rows += recording_misfits(held_out_residuals, held_out=True, floor=division)
-        proved = proof(held_out_residuals, division, unit, effects_added=bool(best.names))
-        shown += maps.overlays(
-            subject, held_out_residuals.data, held_out_residuals.before, held_out_residuals.after, held_out=True
-        )
+    if validation is not None:
+        rows += recording_misfits(validation, held_out=True, floor=division)
+        proved = proof(validation, division, unit, effects_added=bool(best.names))
+        shown += maps.overlays(subject, validation.data, validation.before, validation.after, held_out=True)
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(data, best)
     texts = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
@@ -201,7 +195,7 @@ def _discretisation_error(state: SearchState) -> float:
         state.nominal is None
         or state.weights is None
         or state.nominal.discretisation_error is None
-        or state.nominal.ineffective_refinement
+        or state.nominal.tried_finer
     ):
         return 0.0
     least = min(one.excess for one in state.weights.refits)
@@ -237,9 +231,9 @@ def _summary_texts(
 
 
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
-    if not nominal.ineffective_refinement:
+    if not nominal.tried_finer:
         return ()
-    return (f"a finer discretisation ({nominal.ineffective_refinement}) hardly fits better: the cause is another",)
+    return (f"a finer discretisation ({nominal.tried_finer}) hardly fits better: the cause is another",)
 
 
 def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:

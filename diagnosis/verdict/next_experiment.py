@@ -54,9 +54,7 @@ def separations(
     for k, condition in enumerate(conditions):
         prediction = _predict_condition(subject, rivals[0], condition)
         least = (
-            None
-            if prediction is None
-            else _smallest_separation(subject, data, prediction, rivals[1:], evaluator, refit_genes=False)
+            None if prediction is None else _separation(subject, data, prediction, rivals[1:], evaluator, adapt=False)
         )
         predicted += [] if prediction is None or least is None else [(least, prediction)]
         yield 0.5 * (k + 1) / len(conditions), None
@@ -64,7 +62,7 @@ def separations(
     for k, (most, prediction) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
         if sum(one >= most for one in found) >= MAX_ADVICE:
             return
-        least = _smallest_separation(subject, data, prediction, rivals[1:], evaluator, refit_genes=True)
+        least = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=True)
         found += [] if least is None else [least]
         yield 0.5 + 0.5 * (k + 1) / len(predicted), None if least is None else (least, prediction.recording.condition)
 
@@ -93,18 +91,18 @@ def _predict_condition(subject: Subject, first: Refit, condition: Condition) -> 
     return None if recording is None else _PredictedCondition(genome, recording)
 
 
-def _smallest_separation(
+def _separation(
     subject: Subject,
     data: WhitenedData,
     prediction: _PredictedCondition,
     others: Sequence[Refit],
     evaluator: Evaluator,
     *,
-    refit_genes: bool,
+    adapt: bool,
 ) -> float | None:
     """Smallest separation of several rivals; None where one of them cannot be simulated."""
     values = [
-        separation(subject, data, prediction.genome, prediction.recording, one.fit, evaluator, refit_genes=refit_genes)
+        separation(subject, data, prediction.genome, prediction.recording, one.fit, evaluator, adapt=adapt)
         for one in others
     ]
     known = [one for one in values if one is not None]
@@ -119,11 +117,11 @@ def separation(
     rival: Fit,
     evaluator: Evaluator,
     *,
-    refit_genes: bool,
+    adapt: bool,
 ) -> float | None:
     """Root mean square difference (in noises) of a rival from the first hypothesis' prediction ``recording``.
 
-    With ``refit_genes`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
+    With ``adapt`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
     can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
     the genes). None where the rival cannot be simulated.
     """
@@ -139,7 +137,7 @@ def separation(
         evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
         return residuals_of(evaluation), evaluation.reasons
 
-    columns = np.arange(len(rival.unit)) if refit_genes else np.empty(0, np.int64)
+    columns = np.arange(len(rival.unit)) if adapt else np.empty(0, np.int64)
     try:
         found = differences(simulate, rival.unit, columns, sides=1)
     except ValueError:
@@ -147,7 +145,7 @@ def separation(
     seen = np.isfinite(found.outputs[0])
     white, slopes = found.outputs[0][seen] / data.noise, found.slopes[0][seen].T / data.noise
     whole = float(white @ white)
-    if refit_genes:
+    if adapt:
         whole -= _explained_by_genes(data, rival, white, slopes)
     return float(np.sqrt(max(whole, 0.0) / len(white)))
 
@@ -155,10 +153,10 @@ def separation(
 def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
     """Part of the square of ``difference`` [n] (in noises) that genes with ``slopes`` [F, n] explain, less its cost."""
     lag1 = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
-    likelihood_weight = data.likelihood_weight(rival.coefficients)
-    counts = likelihood_weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
+    weight = data.likelihood_weight(rival.coefficients)
+    counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
     known = rival.jacobian / data.scale[:, None]
-    information = likelihood_weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
+    information = weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
     score = slopes @ difference
     return float(counts * score @ np.linalg.solve(information + counts * slopes @ slopes.T, score))
 

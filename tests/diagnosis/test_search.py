@@ -16,7 +16,7 @@ from wingfit.diagnosis.evidence.competing_fits import StartPoint
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, search_missing_physics
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, run_search
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -92,9 +92,7 @@ def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
 def test_fits_from_the_estimates_ignore_the_given_start() -> None:
     rig = PendulumRig()
     known = SearchState(rig, WhitenedData.of(recorded({})))
-    steps = search_missing_physics(
-        known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator()
-    )
+    steps = run_search(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
     next(steps)
     next(steps)
     assert known.initial_fit is not None

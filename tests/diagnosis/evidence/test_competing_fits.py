@@ -42,8 +42,8 @@ def compete(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def run(
         costs: Mapping[str, list[float]],
-        max_excess: float = np.inf,
-        target_excess: float = np.inf,
+        limit: float = np.inf,
+        target: float = np.inf,
         noise: float = 0.0,
         rivals: list[str] | None = None,
     ) -> tuple[str, float, dict[str, int]]:
@@ -59,9 +59,7 @@ def compete(monkeypatch: pytest.MonkeyPatch) -> Any:
                 yield SimpleNamespace(cost=cost, coefficients=cost, unit=np.array([1e-3 * cost]))
 
         monkeypatch.setattr("wingfit.diagnosis.evidence.competing_fits._from_estimates", steps)
-        found: Any = list(
-            fit_from_estimates(NOTHING, data(noise), NOTHING, NOTHING, entered, max_excess, target_excess)
-        )
+        found: Any = list(fit_from_estimates(NOTHING, data(noise), NOTHING, NOTHING, entered, limit, target))
         if rivals is not None:
             rivals.extend(entry.name for entry, _ in found[-1])
         return (found[-1][0][0].name, found[-1][0][1].cost, steps_run) if found else ("", np.inf, steps_run)
@@ -89,9 +87,9 @@ def test_a_slow_fit_far_behind_is_stopped(compete: Any) -> None:
     _, _, steps_run = compete({"best": [50.0, 5.0, 2.0, 1.0, 0.9, 0.8, 0.7], "crawls": [50.0, 40.0, *[39.99] * 12]})
     assert steps_run["crawls"] == 3
     assert steps_run["best"] == 7
-    _, _, steps_run = compete({"crawls": [50.0, 40.0, *[39.99] * 12]}, max_excess=30.0)
+    _, _, steps_run = compete({"crawls": [50.0, 40.0, *[39.99] * 12]}, limit=30.0)
     assert steps_run["crawls"] == 3
-    _, _, steps_run = compete({"falls": FALLING}, max_excess=1.0)
+    _, _, steps_run = compete({"falls": FALLING}, limit=1.0)
     assert steps_run["falls"] > FIRST_STEPS, "a fit that still improves is not stopped, however large its excess"
 
 
@@ -99,9 +97,9 @@ def test_a_fit_that_would_miss_the_target_is_stopped(compete: Any) -> None:
     """It gains a tenth with every step and might gain a quarter: a twentieth would remain after ten steps."""
     slow = [1e4 * 0.9**k for k in range(16)]
     leads = [900.0 - k for k in range(6)]
-    assert compete({"slow": slow, "leads": leads}, target_excess=3e3)[2]["slow"] == 15
-    assert compete({"slow": slow, "leads": leads}, target_excess=50.0)[2]["slow"] == FIRST_STEPS
-    assert compete({"slow": slow}, target_excess=50.0)[2]["slow"] == 15, "the leader continues"
+    assert compete({"slow": slow, "leads": leads}, target=3e3)[2]["slow"] == 15
+    assert compete({"slow": slow, "leads": leads}, target=50.0)[2]["slow"] == FIRST_STEPS
+    assert compete({"slow": slow}, target=50.0)[2]["slow"] == 15, "the leader continues"
     assert compete({"slow": slow, "done": [5e3, 500.0, 5.0, 1.0, 1.0, 1.0]})[2]["slow"] == FIRST_STEPS
 
 

@@ -26,11 +26,11 @@ from wingfit.diagnosis.evidence.fit import (
 )
 from wingfit.diagnosis.evidence.intervals import covariance
 from wingfit.diagnosis.evidence.nominal import Nominal, finer_is_promising
-from wingfit.diagnosis.evidence.refit import cross_validated_excess, make_refit, refit_with_suspects, substitute_trials
+from wingfit.diagnosis.evidence.refit import cross_validated_excess, make_refit, refit_with, substitute_trials
 from wingfit.diagnosis.evidence.screen import Nuisance, score_tests
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _nominal_from_best, _search_per_discretisation
+from wingfit.diagnosis.search import _nominal_from_best, _search_coarse_first
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -222,10 +222,10 @@ def test_a_finer_discretisation_does_not_hide_an_effect(
     searched: list[str] = []
     fits = {False: found("coarse", 1.0), True: found("fine", 0.7)}
     monkeypatch.setattr("wingfit.diagnosis.search.choose_discretisation", lambda *_, refine: fits[refine])
-    monkeypatch.setattr("wingfit.diagnosis.search._test_and_refit_suspects", tried)
+    monkeypatch.setattr("wingfit.diagnosis.search._try_suspects", tried)
     monkeypatch.setattr("wingfit.diagnosis.search.nominal_suffices", lambda *_: False)
     state = SearchState(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
-    parts = [part for part, _ in _search_per_discretisation(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
+    parts = [part for part, _ in _search_coarse_first(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
     assert searched == expected
     assert cast("Any", state.nominal).subject == taken
     assert cast("Any", state.subject) == taken
@@ -260,7 +260,7 @@ def test_substitutes_reproduce_the_contribution_of_an_effect() -> None:
     nominal = fit(data)
     found = [trials for _, trials in score_tests(RIG, data, nominal, EVALUATOR, RIG.suspects)]
     best = {trials[0].suspect.name: trials[0] for trials in found}
-    both = refit_with_suspects(RIG, data, nominal, EVALUATOR, [best["friction"], best["delay"]])
+    both = refit_with(RIG, data, nominal, EVALUATOR, [best["friction"], best["delay"]])
     assert both is not None
     twin = replace(best["delay"], suspect=replace(best["delay"].suspect, name="twin"))
     offered = [*found, [twin]]
@@ -283,5 +283,5 @@ def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatc
 
     data = replace(data, policy=replace(POLICY, diverged=0.0))
     monkeypatch.setattr("wingfit.diagnosis.evidence.refit._fit_subset", fails)
-    assert refit_with_suspects(RIG, data, nominal, EVALUATOR, trials[:1]) is not None
+    assert refit_with(RIG, data, nominal, EVALUATOR, trials[:1]) is not None
     assert calls

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from tests.diagnosis.closed_form import ClosedForm
-from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit, InitialSimulationError, _accelerations, _broyden, _step
+from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit, InitialSimulationError, _broyden, _second_order, _step
 
 Array = npt.NDArray[np.float64]
 
@@ -187,7 +187,7 @@ def test_acceleration_is_the_second_derivative_along_a_step() -> None:
     slopes = here[:, None] * np.array([[3.0, 1.0], [1.0, 4.0]])
     moves = np.array([[0.5, 0.2], [0.3, -0.1]])
     exact = 0.5 * here * (moves @ np.array([[3.0, 1.0], [1.0, 4.0]])) ** 2
-    np.testing.assert_allclose(_accelerations(rig.simulator, fit_at(rig, unit, slopes), moves), exact, rtol=0.05)
+    np.testing.assert_allclose(_second_order(rig.simulator, fit_at(rig, unit, slopes), moves), exact, rtol=0.05)
 
 
 @pytest.mark.parametrize("steps", [1, 20])

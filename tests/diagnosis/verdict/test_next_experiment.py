@@ -37,8 +37,7 @@ def apart(frequencies: tuple[float, ...], then: float, **missing: float) -> tupl
     recording = RIG.simulated_recording(model, genome, at(then))
     assert recording is not None
     adapted, plain = (
-        separation(RIG, data, genome, recording, rival, EVALUATOR, refit_genes=refit_genes)
-        for refit_genes in (True, False)
+        separation(RIG, data, genome, recording, rival, EVALUATOR, adapt=adapt) for adapt in (True, False)
     )
     assert adapted is not None
     assert plain is not None
