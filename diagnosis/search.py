@@ -41,6 +41,8 @@ from wingfit.diagnosis.subject import Subject, Suspect
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 
+Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
+
 MAX_CONTINUED = 2  # best refits that are continued until they converge
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
@@ -48,9 +50,7 @@ MAX_RIVALS = 3  # hypotheses for which a second effect is tried
 MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
-def run_search(
-    state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
+def run_search(state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator) -> Steps:
     """Fill ``state``; yields the fraction of the work done and the next stage."""
     data, fixed = state.data, spec.calibration.fixed
     yield 0.0, "fitting the nominal model"
@@ -82,7 +82,7 @@ def run_search(
 
 def _search_coarse_first(
     state: SearchState, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
+) -> Steps:
     """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
     nominal = choose_discretisation(state.subject, state.data, evaluator, fit, refine=spec.refine)
     if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
@@ -102,10 +102,10 @@ def _final_fits(state: SearchState, evaluator: Evaluator, floor: float, suspects
     yield "fitting the best hypothesis until it converges"
     for _ in range(MAX_CONTINUED):
         state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
-        unended = _unconverged(state.weights)
-        if unended is None:
+        unconverged = _unconverged(state.weights)
+        if unconverged is None:
             return
-        state.add(continue_fit(state.subject, state.data, evaluator, unended, FINAL_STEPS))
+        state.add(continue_fit(state.subject, state.data, evaluator, unconverged, FINAL_STEPS))
     state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
 
 
@@ -121,8 +121,7 @@ def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
 def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     """Start points in which an effect of the best hypothesis is replaced by one known to look similar.
 
-    Only where the hypothesis leaves more than noise. A score test does not see what the nominal genes, or a similar
-    effect, have already absorbed; of two similar effects the first one fitted may hide the other.
+    A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed.
     """
     if best.excess <= tolerated_excess(state.data, 0.0, 0.0):
         return []
@@ -158,7 +157,8 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    tried_finer, limit = (nominal.tried_finer, data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0))
+    tried_finer = nominal.tried_finer
+    limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
     leading = sorted((one for one in state.refits if one.excess <= limit), key=lambda one: one.excess)[:MAX_CONTINUED]
     for finer in nominal.subject.finer_subjects():
         tried = [(one, _fit_at_finer(finer, data, evaluator, one)) for one in leading]
@@ -178,7 +178,7 @@ def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evalua
     limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
-    followed = [_follow_to_finer(finer, data, evaluator, one, better) for one in others]
+    followed = [_follow(finer, data, evaluator, one, better) for one in others]
     before = state.subject.description
     remark = f"with the effect added, the discretisation limits the model: {finer.description} replaces {before}"
     remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
@@ -199,9 +199,7 @@ def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refi
     return continue_fit(finer, data, evaluator, found)
 
 
-def _follow_to_finer(
-    finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit
-) -> Refit | None:
+def _follow(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
     """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
     found = refit_at(finer, data, evaluator, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
@@ -215,16 +213,15 @@ def _try_suspects(
     suspects: Sequence[Suspect],
     evaluator: Evaluator,
     at_least: Refit | None = None,
-) -> Iterator[tuple[float, str]]:
+) -> Steps:
     """Score tests with the nominal fit, then refits; yields the fraction done and the stage.
 
     There are few or no refits where none is, or is predicted to be, better than ``at_least``, the nominal model with a
     finer discretisation: an effect and a discretisation error may each absorb the other's residual.
     """
     nominal = state.fitted_nominal
-    for k, (suspect, trials) in enumerate(
-        score_tests(state.subject, state.data, nominal.refit.fit, evaluator, suspects)
-    ):
+    tests = score_tests(state.subject, state.data, nominal.refit.fit, evaluator, suspects)
+    for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
     if nominal_suffices(state.data, nominal.refit, len(suspects)):
@@ -237,7 +234,7 @@ def _try_suspects(
 def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None:
     """The nominal model fitted from the genes of the best hypothesis, if that is clearly better; else None.
 
-    If so, the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
+    Then the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
     """
     nominal = state.fitted_nominal.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
@@ -249,7 +246,7 @@ def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None
 
 def _refits(
     state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
-) -> Iterator[tuple[float, str]]:
+) -> Steps:
     """Refit single suspects, then some from the estimates and several together while the residual is not explained."""
     yield from _single_refits(state, nominal, spec, evaluator)
     yield 0.72, "continuing the best refits"
@@ -265,9 +262,7 @@ def _refits(
         _continue_best(state, nominal, evaluator)
 
 
-def _single_refits(
-    state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
+def _single_refits(state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
     """Refit the suspects with the strongest score tests one at a time."""
     data, fit = state.data, nominal.refit.fit
     chosen = strongest_trials(state.data, state.trials, spec.refits)
@@ -278,9 +273,7 @@ def _single_refits(
         state.add(refit_with(state.subject, data, fit, evaluator, [trial]))
 
 
-def _refits_from_estimates(
-    state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
+def _refits_from_estimates(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
     """Refit suspects from the genes' estimates, those whose score tests are strongest there.
 
     At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
@@ -299,12 +292,8 @@ def _refits_from_estimates(
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
     """The strongest trials, and those of all suspects with a location: a few tested locations say little of these."""
     strongest = strongest_trials(data, found, MAX_RESTARTED)
-    placed = [
-        trials[0]
-        for trials in found
-        if trials and trials[0].suspect.location_genes and not trials[0].suspect.candidate_shapes
-    ]
-    return [*strongest, *(trial for trial in placed if all(trial is not one for one in strongest))]
+    others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
+    return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
 
 
 def _compete(state: SearchState, evaluator: Evaluator, starts: Sequence[StartPoint]) -> Iterator[str]:
@@ -324,10 +313,7 @@ def _compete(state: SearchState, evaluator: Evaluator, starts: Sequence[StartPoi
 
 
 def _refine_and_extend(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """Refine the discretisation of the best hypothesis, then try second effects.
-
-    In this order, because a discretisation error may look like a second effect.
-    """
+    """Refine the discretisation, whose error may look like a second effect, then try second effects."""
     coarse = state.subject
     if spec.refine:
         _refine_with_effects(state, state.fitted_nominal, evaluator)
