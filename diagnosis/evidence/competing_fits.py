@@ -103,20 +103,17 @@ class _CompetingFits:
     def _should_stop(self, fit: _CompetingFit) -> bool:
         if len(fit.last_fits) < 2:
             return False
-        before, now = fit.last_fits
-        if small_gain(self.data, before, now, SLOW_FACTOR) and self._excess(fit) > min(
-            self.limit, self._rivalry_limit()
-        ):
+        (before, now), excess, rivalry = fit.last_fits, self._excess(fit), self._rivalry_limit()
+        if small_gain(self.data, before, now, SLOW_FACTOR) and excess > min(self.limit, rivalry):
             return True
-        if fit.steps_taken < FIRST_STEPS or self._excess(fit) <= min(self._excess(one) for one in self.fits):
+        if fit.steps_taken < FIRST_STEPS or excess <= min(self._excess(one) for one in self.fits):
             return False
-        return self._expected_excess(fit) > min(self.target, self._rivalry_limit()) or any(
-            self._excess(other) <= self._excess(fit) and other.same_as(fit) for other in self.fits
-        )
+        repeated = any(self._excess(other) <= excess and other.same_as(fit) for other in self.fits)
+        return self._expected_excess(fit) > min(self.target, rivalry) or repeated
 
     def _expected_excess(self, fit: _CompetingFit) -> float:
         """Excess at the last step if the fit progresses faster than in its latest step (`Policy.acceleration`)."""
-        before, now = (self.data.excess(fit.coefficients) for fit in fit.last_fits)
+        before, now = (self.data.excess(one.coefficients) for one in fit.last_fits)
         if now <= 0.0 or now >= before:
             return now
         return float(now * (now / before) ** (self.data.policy.acceleration * (MAX_STEPS + 1 - fit.steps_taken)))
@@ -126,18 +123,13 @@ class _CompetingFits:
 
     def _rivalry_limit(self) -> float:
         """Excess above which a fit is no rival of the best, and at least what noise may produce."""
-        return max(
-            self.data.policy.rivalry * min(self._excess(one) for one in self.fits),
-            tolerated_excess(self.data, 0.0, 0.0),
-        )
+        least = min(self._excess(one) for one in self.fits)
+        return max(self.data.policy.rivalry * least, tolerated_excess(self.data, 0.0, 0.0))
 
     def _rivals(self) -> list[tuple[StartPoint, Fit]]:
-        initial = sorted((one for one in self.fits if one.last_fits), key=lambda one: one.cost)
-        return [
-            (one.start, one.last_fits[-1])
-            for one in initial
-            if one is initial[0] or self._excess(one) <= self._rivalry_limit()
-        ]
+        first, *others = sorted((one for one in self.fits if one.last_fits), key=lambda one: one.cost)
+        rivals = [first, *(one for one in others if self._excess(one) <= self._rivalry_limit())]
+        return [(one.start, one.last_fits[-1]) for one in rivals]
 
 
 @dataclass

@@ -102,9 +102,8 @@ def broyden_fit(
     first = _initial_fit(simulator, start)
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
-    now = replace(
-        _measure_columns(simulator, replace(first, jacobian=own), ~columns), jacobian_measured=not columns.any()
-    )
+    now = _measure_columns(simulator, replace(first, jacobian=own), ~columns)
+    now = replace(now, jacobian_measured=not columns.any())
     pending = [np.ones(len(start), bool)]
     if columns.any() and not columns.all():
         pending.append(~columns)
@@ -138,11 +137,7 @@ def gauss_newton_fit(
         better, gain = _step(simulator, now, accelerated=accelerated)
         ends = better is None or _converges(data, now, better, 1.0 if accelerated else gain)
         if ends and accelerated:
-            yield (
-                replace(_measure_columns(simulator, better, every), converged=True)
-                if better
-                else replace(now, converged=True)
-            )
+            yield replace(_measure_columns(simulator, better, every) if better else now, converged=True)
             return
         accelerated = accelerated or better is None or small_gain(data, now, better, SLOW_FACTOR)
         now = _measure_columns(simulator, better or now, every, 2 if accelerated else 1)
@@ -233,20 +228,17 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
     moves = np.array([damped.move(d) for d in damped.dampings])
     accelerations = np.zeros((len(moves), len(fit.coefficients)))
     if accelerated:
-        every, accelerations = (
-            _second_order(simulator, fit, moves[::2]),
-            np.concatenate([accelerations, accelerations[::2]]),
-        )
-        moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], every, strict=True)]])
-        accelerations[-len(every) :] = every
+        added = _second_order(simulator, fit, moves[::2])
+        moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], added, strict=True)]])
+        accelerations = np.concatenate([accelerations, added])
     units = np.clip(fit.unit + moves, 0.0, 1.0)
-    promised = fit.cost - _cost(simulator.data, fit.coefficients + moves @ fit.jacobian.T + accelerations, units)
-    if promised.max() <= 1e-9 * fit.cost:
+    predicted = fit.cost - _cost(simulator.data, fit.coefficients + moves @ fit.jacobian.T + accelerations, units)
+    if predicted.max() <= 1e-9 * fit.cost:
         return None, 0.0
     found, reasons, residuals = simulator.at(units, fit.motion_genes)
     bad = np.array([reason is not None for reason in reasons])
     after = _cost(simulator.data, np.where(bad[:, None], FAILED_COEFFICIENT, found), units)
-    trials = Trials.of(units, promised, fit.cost, after, reasons)
+    trials = Trials.of(units, predicted, fit.cost, after, reasons)
     k = trials.best()
     if k is None:
         return None, 0.0

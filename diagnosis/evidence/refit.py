@@ -30,7 +30,6 @@ Array = npt.NDArray[np.float64]
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
 FINAL_STEPS = 20  # of the best hypothesis, until it converges
-MAX_CANDIDATES = 4  # second effects, or pairs, that are tried
 MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
@@ -112,9 +111,8 @@ def refit_with(
     added = [trials[-1]] if base else list(trials)
     genes = [(gene.name, trial) for trial in added for gene in trial.suspect.genes]
     values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
-    problem = Problem(
-        model, data.recordings, (*before.problem.free, *(g for g, _ in genes)), base_genome(model, values), data.axes
-    )
+    free = (*before.problem.free, *(name for name, _ in genes))
+    problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
     for part in 0.5 ** np.arange(MAX_HALVINGS):
         start = np.concatenate([before.unit, *(_scaled_start(trial, part) for trial in added)])
         try:
@@ -206,11 +204,10 @@ def fit_to_convergence(subject: Subject, data: WhitenedData, evaluator: Evaluato
 def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
     """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
     try:
-        return make_refit(
-            data, broyden_fit(subject, data, refit.fit.problem, evaluator, start, steps=REFIT_STEPS), refit.trials
-        )
+        fit = broyden_fit(subject, data, refit.fit.problem, evaluator, start, steps=REFIT_STEPS)
     except FIT_ERRORS:
         return None
+    return make_refit(data, fit, refit.trials)
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
@@ -220,14 +217,12 @@ def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: in
     return [trial for trial in best[:limit] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
-def partner_trials(
-    data: WhitenedData, base: Refit, found: Sequence[list[Trial]], limit: int = MAX_CANDIDATES
-) -> list[Trial]:
+def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]) -> list[Trial]:
     """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
     nuisance = Nuisance(data, base.fit)
     residual = nuisance.residual
     least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
-    return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names)[:limit] if gain > least_gain]
+    return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names) if gain > least_gain]
 
 
 def contribution(data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
@@ -271,16 +266,15 @@ def _by_explained(
 
 
 def suspect_pairs(
-    data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, limit: int = MAX_CANDIDATES
+    data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, limit: int
 ) -> Iterator[tuple[Trial, Trial]]:
     """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
     nuisance = Nuisance(data, nominal)
     residual = nuisance.residual
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
     own = [nuisance.project_out(trial.changes) for trial in best]
-    scored = [
-        (explained(np.vstack([own[i], own[j]]), residual), best[i], best[j]) for i in range(len(best)) for j in range(i)
-    ]
+    indices = [(i, j) for i in range(len(best)) for j in range(i)]
+    scored = [(explained(np.vstack([own[i], own[j]]), residual), best[i], best[j]) for i, j in indices]
     scored.sort(key=lambda triple: -triple[0])
     for gain, one, other in scored[:limit]:
         if float(residual @ residual) - gain < beyond:
@@ -288,7 +282,7 @@ def suspect_pairs(
 
 
 def _scaled_start(trial: Trial, part: float) -> Array:
-    """Start of the suspect's genes with its size at ``part`` of what the trial says."""
+    """Initial genes of the suspect with its size multiplied by ``part``."""
     start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
     start[size] = off[size] + part * (start[size] - off[size])
     return start

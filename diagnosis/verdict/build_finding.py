@@ -101,10 +101,8 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
     shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
     own = {gene.name: gene.value for gene in all_genes(state.data, shown_refit)}
-    span, chord = (
-        _effect_location(shown_refit, own, "span") or missing.span,
-        _effect_location(shown_refit, own, "chord") or missing.chord,
-    )
+    span = _effect_location(shown_refit, own, "span") or missing.span
+    chord = _effect_location(shown_refit, own, "chord") or missing.chord
     phase = missing.phase if decision.verdict != "measurement fault" else None
     return Where(
         found.words + cause_location(span, chord, phase, driven=missing.driven),
@@ -119,9 +117,8 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
 
 def _effect_location(best: Refit, genes: Mapping[str, Interval], along: Literal["span", "chord"]) -> Interval | None:
     """Location of the effect by its own ``genes``; None where it has none."""
-    return next(
-        (genes[one.suspect.location_genes[along]] for one in best.trials if along in one.suspect.location_genes), None
-    )
+    named = (trial.suspect.location_genes for trial in best.trials)
+    return next((genes[one[along]] for one in named if along in one), None)
 
 
 def _finding(

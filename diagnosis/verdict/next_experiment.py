@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, residuals_of, values_at
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
@@ -53,10 +52,9 @@ def separations(
     predicted = list[tuple[float, _PredictedCondition]]()
     for k, condition in enumerate(conditions):
         prediction = _predict_condition(subject, rivals[0], condition)
-        least = (
-            None if prediction is None else _separation(subject, data, prediction, rivals[1:], evaluator, adapt=False)
-        )
-        predicted += [] if prediction is None or least is None else [(least, prediction)]
+        if prediction is not None:
+            most = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=False)
+            predicted += [] if most is None else [(most, prediction)]
         yield 0.5 * (k + 1) / len(conditions), None
     found = list[float]()
     for k, (most, prediction) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
@@ -85,9 +83,8 @@ class _PredictedCondition:
 
 def _predict_condition(subject: Subject, first: Refit, condition: Condition) -> _PredictedCondition | None:
     genome = first.fit.problem.genomes(np.array(list(first.fit.values.values())))[0]
-    recording = subject.simulated_recording(
-        subject.with_initial_motion(subject.extended(first.names), genome), genome, condition
-    )
+    model = subject.with_initial_motion(subject.extended(first.names), genome)
+    recording = subject.simulated_recording(model, genome, condition)
     return None if recording is None else _PredictedCondition(genome, recording)
 
 
@@ -101,10 +98,8 @@ def _separation(
     adapt: bool,
 ) -> float | None:
     """Smallest separation of several rivals; None where one of them cannot be simulated."""
-    values = [
-        separation(subject, data, prediction.genome, prediction.recording, one.fit, evaluator, adapt=adapt)
-        for one in others
-    ]
+    genome, recording = prediction.genome, prediction.recording
+    values = [separation(subject, data, genome, recording, one.fit, evaluator, adapt=adapt) for one in others]
     known = [one for one in values if one is not None]
     return min(known) if len(known) == len(others) else None
 
@@ -125,13 +120,8 @@ def separation(
     can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
     the genes). None where the rival cannot be simulated.
     """
-    problem = Problem(
-        subject.with_initial_motion(rival.problem.model, genome),
-        (recording,),
-        rival.problem.free,
-        rival.problem.base,
-        rival.problem.axes,
-    )
+    model = subject.with_initial_motion(rival.problem.model, genome)
+    problem = replace(rival.problem, model=model, recordings=(recording,))
 
     def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
         evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
