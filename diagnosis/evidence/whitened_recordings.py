@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -46,48 +47,38 @@ class WhitenedData:
         beat_fits = tuple(
             harmonic_fit(one, compared(one, axes) if one.kind == "forces" else whole_markers(one)) for one in recordings
         )
-        noise = np.sqrt(np.mean(np.concatenate([beat_fit.noise[beat_fit.used] ** 2 for beat_fit in beat_fits])))
+        noise = np.sqrt(np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in beat_fits])))
         largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
         return cls(tuple(recordings), beat_fits, axes, max(policy.tolerance * float(noise), 1e-6 * largest), policy)
 
     @cached_property
     def noiseless(self) -> WhitenedData:
         """The same with zero noise variance, for coefficients that were simulated."""
-        beat_fits = tuple(replace(beat_fit, variance=np.zeros_like(beat_fit.variance)) for beat_fit in self.beat_fits)
+        beat_fits = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.beat_fits)
         return replace(self, beat_fits=beat_fits)
 
     @cached_property
     def noise(self) -> float:
         """Root mean square of the noise of a sample, m or N; not below the tolerance."""
-        square = np.mean(np.concatenate([beat_fit.noise[beat_fit.used] ** 2 for beat_fit in self.beat_fits]))
+        square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.beat_fits]))
         return max(float(np.sqrt(square)), self.tolerance)
-
-    @cached_property
-    def recording_ends(self) -> npt.NDArray[np.int64]:
-        """[R] index at which each recording ends in the coefficient vector."""
-        return np.asarray(np.cumsum([beat_fit.used.sum() * len(beat_fit.order) for beat_fit in self.beat_fits]))
 
     @cached_property
     def recording_slices(self) -> tuple[slice, ...]:
         """Slice of each recording in the coefficient vector."""
-        return tuple(
-            slice(a, b)
-            for a, b in zip([0, *self.recording_ends[:-1].tolist()], self.recording_ends.tolist(), strict=True)
-        )
+        ends = np.cumsum([0, *(fit.used.sum() * len(fit.order) for fit in self.beat_fits)]).tolist()
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def variance(self) -> Array:
         """[D] noise variance of the coefficients."""
-        return np.concatenate([beat_fit.variance[beat_fit.used].ravel() for beat_fit in self.beat_fits])
+        return np.concatenate([fit.variance[fit.used].ravel() for fit in self.beat_fits])
 
     @cached_property
     def weight(self) -> Array:
         """[D] weight of a coefficient's square in the mean square over all samples of all channels."""
-        channels = sum(int(beat_fit.used.sum()) for beat_fit in self.beat_fits)
-        return (
-            np.concatenate([np.tile(beat_fit.weight, int(beat_fit.used.sum())) for beat_fit in self.beat_fits])
-            / channels
-        )
+        channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
+        return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
 
     @cached_property
     def scale(self) -> Array:
@@ -97,9 +88,7 @@ class WhitenedData:
 
     def coefficients_of(self, residuals: Sequence[Array]) -> Array:
         """Coefficients [..., D] of the residuals [..., T, C] of each recording."""
-        found = [
-            beat_fit.of(one)[..., beat_fit.used, :] for beat_fit, one in zip(self.beat_fits, residuals, strict=True)
-        ]
+        found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
     def chi_squared(self, coefficients: Array) -> float:
@@ -145,7 +134,7 @@ class WhitenedData:
     @cached_property
     def recording_weights(self) -> Array:
         """[R] weight of each recording in the mean square."""
-        used = np.array([int(beat_fit.used.sum()) for beat_fit in self.beat_fits], float)
+        used = np.array([int(fit.used.sum()) for fit in self.beat_fits], float)
         return np.asarray(used / used.sum())
 
     @cached_property
@@ -157,8 +146,8 @@ class WhitenedData:
         timing as a whole; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
         """
         independent = sum(
-            1.0 if recording.kind == "forces" else beat_fit.used.sum() / 3.0
-            for recording, beat_fit in zip(self.recordings, self.beat_fits, strict=True)
+            1.0 if recording.kind == "forces" else fit.used.sum() / 3.0
+            for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
         every = self.weight * self.variance
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])

@@ -134,20 +134,20 @@ def _finding(
     subject, data, weights = state.subject, state.data, state.weights
     if state.nominal is None or weights is None:
         raise ValueError("a finding needs a search that has ended")
-    nominal, division = state.nominal.refit, _discretisation_error(state)
+    nominal, discretisation = state.nominal.refit, _discretisation_error(state)
     own = ResidualPair(data, nominal.fit.residuals, best.fit.residuals)
-    rows = recording_misfits(own, held_out=False, floor=division)
+    rows = recording_misfits(own, held_out=False, floor=discretisation)
     shown = list(maps.overlays(subject, data, own.before, own.after, held_out=False))
     kind = data.recordings[0].kind
     unit: Literal["m", "N"] = "m" if kind == "tracks" else "N"
     proved = None
     if validation is not None:
-        rows += recording_misfits(validation, held_out=True, floor=division)
-        proved = proof(validation, division, unit, effects_added=bool(best.names))
+        rows += recording_misfits(validation, held_out=True, floor=discretisation)
+        proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
         shown += maps.overlays(subject, validation.data, validation.before, validation.after, held_out=True)
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(data, best)
-    texts = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
+    weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
         dataset=name,
         kind=kind,
@@ -159,8 +159,8 @@ def _finding(
         named=decision.named,
         added_effects=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / data.noise**2)),
-        floors=_floors(state, division),
-        hypotheses=hypotheses(data, texts, state.trials),
+        floors=_floors(state, discretisation),
+        hypotheses=hypotheses(data, weights, state.trials),
         indistinguishable=decision.alternatives,
         where=location if decision.verdict != "adequate" else None,
         markers=maps.markers(before, after),
@@ -188,22 +188,18 @@ def _discretisation_error(state: SearchState) -> float:
 
     Zero where a finer discretisation fits no better.
     """
-    if (
-        state.nominal is None
-        or state.weights is None
-        or state.nominal.discretisation_error is None
-        or state.nominal.tried_finer
-    ):
+    nominal = state.fitted_nominal
+    if state.weights is None or nominal.discretisation_error is None or nominal.tried_finer:
         return 0.0
     least = min(one.excess for one in state.weights.refits)
-    return min(state.nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
+    return min(nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
 
 
-def _floors(state: SearchState, division: float) -> Floors:
+def _floors(state: SearchState, discretisation: float) -> Floors:
     data, nominal = state.data, state.fitted_nominal
     lag1 = float(np.median([beat_fit.lag1 for beat_fit in data.beat_fits]))
-    total = float(np.sqrt(data.noise**2 + division**2 + data.tolerance**2))
-    error = None if nominal.discretisation_error is None else division
+    total = float(np.sqrt(data.noise**2 + discretisation**2 + data.tolerance**2))
+    error = None if nominal.discretisation_error is None else discretisation
     return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total)
 
 
@@ -230,7 +226,8 @@ def _summary_texts(
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
     if not nominal.tried_finer:
         return ()
-    return (f"a finer discretisation ({nominal.tried_finer}) hardly fits better: the cause is another",)
+    finer = nominal.tried_finer
+    return (f"a finer discretisation ({finer}) hardly fits better: the discretisation is not the cause",)
 
 
 def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
