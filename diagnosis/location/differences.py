@@ -159,11 +159,11 @@ def _sentence(
 
 
 def cause_location(
-    span: Interval | None, chord: Interval | None, phase: Interval | None, *, driven: bool = False
+    span: Interval | None, chord: Interval | None, phase: Interval | None, *, drive_error: bool = False
 ) -> str:
     """Where the cause of a misfit acts, as text that continues the misfit's location; "" where it is not known.
 
-    ``driven``: the cause is an error of the drive rods.
+    ``drive_error``: the cause is an error of the drive rods.
     """
     parts = [
         f"{100 * one.value:.0f} % of the {name}{_range_text(one, 100, 0, ' %')}"
@@ -172,7 +172,7 @@ def cause_location(
     ]
     if phase is not None:
         parts.append(f"{phase.value % 1.0:.2f} of the beat{_range_text(phase, 1, 2, '', -(phase.value // 1.0))}")
-    if driven:
+    if drive_error:
         return "; its cause is an error of the drive's motion" + (f", largest at {parts[-1]}" if phase else "")
     return f"; its cause acts at {', '.join(parts)}" if parts else ""
 

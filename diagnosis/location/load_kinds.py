@@ -17,33 +17,33 @@ _LENGTHS = (0.25, 0.5)  # of the span: correlation lengths of smooth loads
 _CENTRES = np.linspace(0.0, 1.0, 41)  # of localised loads along the span (0 to 1)
 _WIDTHS = (0.07, 0.15, 0.3)  # their standard deviations
 _CHORDS = np.linspace(0.0, 1.0, 9)  # their locations along the chord (0 to 1)
-_TURNING = 0.25  # of the chord: standard deviation of the lever of smooth loads about mid-chord
+_LEVER = 0.25  # of the chord: standard deviation of the lever of smooth loads about mid-chord
 _DECAYS = (0.0, 1.0, 2.0)  # exponents with which the standard deviation of loads falls with the harmonic
 _SMOOTH = 0.1  # prior probability of smooth loads; localised loads have the rest
-_DRIVEN = 0.1  # prior probability of an error of the drive
+_DRIVE_ERROR = 0.1  # prior probability of an error of the drive
 _RODS = (((1.0, 1.0),), ((1.0, 0.0),), ((0.0, 1.0),), ((1.0, 0.0), (0.0, 1.0)))  # both rods, one, or each independently
 
 
-class Family(NamedTuple):
+class LoadFamily(NamedTuple):
     """A family of loads (forces and moments) along the span; ``places``: centre, width and chord location, if any.
 
     ``shapes``: K of them, [Z, stations] each; a load is their sum with independent sizes. ``share``: prior probability
-    of each. ``driven``: turns of the two rods, which follow the stations.
+    of each. ``drive_error``: turns of the two rods, which follow the stations.
     """
 
     shapes: tuple[Array, ...]
     places: tuple[tuple[float | None, float | None, float | None], ...]
     share: float
-    driven: bool = False
+    drive_error: bool = False
 
     def __len__(self) -> int:
         return len(self.shapes)
 
 
-class Form(NamedTuple):
+class LoadForm(NamedTuple):
     """One shape of a family, with standard deviations ``spread`` [M] of the terms of the beat."""
 
-    family: Family
+    family: LoadFamily
     number: int
     spread: Array
 
@@ -59,19 +59,19 @@ def spreads(probe: Probe) -> list[Array]:
     return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
 
 
-def smooth(probe: Probe, chord: Array | None) -> Family:
+def smooth(probe: Probe, chord: Array | None) -> LoadFamily:
     """Loads that are correlated over a length of the span; forces and moments are independent."""
     y, shapes = np.array(probe.stations), []
     for length in _LENGTHS:
         root = np.linalg.cholesky(np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))).T
         if probe.turning and chord is not None:
             nothing = np.zeros_like(root)
-            root = np.block([[root, nothing], [nothing, _TURNING * chord * root]])
+            root = np.block([[root, nothing], [nothing, _LEVER * chord * root]])
         shapes.append(root)
-    return Family(_beside_rods(probe, shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
+    return LoadFamily(_without_rods(probe, shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
 
 
-def placed(probe: Probe, chord: Array | None) -> Family:
+def localised(probe: Probe, chord: Array | None) -> LoadFamily:
     """Localised loads: forces as Gaussian bumps along the span, with the moments of their location along the chord."""
     span = np.linspace(0.0, 1.0, 401)
     hats, shapes = probe.hats(span), []
@@ -86,19 +86,19 @@ def placed(probe: Probe, chord: Array | None) -> Family:
         for part in _CHORDS:
             shapes.append(np.concatenate([force, (0.5 - part) * chord * force])[None])
             places.append((float(centre), width, float(part)))
-    rest = 1.0 - _SMOOTH - (_DRIVEN if probe.driving else 0.0)
-    return Family(_beside_rods(probe, shapes), tuple(places), rest / len(shapes))
+    rest = 1.0 - _SMOOTH - (_DRIVE_ERROR if probe.driving else 0.0)
+    return LoadFamily(_without_rods(probe, shapes), tuple(places), rest / len(shapes))
 
 
-def driven(probe: Probe) -> Family:
+def drive_errors(probe: Probe) -> LoadFamily:
     """Errors of the drive rods; empty for a probe that does not drive."""
     if not probe.driving:
-        return Family((), (), 0.0, driven=True)
+        return LoadFamily((), (), 0.0, drive_error=True)
     still = np.zeros((2, probe.loads // (1 + 2 * probe.harmonics)))
     shapes = tuple(np.hstack([still[: len(rods)], np.array(rods)]) for rods in _RODS)
-    return Family(shapes, ((None, None, None),) * len(shapes), _DRIVEN / len(shapes), driven=True)
+    return LoadFamily(shapes, ((None, None, None),) * len(shapes), _DRIVE_ERROR / len(shapes), drive_error=True)
 
 
-def _beside_rods(probe: Probe, shapes: Sequence[Array]) -> tuple[Array, ...]:
+def _without_rods(probe: Probe, shapes: Sequence[Array]) -> tuple[Array, ...]:
     """Shapes of loads with zeros for the rods."""
     return tuple(np.pad(shape, ((0, 0), (0, 2 * probe.driving))) for shape in shapes)

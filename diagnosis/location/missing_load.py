@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.diagnosis.finding import Interval, MissingLoad, table
-from wingfit.diagnosis.location.load_kinds import Form, driven, placed, smooth, spreads
+from wingfit.diagnosis.location.load_kinds import LoadForm, drive_errors, localised, smooth, spreads
 from wingfit.sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
@@ -66,24 +66,24 @@ def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Kind:
+class LoadKind:
     """A kind of load and its posterior: ``probability``, mean sizes [R, P], covariance [R, P, P].
 
     ``centre``, ``width`` (standard deviation) and ``chord`` (0 to 1) of localised loads; None for smooth loads, and
-    ``chord`` for a probe without moments. ``driven``: turns of the rods instead.
+    ``chord`` for a probe without moments. ``drive_error``: turns of the rods instead.
     """
 
     probability: float
     centre: float | None
     width: float | None
     chord: float | None
-    driven: bool
+    drive_error: bool
     sizes: Array
     covariance: Array
 
 
 @dataclass(frozen=True)
-class Inferred:
+class InferredLoads:
     """Loads under each of R conditions.
 
     Attributes:
@@ -98,19 +98,19 @@ class Inferred:
     probe: Probe
     names: tuple[str, ...]
     crossings: tuple[float, ...]
-    kinds: tuple[Kind, ...]
+    kinds: tuple[LoadKind, ...]
     evidence: Array
     floor: Array
 
     @property
-    def placed(self) -> float:
+    def localised(self) -> float:
         """Probability of localised loads."""
         return sum(kind.probability for kind in self.kinds if kind.centre is not None)
 
     @property
-    def driven(self) -> bool:
+    def drive_error(self) -> bool:
         """Whether the drive rods are in error, and no load acts."""
-        return self.kinds[0].driven
+        return self.kinds[0].drive_error
 
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
         """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
@@ -119,7 +119,7 @@ class Inferred:
         """
         values, errors = [], []
         weight = np.array([kind.probability for kind in self.kinds])
-        places = np.eye(2) if self.driven else self.probe.hats(span)
+        places = np.eye(2) if self.drive_error else self.probe.hats(span)
         for r, crossing in enumerate(self.crossings):
             basis = np.kron(places, self.probe.terms(phase + crossing))
             each = np.array([basis @ kind.sizes[r, self.reported] for kind in self.kinds])
@@ -134,7 +134,7 @@ class Inferred:
     @property
     def reported(self) -> slice:
         """The sizes that are reported: forces, or turns of the rods."""
-        return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
+        return slice(self.probe.loads, None) if self.drive_error else slice(0, self.probe.forces)
 
     @property
     def noise_inflation(self) -> float:
@@ -206,7 +206,7 @@ class _NormalEquations:
 
 def infer(
     cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
-) -> Inferred:
+) -> InferredLoads:
     """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 
     Averages over kinds of load; errors of the drive are reported where no load explains as much. ``chord`` [stations]
@@ -215,10 +215,12 @@ def infer(
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
     if probe.turning and (chord is None or len(chord) != len(probe.stations)):
-        raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
+        raise ValueError(f"a probe with moments needs the chord at each of its {len(probe.stations)} stations")
     normals = [_NormalEquations(case) for case in cases]
-    families = [smooth(probe, chord), placed(probe, chord), driven(probe)]
-    forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
+    families = [smooth(probe, chord), localised(probe, chord), drive_errors(probe)]
+    forms = [
+        LoadForm(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))
+    ]
     evidence = np.array(
         [
             np.concatenate([normal.evidence(family.shapes, s) for family in families for s in spreads(probe)])
@@ -228,7 +230,7 @@ def infer(
     best = evidence.max(axis=2)
     total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
     weight = np.exp((total - total.max()) / max(response_error * float(total.max()), 1.0))
-    driving = np.array([form.family.driven for form in forms])
+    driving = np.array([form.family.drive_error for form in forms])
     weight[driving != driving[np.argmax(total)]] = 0.0  # loads that imitate rods are huge ones at the root
     kept = [int(k) for k in np.argsort(-weight)[:_MAX_KINDS] if weight[k] >= _MIN_RELATIVE_PROBABILITY]
     kinds = []
@@ -236,8 +238,10 @@ def infer(
         family, number, _ = form = forms[k]
         strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
         solved = _posterior(normals, [strength * form.root for strength in strengths])
-        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], family.driven, *solved))
-    return Inferred(
+        kinds.append(
+            LoadKind(float(weight[k] / weight[kept].sum()), *family.places[number], family.drive_error, *solved)
+        )
+    return InferredLoads(
         probe,
         tuple(case.name for case in cases),
         tuple(case.crossing for case in cases),
@@ -264,7 +268,7 @@ def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> t
     return np.array(sizes), np.array(covariance)
 
 
-def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
+def missing_loads(inferred: InferredLoads) -> tuple[MissingLoad, ...]:
     """The load under each condition at the probe's stations and PHASES instants from the start of the beat.
 
     For errors of the drive, the additional turn of each rod, rad.
@@ -272,7 +276,7 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
     phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
     values, errors = inferred.fields(np.array(stations), phase)
     at = tuple(phase.tolist())
-    if not inferred.driven:
+    if not inferred.drive_error:
         every = zip(inferred.names, values, errors, strict=True)
         return tuple(MissingLoad(name, stations, at, table(v), table(e), "N/m") for name, v, e in every)
     values, errors = np.radians(values), np.radians(errors)
@@ -284,7 +288,7 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
     )
 
 
-def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
+def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
     """Where and when the load acts, over all recordings with one; None where there is none.
 
     From posterior draws. The centre in the beat is that of the load above half of its maximum.
@@ -300,22 +304,22 @@ def locate_load(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
         if not count:
             continue
         fields = _posterior_draws(inferred, kind, shown, phase, int(count), rng)
-        if kind.driven:
+        if kind.drive_error:
             pass
         elif kind.centre is not None and kind.width is not None:
             bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
             along.append(np.tile(bump, (count, 1)))
         else:
             along.append(np.abs(fields).sum(axis=(0, 3)))
-        over = fields - fields.mean(axis=3, keepdims=True) if kind.driven else fields.sum(axis=2, keepdims=True)
+        over = fields - fields.mean(axis=3, keepdims=True) if kind.drive_error else fields.sum(axis=2, keepdims=True)
         during.append(np.abs(over).sum(axis=(0, 2)))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
-    if inferred.driven:
+    if inferred.drive_error:
         return LoadPlace(None, (0.0, 1.0), *_phase_location(phase, np.concatenate(during)))
     span, extent = _span_location(np.concatenate(along))
     likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
-    if likeliest is not None and inferred.placed > 0.5:  # the mean over all locations would lie between root and tip
+    if likeliest is not None and inferred.localised > 0.5:  # the mean over all locations would lie between root and tip
         span = _with_interval(likeliest.centre, span)
         chord = (
             _with_interval(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
@@ -333,13 +337,18 @@ def _with_interval(value: float | None, draws: Interval) -> Interval:
 
 
 def _posterior_draws(
-    inferred: Inferred, kind: Kind, shown: npt.NDArray[np.int64], phase: Array, count: int, rng: np.random.Generator
+    inferred: InferredLoads,
+    kind: LoadKind,
+    shown: npt.NDArray[np.int64],
+    phase: Array,
+    count: int,
+    rng: np.random.Generator,
 ) -> Array:
     """Draws of the loads [shown, count, span, phase], divided by each recording's root mean square.
 
     For errors of the drive [shown, count, 2, phase].
     """
-    places, found = np.eye(2) if kind.driven else inferred.probe.hats(_SPAN), []
+    places, found = np.eye(2) if kind.drive_error else inferred.probe.hats(_SPAN), []
     for r in shown:
         size, turn = np.linalg.eigh(kind.covariance[r])
         off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))

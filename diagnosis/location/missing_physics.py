@@ -15,7 +15,7 @@ from wingfit.diagnosis.location.free_form_law import free_law
 from wingfit.diagnosis.location.missing_load import (
     PHASES,
     Case,
-    Inferred,
+    InferredLoads,
     LoadPlace,
     infer,
     locate_load,
@@ -37,13 +37,13 @@ MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
 class MissingPhysics:
     """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
 
-    ``driven``: the drive rods are in error, and no load acts. ``pulse``: instant of a force, for recordings of forces.
+    ``drive_error``: the drive rods are in error, and no load acts. ``pulse``: instant of a recorded force.
     """
 
     loads: tuple[MissingLoad, ...] = ()
     place: LoadPlace | None = None
     law: FreeLaw | None = None
-    driven: bool = False
+    drive_error: bool = False
     pulse: Interval | None = None
 
     @property
@@ -68,7 +68,7 @@ class LoadEstimate:
 
     cases: tuple[Case, ...]
     motions: tuple[StationMotion, ...]
-    inferred: Inferred
+    inferred: InferredLoads
 
 
 def largest_residuals(data: WhitenedData, nominal: Refit) -> list[int]:
@@ -101,11 +101,11 @@ def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysi
     best = min(
         (guess for guess in found if len(guess.cases) == whole), key=lambda guess: guess.inferred.noise_inflation
     )
-    loads, driven = missing_loads(best.inferred), best.inferred.driven
-    if not driven and not _plausible(loads, best.motions):
+    loads, drive_error = missing_loads(best.inferred), best.inferred.drive_error
+    if not drive_error and not _plausible(loads, best.motions):
         return MissingPhysics()
-    free_form = free_law(best.cases, PROBE, best.motions) if law and not driven else None
-    return MissingPhysics(loads, locate_load(best.inferred), free_form, driven)
+    free_form = free_law(best.cases, PROBE, best.motions) if law and not drive_error else None
+    return MissingPhysics(loads, locate_load(best.inferred), free_form, drive_error)
 
 
 def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:

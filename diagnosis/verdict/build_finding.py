@@ -105,7 +105,7 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     chord = _effect_location(shown_refit, own, "chord") or missing.chord
     phase = missing.phase if decision.verdict != "measurement fault" else None
     return Where(
-        found.words + cause_location(span, chord, phase, driven=missing.driven),
+        found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
         span or found.span,
         chord or found.chord,
         phase or found.phase,

@@ -61,7 +61,7 @@ def drive_error_cases(*turns_deg: float) -> tuple[tuple[Case, Probed], ...]:
 def test_a_drive_error_is_no_load() -> None:
     inferred = infer([one for one, _ in drive_error_cases(1.0, 1.0)], DRIVING)
     found = locate_load(inferred)
-    assert inferred.driven
+    assert inferred.drive_error
     assert found is not None
     assert found.span is found.chord is None
     assert found.phase is not None
@@ -77,7 +77,7 @@ def test_a_drive_error_is_no_load() -> None:
 
 def test_an_error_of_the_rear_rod_alone_is_identified() -> None:
     inferred = infer([one for one, _ in drive_error_cases(0.0, 1.0)], DRIVING)
-    assert inferred.driven
+    assert inferred.drive_error
     motions = missing_loads(inferred)
     rear = [motion for motion in motions if motion.rod == "rear"]
     assert [motion.recording for motion in rear] == list(inferred.names)
@@ -98,7 +98,7 @@ def test_a_load_is_no_drive_error() -> None:
         )
         found.append(case(model("6x1"), recording, DRIVING)[0])
     inferred = infer(found, DRIVING)
-    assert not inferred.driven
+    assert not inferred.drive_error
     assert span_of(locate_load(inferred)).value == pytest.approx(PLACE, abs=0.1)
 
 
