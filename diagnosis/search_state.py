@@ -47,11 +47,9 @@ class SearchState:
         """Store ``refit``; of two with the same suspects, store the one with the lower cost."""
         if refit is None:
             return
-        for k, fitted_nominal in enumerate(self.refits):
-            if set(fitted_nominal.names) == set(refit.names):
-                self.refits[k] = min(
-                    fitted_nominal, refit, key=lambda one: one.fit.cost - COST_TOLERANCE * one.fit.converged
-                )
+        for k, stored in enumerate(self.refits):
+            if set(stored.names) == set(refit.names):
+                self.refits[k] = min(stored, refit, key=lambda one: one.fit.cost - COST_TOLERANCE * one.fit.converged)
                 return
         self.refits.append(refit)
 

@@ -67,7 +67,7 @@ def choose_discretisation(
     """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
     current, remarks = make_refit(data, fit), list[str]()
     for _ in range(MAX_REFINEMENTS):
-        error, finest, better, ineffective = 0.0, "", None, ""
+        error, finest, ineffective, better = 0.0, "", "", None
         for finer in subject.finer_subjects():
             changes, gain = finer_change(finer, data, evaluator, current)
             if changes <= error:
@@ -75,14 +75,10 @@ def choose_discretisation(
             error, finest, ineffective = changes, finer.description, ""
             if refine and finer_is_promising(data, changes, gain, current):
                 found = refit_at(finer, data, evaluator, current)
-                better = (
-                    fit_to_convergence(finer, data, evaluator, found)
-                    if found and improves(data, found, current)
-                    else None
-                )
-                ineffective = finer.description if found is not None else ""
-            if better is not None:
-                break
+                ineffective = finer.description if found else ""
+                if found and improves(data, found, current):
+                    better = fit_to_convergence(finer, data, evaluator, found)
+                    break
         if better is None:
             return Nominal(subject, current, error if finest else None, finest, tuple(remarks), ineffective)
         remarks.append(

@@ -58,13 +58,13 @@ def decide(weights: HypothesisWeights) -> Decision:
         verdict = "unnamed"
         if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # worth its genes
             best = refits[int(np.argmax(weights.evidence[1:]))]
-    distinguishing = verdict not in ("adequate", "unnamed") and len(possible) > 1
-    possible_names = tuple(refit.names for refit in possible) if distinguishing else ()
+    listed = verdict not in ("adequate", "unnamed") and len(possible) > 1
+    alternatives = tuple(refit.names for refit in possible) if listed else ()
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
         named = best.names if verdict in ("named", "measurement fault") else ()
-    return Decision(verdict, probability, named, possible_names, best)
+    return Decision(verdict, probability, named, alternatives, best)
 
 
 def _common_subset(possible: Sequence[Refit]) -> Refit | None:
@@ -78,11 +78,11 @@ def hypotheses(
     """All weighed hypotheses, most probable first, then those that were only score-tested, by score."""
     order = np.argsort(-weights.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
-    texts = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
+    refitted = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
     known = {refit.names for refit in weights.refits}
     screened = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
     start = max(weights.refits[0].excess, 0.0) / data.noise**2
-    return (*texts, *(_screened_hypothesis(trial, start, data) for trial in screened[:MAX_SCREENED_LISTED]))
+    return (*refitted, *(_screened_hypothesis(trial, start, data) for trial in screened[:MAX_SCREENED_LISTED]))
 
 
 def _refitted_hypothesis(
