@@ -179,7 +179,7 @@ class _Simulator:
     evaluator: Evaluator
 
     def at(self, units: Array, motion_genes: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """Evaluate individuals [B, F] from the motion of genes ``near`` [F]; results as WhitenedData.evaluate."""
+        """Evaluate ``units`` [B, F], starting from the motion of ``motion_genes`` [F]; as WhitenedData.evaluate."""
         problem, genes = self.problem, free_genes(self.problem)
         genome = problem.genomes(values_at(genes, motion_genes[None]))[0]
         model = self.subject.with_initial_motion(problem.model, genome)

@@ -63,7 +63,7 @@ def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval
 
 
 def _cell_edges(positions: Array) -> Array:
-    """Edges [n + 1] of the cells of the span or chord that markers at sorted ``places`` [n] represent."""
+    """Edges [n + 1] of the cells of the span or chord that markers at sorted ``positions`` [n] represent."""
     if len(positions) < 2:
         return np.repeat(positions, 2)
     half = 0.5 * (positions[1:] + positions[:-1])
