@@ -23,7 +23,7 @@ class Policy:
     """
 
     # Verdict
-    negligible: float = _threshold(0.3, "noise RMS", "a residual that is no larger beyond the noise counts as none")
+    negligible: float = _threshold(0.3, "noise RMS", "a residual this small beyond the noise counts as none")
     form: float = _threshold(0.15, "nominal residual RMS", "residual of the right effect in a slightly wrong form")
     discretisation_factor: float = _threshold(
         1.5, "change by the next finer discretisation", "the exact solution may lie beyond the next discretisation"
@@ -67,7 +67,7 @@ class Policy:
         0.5, "remaining chi-squared", "a second effect must be predicted to explain as much to be refitted"
     )
     partner_form: float = _threshold(
-        0.25, "allowance for form", "a second effect is tried if a hypothesis leaves more of the allowance"
+        0.25, "allowance for form", "fraction of the allowance above which a second effect is tried"
     )
     substitute: float = _threshold(
         0.8, "contribution of an effect", "another that can reproduce as much is tried in its place"
@@ -83,7 +83,7 @@ class Policy:
     )
     finer_matters: float = _threshold(0.25, "noise RMS", "a change by the next discretisation below this is negligible")
     finer_gain: float = _threshold(0.25, "excess", "a finer discretisation must remove as much to be worth its cost")
-    finer_limit: float = _threshold(0.3, "noise RMS", "a residual below needs no finer discretisation")
+    finer_limit: float = _threshold(0.3, "noise RMS", "a residual below this needs no finer discretisation")
 
 
 POLICY = Policy()
