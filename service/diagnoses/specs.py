@@ -42,14 +42,15 @@ def asked(body: DiagnosisIn, model: CalibrationSpec, start: Mapping[str, float])
 
 
 def plain(spec: DiagnosisSpec) -> dict[str, Any]:
-    """A specification as JSON."""
-    return dict(json.loads(json.dumps(asdict(spec))))
+    """A specification as JSON, without the thresholds: a request cannot change them."""
+    return {name: value for name, value in json.loads(json.dumps(asdict(spec))).items() if name != "policy"}
 
 
 def stored(values: dict[str, Any]) -> DiagnosisSpec:
     """A specification from its JSON form."""
     tuples: dict[str, Any] = {name: tuple(values[name]) for name in ("suspects", "axes") if name in values}
-    return DiagnosisSpec(**(values | tuples | {"calibration": store.spec_from(values["calibration"])}))
+    own = {name: value for name, value in values.items() if name != "policy"}
+    return DiagnosisSpec(**(own | tuples | {"calibration": store.spec_from(values["calibration"])}))
 
 
 def out(spec: DiagnosisSpec) -> DiagnosisSpecOut:
