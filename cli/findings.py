@@ -24,8 +24,8 @@ def print_finding(finding: Json) -> None:
         say(f"location: {finding['where']['words']}")
     say("")
     _ranking(finding)
-    if finding["alike"]:
-        say(f"not distinguishable by these recordings: {'; '.join(' and '.join(names) for names in finding['alike'])}")
+    if alternatives := [" and ".join(names) for names in finding["indistinguishable"]]:
+        say(f"not distinguishable by these recordings: {'; '.join(alternatives)}")
     _genes(finding)
     for key, label in (("law", "free-form law of the residual"), ("proof", "held-out recordings")):
         if finding[key]:

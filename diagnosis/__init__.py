@@ -1,4 +1,4 @@
-"""What a model left out: where it differs from the recordings, which effect does that, and the proof."""
+"""Diagnosis of missing physics: where model and recordings differ, which effect explains that, and validation."""
 
 from wingfit.diagnosis.diagnose import check, diagnose, diagnose_subject
 from wingfit.diagnosis.finding import Finding

@@ -1,4 +1,4 @@
-"""A diagnosis from beginning to end: recordings and a model in, a finding out."""
+"""A diagnosis from recordings and a model to a finding."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ from importlib.metadata import PackageNotFoundError, version
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import base_genome
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.diagnosis.search import assess, suspected
-from wingfit.diagnosis.search_state import Assessment, Counted
+from wingfit.diagnosis.search import run_search, select_suspects
+from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.build_finding import concluded
+from wingfit.diagnosis.verdict.build_finding import build_finding
 from wingfit.records import Dataset, Recording
 from wingfit.records.blas_threads import one_blas_thread
 
-ASSESSED = 0.7  # of the work: after that there is a verdict, and its place and its proof are looked for
+SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
 
 
 @one_blas_thread
 def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
-    """ValueError, for the user, where ``spec`` does not fit ``dataset``; nothing is simulated."""
-    subject, fitted, held_out, _ = _prepared(dataset, spec)
+    """ValueError where ``spec`` does not fit ``dataset``; simulates nothing."""
+    subject, fitted, held_out, _ = _prepare(dataset, spec)
     axes = _axes(dataset, spec)
-    Stack.of(fitted, axes)
+    WhitenedData.of(fitted, axes)
     for recording in held_out:
-        Stack.of([recording], axes)
-    suspected(subject, spec)
+        WhitenedData.of([recording], axes)
+    select_suspects(subject, spec)
     base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
     if spec.refits < 1:
         raise ValueError(f"refits is {spec.refits}; at least 1 effect must be refitted: give 1 or more")
@@ -41,8 +41,8 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
 
 @one_blas_thread
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
-    """Diagnose ``dataset``; the last report has the finding. ValueError where ``spec`` does not fit."""
-    subject, fitted, held_out, free = _prepared(dataset, spec)
+    """Diagnose ``dataset``; the last report holds the finding. ValueError where ``spec`` does not fit."""
+    subject, fitted, held_out, free = _prepare(dataset, spec)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=_axes(dataset, spec)
     )
@@ -60,18 +60,18 @@ def diagnose_subject(
     free: tuple[str, ...] = (),
     axes: tuple[str, ...] = (),
 ) -> Iterator[Progress]:
-    """Diagnose any rig that meets the protocol; ``free`` are the nominal genes to fit (default: those searched)."""
+    """Diagnose any rig that meets the protocol; ``free``: nominal genes to fit (default: all that are searched)."""
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
-    held_out, copies = _unseen(fitted, held_out)
-    state = Assessment(subject, Stack.of(fitted, axes, spec.policy))
-    counted = Counted(evaluator, state)
-    for fraction, stage in assess(state, spec, free or tuple(subject.model.searched), counted):
-        yield Progress(ASSESSED * fraction, stage, state.evaluations)
+    held_out, copies = _without_copies(fitted, held_out)
+    state = SearchState(subject, WhitenedData.of(fitted, axes, spec.policy))
+    counted = CountingEvaluator(evaluator, state)
+    for fraction, stage in run_search(state, spec, free or tuple(subject.model.searched), counted):
+        yield Progress(SEARCH_FRACTION * fraction, stage, state.evaluations)
     finding: Finding | None = None
-    for fraction, stage, found in concluded(state, name, held_out, counted):
+    for fraction, stage, found in build_finding(state, name, held_out, counted):
         finding = found
-        yield Progress(ASSESSED + (1.0 - ASSESSED) * fraction, stage, state.evaluations)
+        yield Progress(SEARCH_FRACTION + (1.0 - SEARCH_FRACTION) * fraction, stage, state.evaluations)
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     spent = time.monotonic() - began
@@ -80,21 +80,21 @@ def diagnose_subject(
     yield Progress(1.0, "done", state.evaluations, finding)
 
 
-def _unseen(
+def _without_copies(
     fitted: Sequence[Recording], held_out: Sequence[Recording]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """Those held out that are no copies of one that is fitted, and remarks on the others: they prove nothing."""
+    """Held-out recordings without copies of fitted ones, which validate nothing, and a remark for each copy."""
     known = {one.values.tobytes(): one.name for one in reversed(fitted)}
     copies = {one.name: known[one.values.tobytes()] for one in held_out if one.values.tobytes() in known}
-    told = [
-        f"{name} is held out and has the very values of {other}, which is fitted: it proves nothing and was left out"
+    remarks = [
+        f"held-out recording {name} is a copy of {other}, which is fitted: it cannot validate the fit and was ignored"
         for name, other in copies.items()
     ]
-    return tuple(one for one in held_out if one.name not in copies), tuple(told)
+    return tuple(one for one in held_out if one.name not in copies), tuple(remarks)
 
 
 def _versions() -> dict[str, str]:
-    """Of the packages that the numbers rest on, as far as they are installed."""
+    """Versions of the packages that the numbers depend on, as far as they are installed."""
     found = {}
     for name in ("wingfit", "numpy", "scipy", "numba"):
         with suppress(PackageNotFoundError):
@@ -102,10 +102,10 @@ def _versions() -> dict[str, str]:
     return found
 
 
-def _prepared(
+def _prepare(
     dataset: Dataset, spec: DiagnosisSpec
 ) -> tuple[Subject, tuple[Recording, ...], tuple[Recording, ...], tuple[str, ...]]:
-    """Subject, recordings that are fitted and held out, as they are fitted, and the free genes."""
+    """Subject, recordings to fit and held out (both filtered as they are fitted), and the free genes."""
     calibration = replace(spec.calibration, mode="joint", axes=_axes(dataset, spec) or spec.calibration.axes)
     ready = prepare(calibration, dataset)
     (stage,) = ready.stages

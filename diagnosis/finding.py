@@ -1,7 +1,7 @@
-"""What a diagnosis found: plain data, complete enough to draw the report from it alone.
+"""The result of a diagnosis: plain data from which the report is drawn.
 
 Lengths in m, forces in N, angles in rad, phases in beats (0 to 1, from the start of the beat as the dataset defines
-it), places on a wing in parts of the span (root 0, tip 1) and of the chord (leading edge 0, trailing edge 1).
+it), locations on a wing from 0 to 1 along the span (root to tip) and the chord (leading to trailing edge).
 ``unit`` is that of a channel: "m" for tracks, "N" for forces; all misfits are root mean squares of one channel in it.
 """
 
@@ -21,7 +21,7 @@ Table = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with a 90 % interval; ``low`` and ``high`` are None where nothing bounds it."""
+    """A value with a 90 % interval; ``low`` and ``high`` are None where the data do not bound it."""
 
     value: float
     low: float | None
@@ -30,21 +30,21 @@ class Interval:
 
 @dataclass(frozen=True)
 class Floors:
-    """How small a misfit can be.
+    """The smallest misfit that can be expected.
 
     Attributes:
-        noise: root mean square of the measurement's noise, by the scatter between beats.
-        memory: correlation of the noise from frame to frame (or sample to sample).
-        division: misfit that the model's own division leaves, by comparison with a finer one, but no more than is left;
-            None where there is none.
-        finer: the division that it was compared with.
-        simulation: misfit that no model is asked to be better than, a tenth of the noise.
-        total: root of the sum of squares of these: what a right model would leave.
+        noise: root mean square of the measurement noise, from the scatter between beats.
+        lag1_autocorrelation: of the noise, between successive samples.
+        discretisation: misfit by the model's discretisation, from a comparison with a finer one; at most the residual;
+            None where there is no finer one.
+        finer: the discretisation that it was compared with.
+        simulation: misfit below which no model is required to be: a tenth of the noise.
+        total: root of the sum of squares of these, the misfit of a right model.
     """
 
     noise: float
-    memory: float
-    division: float | None
+    lag1_autocorrelation: float
+    discretisation: float | None
     finer: str
     simulation: float
     total: float
@@ -52,7 +52,7 @@ class Floors:
 
 @dataclass(frozen=True)
 class GeneValue:
-    """A gene of the model that explains the data best; ``off`` is the value at which an effect is switched off."""
+    """A gene of the best model; ``off`` is the value at which it switches its effect off, if it does."""
 
     name: str
     unit: str
@@ -63,23 +63,23 @@ class GeneValue:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """An effect, or several at once, as an explanation.
+    """One effect, or several together, as an explanation of the residual.
 
     Attributes:
         effects: names; empty for the nominal model.
-        title: for people.
+        title: display name.
         family: of the first effect; "" for the nominal model.
-        source: where its law is from.
+        source: reference of its law.
         signature: what it looks like.
-        probability: that this is what is lacking, given that one of those considered, or none, is.
-        evidence: natural logarithm of its evidence over the nominal model's.
-        score: of the score test, chi-squared with ``freedom`` degrees; before any refit.
+        probability: that this is the missing physics, given that one of the hypotheses considered, or none, is right.
+        evidence: natural logarithm of its evidence relative to the nominal model.
+        score: of the score test before any refit, chi-squared with ``freedom`` degrees.
         freedom: number of its genes.
-        explained: part of the nominal model's excess misfit (mean square beyond the noise) that its refit takes away.
-        predicted: the same for recordings that were left out of the fit one by one; None where that was not done.
-        misfit: what its refit leaves, root mean square.
-        refitted: whether it was refitted in full; else all but the score is by linear extrapolation.
-        genes: of its effects; empty unless refitted. Intervals of all but the best rest on slopes learnt on the way.
+        explained: fraction of the nominal model's excess (mean square beyond the noise) that its refit removes.
+        predicted: the same cross-validated, recordings left out one at a time; None where that was not done.
+        misfit: root mean square after its refit.
+        refitted: whether it was refitted; otherwise all but the score is a linear extrapolation.
+        genes: of its effects; empty unless refitted. Only the best hypothesis has intervals from a measured Jacobian.
     """
 
     effects: tuple[str, ...]
@@ -100,10 +100,9 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Exponent:
-    """How the misfit, or what was named, grows with one variable of the condition: as its power.
+    """How the misfit, or the named effect, scales with one variable of the condition: the exponent of a power law.
 
-    ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` say between which
-    values recordings told it.
+    ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` are the range that was recorded.
     """
 
     variable: str
@@ -115,14 +114,14 @@ class Exponent:
 
 @dataclass(frozen=True)
 class Where:
-    """Where the nominal model and the recordings differ; where there is a name, by what that does to the recordings.
+    """Where the nominal model differs from the recordings; for a named effect, where that effect changes them.
 
     Attributes:
         words: the same in a sentence or two.
-        span, chord: centre and extent of the place on the wing; None where forces do not tell a place.
+        span, chord: centre and extent on the wing; None where forces do not identify a location.
         phase: centre and extent in the beat; None where the misfit is spread over the whole beat.
-        axis: along which channel axis most of it lies ("x", "y" or "z").
-        harmonics: part of its mean square in each harmonic of the beat, from 0.
+        axis: channel axis with most of it ("x", "y" or "z").
+        harmonics: fraction of its mean square in each harmonic of the beat, from 0.
         exponents: how it scales.
     """
 
@@ -137,10 +136,10 @@ class Where:
 
 @dataclass(frozen=True)
 class MarkerMisfit:
-    """Misfit of one marker (or force axis) over all recordings: root mean square beyond the noise, before and after.
+    """Misfit of one marker or force axis over all recordings: root mean square beyond the noise, before and after.
 
-    ``span`` and ``chord`` are its place in parts, ``x`` and ``y`` in m on the wing; None for forces. ``worst`` is the
-    phase at which it is largest, ``direction`` its mean direction there (x, y, z).
+    ``span`` and ``chord`` from 0 to 1, ``x`` and ``y`` in m on the wing; None for forces. ``worst`` is the phase at
+    which it is largest, ``direction`` its mean direction there (x, y, z).
     """
 
     name: str
@@ -158,8 +157,8 @@ class MarkerMisfit:
 class PhaseMap:
     """Misfit of the nominal model over the beat, averaged (root mean square) over the recordings.
 
-    ``bands`` are the span stations of the rows in parts (one row, band 0, for forces), ``phase`` the columns;
-    ``before`` and ``after`` [bands][phase]; ``noise`` is what noise alone leaves in a cell.
+    ``bands`` are the span stations of the rows (one row, band 0, for forces), ``phase`` the columns; ``before`` and
+    ``after`` [bands][phase]; ``noise`` is the expected value of a cell by noise alone.
     """
 
     bands: Numbers
@@ -171,11 +170,10 @@ class PhaseMap:
 
 @dataclass(frozen=True)
 class MissingLoad:
-    """The load that the nominal model lacks, or the motion of its drive, found through its own response.
+    """The load missing from the nominal model, or the error of its drive, under one condition.
 
-    Under one condition. ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap
-    normal, N/m; where a recording of forces shows it directly, N; what a ``rod`` ("front" or "rear") turns further
-    than it is said to, rad, upward.
+    ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap normal, N/m; for
+    recordings of forces the force itself, N; for a ``rod`` ("front" or "rear") its additional turn, rad, upward.
     """
 
     recording: str
@@ -189,7 +187,7 @@ class MissingLoad:
 
 @dataclass(frozen=True)
 class RecordingMisfit:
-    """Misfit to one recording before (nominal model, refitted) and after (with what was found), with 90 % intervals."""
+    """Misfit to one recording before (nominal model, refitted) and after (effects added), with 90 % intervals."""
 
     name: str
     held_out: bool
@@ -204,7 +202,7 @@ class RecordingMisfit:
 
 @dataclass(frozen=True)
 class Overlay:
-    """One channel over one beat: what was recorded (mean beat, samples at their phases) and what is simulated."""
+    """One channel over one beat: recorded mean beat (samples at their phases) and simulations before and after."""
 
     recording: str
     channel: str
@@ -226,7 +224,7 @@ class Term:
 
 @dataclass(frozen=True)
 class FreeLaw:
-    """A sparse law for what no effect explains; ``explained`` as in :class:`Hypothesis`, cross-validated."""
+    """A sparse law for a residual that no effect explains; ``explained`` as in :class:`Hypothesis`, cross-validated."""
 
     words: str
     terms: tuple[Term, ...]
@@ -235,7 +233,7 @@ class FreeLaw:
 
 @dataclass(frozen=True)
 class Advice:
-    """A condition to record next. ``separation`` is how far the hypotheses would lie apart, in standard deviations."""
+    """A condition to record next; ``separation``: distance of the predictions in standard deviations."""
 
     words: str
     flap_frequency_hz: float
@@ -250,7 +248,7 @@ class Advice:
 
 @dataclass(frozen=True)
 class Proof:
-    """Misfit over all held-out recordings in parts of ``floor`` (m or N): nominal refitted, and with what was found."""
+    """Misfit over all held-out recordings divided by ``floor`` (m or N), before and after as in RecordingMisfit."""
 
     before: Interval
     after: Interval
@@ -261,34 +259,34 @@ class Proof:
 
 @dataclass(frozen=True)
 class Finding:
-    """The outcome of a diagnosis.
+    """The result of a diagnosis.
 
     Attributes:
         dataset: its name.
         kind: "tracks" or "forces".
         unit: "m" or "N".
-        model: in words: which model, division, preset.
+        model: description of model, discretisation and preset.
         verdict: the decision.
-        summary: it in a few sentences for people.
+        summary: the verdict in a few sentences.
         probabilities: of every verdict; they sum to one.
-        named: effects that the verdict names (one or more); of an ambiguous one, those that cannot be told apart.
-        put_in: effects in the model that is called "after": those named, the most probable of an ambiguous verdict, the
-            nearest of an unnamed one if they take as much as they cost; else empty.
-        strength: misfit after the best nominal refit over the noise, d.
-        floors: how small a misfit can be.
-        hypotheses: most probable first; the nominal model is among them.
-        alike: explanations, each of one or several effects, that these recordings cannot tell apart.
-        where: place, phase, axis, scaling.
+        named: effects that the verdict names; for an ambiguous one, all that cannot be distinguished.
+        added_effects: in the model called "after": those named, the most probable of an ambiguous verdict, the best of
+            an unnamed one if its evidence suffices; else empty.
+        strength: misfit after the best nominal refit divided by the noise.
+        floors: the smallest misfit that can be expected.
+        hypotheses: most probable first, the nominal model included.
+        indistinguishable: hypotheses (each of one or several effects) that these recordings cannot distinguish.
+        where: location, phase, axis, scaling.
         markers, phase_map, missing: the maps.
         recordings: misfit to each.
-        proof: on held-out recordings; None where none is held out.
-        overlays: tracks or forces to look at.
+        proof: validation on held-out recordings; None where there are none.
+        overlays: tracks or forces to plot.
         genes: of the best model, nominal ones included.
-        law: where the verdict is unnamed, a free-form law.
+        law: for an unnamed verdict, a free-form law.
         advice: what to record next, best first.
-        outline: of the wing, (x, y) in m, to draw the map on; empty for forces.
+        outline: of the wing, (x, y) in m; empty for forces.
         remarks: everything else that a reader must know.
-        seconds, evaluations: what it took; ``versions`` of the packages that it rests on.
+        seconds, evaluations: cost; ``versions`` of the packages that the numbers depend on.
     """
 
     dataset: str
@@ -299,11 +297,11 @@ class Finding:
     summary: str
     probabilities: dict[str, float]
     named: tuple[str, ...]
-    put_in: tuple[str, ...]
+    added_effects: tuple[str, ...]
     strength: float
     floors: Floors
     hypotheses: tuple[Hypothesis, ...]
-    alike: tuple[tuple[str, ...], ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
     where: Where | None
     markers: tuple[MarkerMisfit, ...]
     phase_map: PhaseMap | None
@@ -322,5 +320,5 @@ class Finding:
 
 
 def table(values: npt.NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
-    """Values [N, M] as a finding keeps them."""
+    """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

@@ -1,4 +1,4 @@
-"""The two rigs that are known, under diagnosis: a flexible wing that cameras see, a vehicle on a balance."""
+"""The two known rigs as subjects: a flexible wing seen by cameras, and a vehicle on a force balance."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from wingfit.calibration.effects import sizes
 from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
-from wingfit.diagnosis.subject import Place, Subject, Suspect
+from wingfit.diagnosis.subject import ChannelLocation, Subject, Suspect
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.records.dataset import ForceAxis
 from wingfit.sim.effects.contract import Effect
@@ -31,19 +31,19 @@ from wingfit.sim.wing.probing import Probed, probed
 
 Array = npt.NDArray[np.float64]
 
-MOST_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
-MOST_ELEMENTS = 640
-CONVERGED = 1e-3  # of the root mean square force: far below what any balance tells
-MOST_CONDITIONS = 40
-MERGED = 0.05  # of the range of a variable: conditions nearer than that are meant to be the same
-SPOTS = 64  # markers of which a fault is tried
-_PLACES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
+MAX_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
+MAX_ELEMENTS = 640
+FORCE_TOLERANCE = 1e-3  # of the root mean square force: far below the resolution of any balance
+MAX_CONDITIONS = 40
+LEVEL_TOLERANCE = 0.05  # of the range of a variable: values nearer than that count as one setting
+MAX_MARKERS_TRIED = 64  # as candidates for the fault of a marker
+_LOCATION_GENES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
 
 
 def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
-    """The rig of ``dataset`` with the nominal model that ``spec`` asks for; ValueError where there is none such.
+    """The rig of ``dataset`` with the nominal model of ``spec``; ValueError where that model does not exist.
 
-    Effects that ``spec`` names are part of the nominal model and no suspects.
+    Effects that ``spec`` names are part of the nominal model, and no suspects.
     """
     model = model_for(dataset, spec)
     if isinstance(model, FlexibleWing):
@@ -53,14 +53,14 @@ def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
 
 @dataclass(frozen=True, eq=False)
 class WingSubject:
-    """A flexible wing that was recorded as tracks of markers."""
+    """A flexible wing, recorded as marker tracks."""
 
     dataset: Dataset
     model: FlexibleWing
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Effects of the library that a wing can have and the nominal model has not."""
+        """Effects that apply to a wing and are not in the nominal model."""
         return _suspects(self.model.wing, self.model.effects)
 
     @property
@@ -72,28 +72,29 @@ class WingSubject:
         return (*front, *rear, front[0])
 
     @property
-    def told(self) -> str:
-        """The model in words."""
+    def description(self) -> str:
+        """The nominal model in one line for the user."""
         bodies = Division.parse(self.model.division).bodies
         along = ", ".join(map(str, bodies)) if len(set(bodies)) > 1 else f"{bodies[0]} each"
         words = f"flexible wing of {sum(bodies)} bodies in {len(bodies)} strips ({along})"
-        return words + _with(self.model.effects)
+        return words + _effects_text(self.model.effects)
 
     def extended(self, names: Sequence[str]) -> FlexibleWing:
-        """The nominal model with suspects put in, switched off."""
+        """The nominal model with suspects added, switched off."""
         return self.model.with_effects(*names)
 
-    def beside(self, model: Model, genome: Array) -> Model:
-        """The wing begins its search for the periodic motion at that of ``genome``, without its effects."""
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:
+        """The wing's search for the periodic motion starts from that of ``genome``, without its effects."""
         return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
-    def finer(self) -> tuple[WingSubject, ...]:
+    def finer_subjects(self) -> tuple[WingSubject, ...]:
         """More strips with as many bodies along the chord; then more strips with the next even number of these.
 
-        Strips alone do not show the bending along the chord that a division leaves out, and that is most of the error
-        of a coarse one (of the Robird's wing with 4 bodies 4 to 6 mm; in 8 strips no less; with 24 bodies 1 mm). Yet it
-        is the strips where the chord does not bend. Even, since an odd number is worse than one fewer: of 18 bodies, 3
-        along the chord, 3 to 5 mm. None beyond MOST_BODIES.
+        Strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
+        coarse one (Robird wing with 4 bodies: 4 to 6 mm, in 8 strips no less; with 24 bodies 1 mm), except where the
+        chord does not bend.
+        An even number, because an odd number is worse than one fewer: 18 bodies, 3 along the chord, 3 to 5 mm. At most
+        MAX_BODIES.
         """
         bodies = Division.parse(self.model.division).bodies
         chordwise, strips = max(bodies), len(bodies) + 2
@@ -101,42 +102,44 @@ class WingSubject:
         return tuple(
             replace(self, model=replace(self.model, division=f"{along}x{across}"))
             for along, across in finer
-            if along * across <= MOST_BODIES
+            if along * across <= MAX_BODIES
         )
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
-        """Where each channel of ``recording`` is measured: three of each marker, at its place at rest."""
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
+        """Three channels of each marker, at its position at rest."""
         wing, planform, found = self.model.wing, Planform(self.model.wing), []
         for name in recording.markers:
             x, y, _ = wing.marker(name).position
-            found += [Place(name, axis, _station(wing, y), planform.fraction(x, y), x, y) for axis in "xyz"]
+            found += [ChannelLocation(name, axis, _station(wing, y), planform.fraction(x, y), x, y) for axis in "xyz"]
         return tuple(found)
 
-    def origin(self, recording: Recording) -> float:
+    def beat_start_phase(self, recording: Recording) -> float:
         """Phase (rad) at which the reference markers rise through the height of the hinge."""
         return recorded_crossing(self.model.wing, recording)
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """Tracks of all markers under ``condition``, at the phases of the recording made under the most similar one."""
-        blank = _blank(self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers))
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """Tracks of all markers under ``condition``, at the phases of the recording of the most similar condition."""
+        blank = _empty_recording(
+            self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers)
+        )
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
-        """Tracks of the wing under known loads; None where it cannot be simulated so."""
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+        """Responses of the tracks to unit loads; None where the wing cannot be simulated with them."""
         try:
             return probed(self.model, genome, recording, probe)
         except ValueError:
             return None
 
-    def conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that one might record next."""
-        return _conditions(self.dataset)
+    def candidate_conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that could be recorded next."""
+        return _candidate_conditions(self.dataset)
 
 
 @dataclass(frozen=True, eq=False)
 class VehicleSubject:
-    """A flapping vehicle that was recorded as forces, which are fitted as ``spec`` says."""
+    """A flapping vehicle, recorded as forces, which are filtered for the fit according to ``spec``."""
 
     dataset: Dataset
     model: BladeElementWing
@@ -144,42 +147,42 @@ class VehicleSubject:
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Effects of the library that a vehicle can have and the nominal model has not, as an effect or as a term."""
+        """Effects that apply to a vehicle and are not in the nominal model, as an effect or as a term."""
         known = {*self.model.effects, *self.model.terms}
         return _suspects(self.model.vehicle, known if self.model.vehicle.claps else known | {"clap_and_peel"})
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
-        """None: forces do not tell a place."""
+        """Empty: forces do not identify a location."""
         return ()
 
     @property
-    def told(self) -> str:
-        """The model in words."""
+    def description(self) -> str:
+        """The nominal model in one line for the user."""
         terms = set(self.model.terms)
         preset = min(PRESETS.values(), key=lambda one: len(terms ^ set(one.terms)))
-        lacking = [name for name in preset.terms if name not in terms]
+        missing = [name for name in preset.terms if name not in terms]
         more = [name for name in self.model.terms if name not in preset.terms]
-        changed = [f"without {', '.join(lacking)}"] * bool(lacking) + [f"with {', '.join(more)}"] * bool(more)
+        changed = [f"without {', '.join(missing)}"] * bool(missing) + [f"with {', '.join(more)}"] * bool(more)
         words = f"quasi-steady blade elements, model {preset.name!r} ({preset.description})"
-        return words + "".join(f", {one}" for one in changed) + _with(self.model.effects)
+        return words + "".join(f", {one}" for one in changed) + _effects_text(self.model.effects)
 
     def extended(self, names: Sequence[str]) -> BladeElementWing:
-        """The nominal model with suspects put in, switched off."""
+        """The nominal model with suspects added, switched off."""
         return self.model.with_effects(*names)
 
-    def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002  # part of the protocol
-        """Prescribed motion needs no search."""
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:  # noqa: ARG002  # part of the protocol
+        """Return ``model``: its motion is prescribed."""
         return model
 
-    def finer(self) -> tuple[VehicleSubject, ...]:
-        """Twice as many elements and instants; none where this changes no recorded force by CONVERGED, or too many."""
+    def finer_subjects(self) -> tuple[VehicleSubject, ...]:
+        """Twice as many elements and instants; empty where the forces change less than FORCE_TOLERANCE, or too many."""
         return self._finer
 
     @cached_property
     def _finer(self) -> tuple[VehicleSubject, ...]:
         finer = replace(self.model, elements=2 * self.model.elements, instants=2 * self.model.instants)
-        if finer.elements > MOST_ELEMENTS or not self._changes(finer):
+        if finer.elements > MAX_ELEMENTS or not self._changes(finer):
             return ()
         return (replace(self, model=finer),)
 
@@ -187,34 +190,34 @@ class VehicleSubject:
         nominal = np.array([[gene.nominal for gene in self.model.genes]])
         for recording in self.dataset.recordings:
             own, other = (model.beat(nominal, recording)[0] for model in (self.model, finer))
-            if np.sqrt(np.mean((own - other[::2]) ** 2)) > CONVERGED * np.sqrt(np.mean(own**2)):
+            if np.sqrt(np.mean((own - other[::2]) ** 2)) > FORCE_TOLERANCE * np.sqrt(np.mean(own**2)):
                 return True
         return False
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
-        """Which axis each channel of ``recording`` is measured along."""
-        return tuple(Place(f"force_{axis}", axis) for axis in recording.forces)
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
+        """The axis of each channel."""
+        return tuple(ChannelLocation(f"force_{axis}", axis) for axis in recording.forces)
 
-    def origin(self, recording: Recording) -> float:  # noqa: ARG002 - the protocol's
+    def beat_start_phase(self, recording: Recording) -> float:  # noqa: ARG002 - the protocol's
         """Zero: times of forces count from the start of a beat."""
         return 0.0
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """Forces along both axes under ``condition``, at the phases of the recording under the most similar one.
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """Forces along both axes under ``condition``, at the phases of the recording of the most similar condition.
 
         Low-passed as they would be fitted.
         """
-        blank = _blank(self.dataset, condition, forces=("x", "z"))
+        blank = _empty_recording(self.dataset, condition, forces=("x", "z"))
         blank = replace(blank, low_pass=fitted_through(self.spec, blank))
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> None:
-        """None: what forces lack is seen as it is."""
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> None:
+        """None: recordings of forces show the missing force directly."""
 
-    def conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that one might record next."""
-        return _conditions(self.dataset)
+    def candidate_conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that could be recorded next."""
+        return _candidate_conditions(self.dataset)
 
 
 # -- suspects --------------------------------------------------------------------------------------------------
@@ -227,25 +230,31 @@ def _suspects(rig: Wing | Vehicle, known: Collection[str]) -> tuple[Suspect, ...
 
 
 def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
-    places = {_PLACES[p.name]: f"{effect.name}.{p.name}" for p in effect.parameters if p.place and p.name in _PLACES}
+    location_genes = {
+        _LOCATION_GENES[p.name]: f"{effect.name}.{p.name}"
+        for p in effect.parameters
+        if p.place and p.name in _LOCATION_GENES
+    }
     return Suspect(
         name=effect.name,
         title=effect.title,
         family=effect.family,
         genes=effect.genes(rig),
-        sizes=sizes(effect),
+        size_genes=sizes(effect),
         typical=effect.typical(rig),
         source=effect.source,
         signature=effect.signature,
-        places=places,
-        alike=effect.confused_with,
-        spots=_at_markers(rig) if places and effect.port == "observation" and isinstance(rig, Wing) else (),
+        location_genes=location_genes,
+        confused_with=effect.confused_with,
+        candidate_shapes=_marker_shapes(rig)
+        if location_genes and effect.port == "observation" and isinstance(rig, Wing)
+        else (),
     )
 
 
-def _at_markers(wing: Wing) -> tuple[tuple[float, float], ...]:
-    """Station and chord of the markers, SPOTS at most: a fault of a marker is that of one of them."""
-    planform, every = Planform(wing), -(-len(wing.markers) // SPOTS)
+def _marker_shapes(wing: Wing) -> tuple[tuple[float, float], ...]:
+    """Station and chord of at most MAX_MARKERS_TRIED markers, the candidates for the fault of a marker."""
+    planform, every = Planform(wing), -(-len(wing.markers) // MAX_MARKERS_TRIED)
     found = ((marker.position[:2], _station(wing, marker.position[1])) for marker in wing.markers[::every])
     return tuple((station, float(np.clip(planform.fraction(x, y), 0.0, 1.0))) for (x, y), station in found)
 
@@ -254,22 +263,22 @@ def _station(wing: Wing, y: float) -> float:
     return float(np.clip((y - wing.stations[0].y) / wing.span, 0.0, 1.0))
 
 
-def _with(effects: Sequence[str]) -> str:
-    """The effects that a model has, in words."""
+def _effects_text(effects: Sequence[str]) -> str:
+    """The effects of a model as text."""
     return f", with {', '.join(repr(EFFECTS[name].title) for name in effects)}" if effects else ""
 
 
 # -- conditions ------------------------------------------------------------------------------------------------
 
 
-def _blank(
+def _empty_recording(
     dataset: Dataset, condition: Condition, markers: tuple[str, ...] = (), forces: tuple[ForceAxis, ...] = ()
 ) -> Recording:
-    """A recording of such channels without data, otherwise like the one made under the most similar condition.
+    """A recording of such channels without data, otherwise like the one under the most similar condition.
 
-    Its instants are at the same phases of the beat, so that it shows as much as that one.
+    Its samples are at the same phases of the beat, so that it contains as much information.
     """
-    like = min(dataset.recordings, key=lambda recording: _unlike(dataset, recording.condition, condition))
+    like = min(dataset.recordings, key=lambda recording: _dissimilarity(dataset, recording.condition, condition))
     times = like.times * (like.condition.flap_frequency / condition.flap_frequency)
     values = np.full((len(times), 3 * len(markers) + len(forces)), np.nan)
     return replace(
@@ -285,7 +294,7 @@ def _blank(
 
 
 def _name(condition: Condition) -> str:
-    """Of a recording made under ``condition``."""
+    """Name of a recording under ``condition``."""
     lag, incidence = np.degrees(condition.phase_lag), np.degrees(condition.angle_of_attack)
     return (
         f"{condition.flap_frequency:g}hz-lag{lag:.3g}deg-{condition.pressure / 100.0:g}mbar-{condition.airspeed:g}ms-"
@@ -293,34 +302,33 @@ def _name(condition: Condition) -> str:
     )
 
 
-def _unlike(dataset: Dataset, one: Condition, other: Condition) -> tuple[bool, float]:
-    """Whether only one of two conditions has a stream, and how far apart they are otherwise."""
-    places = _places([one, other], [recording.condition for recording in dataset.recordings])
-    return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(places[0] - places[1]))
+def _dissimilarity(dataset: Dataset, one: Condition, other: Condition) -> tuple[bool, float]:
+    """Whether only one of two conditions has an air stream, and their distance otherwise."""
+    positions = _normalised([one, other], [recording.condition for recording in dataset.recordings])
+    return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(positions[0] - positions[1]))
 
 
-def _conditions(dataset: Dataset) -> tuple[Condition, ...]:
-    """What the rigs of ``dataset`` can run and did not, at most MOST_CONDITIONS that are far from all else.
+def _candidate_conditions(dataset: Dataset) -> tuple[Condition, ...]:
+    """Conditions that the rigs of ``dataset`` can run and did not, at most MAX_CONDITIONS, far from each other.
 
-    Every frequency and lag that a rig ran, and those half-way between neighbours, with every stream (pressure,
-    airspeed, incidence) alike. In free flight the vehicle, not the experimenter, chooses what goes with what: there
-    nothing is proposed.
+    All combinations of the frequencies and lags of a rig, and their midpoints, with every stream (pressure, airspeed,
+    incidence). None in free flight, where the vehicle and not the experimenter chooses the combinations.
     """
-    recorded, able = [recording.condition for recording in dataset.recordings], list[Condition]()
+    recorded, candidates = [recording.condition for recording in dataset.recordings], list[Condition]()
     for rig in dict.fromkeys(r.rig for r in dataset.recordings if r.rig != "free_flight"):
-        able += _combined([r.condition for r in dataset.recordings if r.rig == rig])
-    return tuple(_spread(able, recorded, MOST_CONDITIONS))
+        candidates += _combinations([r.condition for r in dataset.recordings if r.rig == rig])
+    return tuple(_farthest_first(candidates, recorded, MAX_CONDITIONS))
 
 
-def _combined(ran: Sequence[Condition]) -> Iterator[Condition]:
-    """All combinations of what one rig ran."""
+def _combinations(ran: Sequence[Condition]) -> Iterator[Condition]:
+    """All combinations of the settings of one rig."""
     frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
-    for f, lag, stream in product(_between(frequencies), _between(lags), _streams(ran)):
+    for f, lag, stream in product(_with_midpoints(frequencies), _with_midpoints(lags), _streams(ran)):
         yield replace(stream, flap_frequency=f, phase_lag=lag)
 
 
 def _streams(ran: Sequence[Condition]) -> list[Condition]:
-    """Conditions with unlike streams, and half-way between neighbours: pressures are halved in their logarithm."""
+    """Conditions with different streams, and midpoints between neighbours (geometric for the pressure)."""
     names = ("pressure", "airspeed", "angle_of_attack")
     levels = {name: _levels([getattr(c, name) for c in ran], logarithm=name == "pressure") for name in names}
     snapped = {tuple(_nearest(levels[name], getattr(c, name)) for name in names): c for c in ran}
@@ -333,10 +341,10 @@ def _streams(ran: Sequence[Condition]) -> list[Condition]:
 
 
 def _levels(values: Sequence[float], *, logarithm: bool = False) -> list[float]:
-    """Values that are meant to differ: those within MERGED of their range, or half of it of the largest, are one."""
+    """Distinct settings: values within LEVEL_TOLERANCE of their range, or of half the largest value, count as one."""
     ordered = sorted(values)
     scaled = [_logarithm(value) for value in ordered] if logarithm else ordered
-    apart = MERGED * max(scaled[-1] - scaled[0], 0.5 * abs(scaled[-1]))
+    apart = LEVEL_TOLERANCE * max(scaled[-1] - scaled[0], 0.5 * abs(scaled[-1]))
     groups, first = [[ordered[0]]], scaled[0]
     for value, at in zip(ordered[1:], scaled[1:], strict=True):
         if at - first > apart:
@@ -347,12 +355,12 @@ def _levels(values: Sequence[float], *, logarithm: bool = False) -> list[float]:
 
 
 def _logarithm(pressure: float) -> float:
-    """Of a pressure in Pa; below 1 Pa there is nothing to tell apart."""
+    """Logarithm of a pressure in Pa, at least 1 Pa: lower ones do not differ."""
     return float(np.log(max(pressure, 1.0)))
 
 
-def _between(levels: Sequence[float]) -> list[float]:
-    """The levels, and the middles between neighbours."""
+def _with_midpoints(levels: Sequence[float]) -> list[float]:
+    """The levels and the midpoints between neighbours."""
     return [*levels, *(0.5 * (one + other) for one, other in pairwise(levels))]
 
 
@@ -360,22 +368,22 @@ def _nearest(levels: Sequence[float], value: float) -> float:
     return min(levels, key=lambda level: abs(level - value))
 
 
-def _spread(able: Sequence[Condition], recorded: Sequence[Condition], most: int) -> Iterator[Condition]:
-    """Up to ``most`` of those ``able``, each the farthest from all that are recorded or taken already."""
-    if not able:
+def _farthest_first(candidates: Sequence[Condition], recorded: Sequence[Condition], most: int) -> Iterator[Condition]:
+    """Up to ``most`` of the ``candidates``, each the farthest from all that are recorded or selected already."""
+    if not candidates:
         return
-    places, taken = _places(able, recorded), _places(recorded, recorded)
+    places, taken = _normalised(candidates, recorded), _normalised(recorded, recorded)
     near = np.linalg.norm(places[:, None] - taken[None], axis=2).min(axis=1)
     for _ in range(most):
         k = int(np.argmax(near))
-        if near[k] <= MERGED:
+        if near[k] <= LEVEL_TOLERANCE:
             return
-        yield able[k]
+        yield candidates[k]
         near = np.minimum(near, np.linalg.norm(places - places[k], axis=1))
 
 
-def _places(conditions: Sequence[Condition], ran: Sequence[Condition]) -> Array:
-    """Conditions [N, 5] in parts of the range that was run: frequency, lag, log pressure, airspeed, incidence."""
+def _normalised(conditions: Sequence[Condition], ran: Sequence[Condition]) -> Array:
+    """Conditions [N, 5] divided by the recorded range: frequency, lag, log pressure, airspeed, incidence."""
 
     def numbers(some: Sequence[Condition]) -> Array:
         rows = [(c.flap_frequency, c.phase_lag, _logarithm(c.pressure), c.airspeed, c.angle_of_attack) for c in some]

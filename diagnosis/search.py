@@ -1,4 +1,4 @@
-"""The search for what is lacking: nominal fit, score tests, refits alone and together."""
+"""The search for missing physics: nominal fit, score tests, refits of single effects and of several together."""
 
 from __future__ import annotations
 
@@ -9,385 +9,392 @@ from dataclasses import replace
 import numpy as np
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.diagnosis.evidence.competing_fits import Entry, afresh, entries
-from wingfit.diagnosis.evidence.fit import UNFIT, Fit
-from wingfit.diagnosis.evidence.nominal import Nominal, first_fit, improves, leaves, promises, settled
-from wingfit.diagnosis.evidence.refit import (
-    LAST,
-    Refit,
-    again,
-    continued,
-    ended,
-    judged,
-    pairs,
-    partners,
-    refitted,
-    resumed,
-    substitutes,
-    worth_a_refit,
+from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, start_points
+from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
+from wingfit.diagnosis.evidence.nominal import (
+    Nominal,
+    choose_discretisation,
+    finer_change,
+    finer_is_promising,
+    fit_nominal,
+    improves,
 )
-from wingfit.diagnosis.evidence.screen import Trial, screened
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
-from wingfit.diagnosis.search_state import Assessment
+from wingfit.diagnosis.evidence.refit import (
+    FINAL_STEPS,
+    Refit,
+    continue_fit,
+    fit_to_convergence,
+    make_refit,
+    partner_trials,
+    refit_at,
+    refit_with,
+    restart_fit,
+    strongest_trials,
+    substitute_trials,
+    suspect_pairs,
+)
+from wingfit.diagnosis.evidence.screen import Trial, score_tests
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject, Suspect
-from wingfit.diagnosis.verdict.verdict import decided
-from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, beyond_doubt, tolerated, weighed
+from wingfit.diagnosis.verdict.verdict import decide
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 
-CONTINUED = 2  # of the best refits, if they have not converged
-RUNNERS = 3  # suspects that are fitted from the estimates
-PARTNERS = 3  # of the best explanation
-RIVALS = 3  # explanations to which a partner is sought
-SUBSTITUTES = 2  # tried in place of each part of an explanation of several
+Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
+
+MAX_CONTINUED = 2  # best refits that are continued until they converge
+MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
+MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
+MAX_RIVALS = 3  # hypotheses for which a second effect is tried
+MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
-def assess(
-    state: Assessment, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
-    """Fill ``state``; yields the part of the work done and what comes next."""
-    stack, fixed = state.stack, spec.calibration.fixed
+def run_search(state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator) -> Steps:
+    """Fill ``state``; yields the fraction of the work done and the next stage."""
+    data, fixed = state.data, spec.calibration.fixed
     yield 0.0, "fitting the nominal model"
     if spec.start:
-        with suppress(*UNFIT):
-            state.begun = state.subject, next(first_fit(state.subject, stack, evaluator, free, {}, fixed))
-    for k, fit in enumerate(first_fit(state.subject, stack, evaluator, free, spec.start, fixed)):
-        state.begun = state.begun or (state.subject, fit)
+        with suppress(*FIT_ERRORS):
+            state.initial_fit = state.subject, next(fit_nominal(state.subject, data, evaluator, free, {}, fixed))
+    for k, fit in enumerate(fit_nominal(state.subject, data, evaluator, free, spec.start, fixed)):
+        state.initial_fit = state.initial_fit or (state.subject, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
-    yield 0.25, "comparing with a finer division"
-    suspects = suspected(state.subject, spec)
-    for fraction, stage in _settled(state, spec, fit, suspects, evaluator):
+    yield 0.25, "comparing with a finer discretisation"
+    suspects = select_suspects(state.subject, spec)
+    for fraction, stage in _search_coarse_first(state, spec, fit, suspects, evaluator):
         yield 0.3 + 0.55 * fraction, stage
     yield 0.85, "fitting the nominal model again"
-    better = _elsewhere(state, evaluator)
+    better = _nominal_from_best(state, evaluator)
     if better is not None:
-        state.begin(replace(state.known, refit=better))
-        for fraction, stage in _suspected(state, spec, suspects, evaluator):
+        state.restart_from(replace(state.fitted_nominal, refit=better))
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
             yield 0.85 + 0.07 * fraction, stage
-    yield 0.92, "comparing with a finer division"
-    for stage in _completed(state, spec, evaluator):
+    yield 0.92, "comparing with a finer discretisation"
+    for stage in _refine_and_extend(state, spec, evaluator):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
     if state.refits:
-        _solved(state, state.known, evaluator)
-    floor = 0.0 if spec.refine else state.known.division or 0.0
-    yield from ((0.95, stage) for stage in _ended(state, evaluator, floor, len(suspects)))
+        _continue_best(state, state.fitted_nominal, evaluator)
+    floor = 0.0 if spec.refine else state.fitted_nominal.discretisation_error or 0.0
+    yield from ((0.95, stage) for stage in _final_fits(state, evaluator, floor, len(suspects)))
 
 
-def _settled(
-    state: Assessment, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
-    """Suspects beside the nominal ``fit``; where a finer division does better than all of these, beside that one's."""
-    nominal = settled(state.subject, state.stack, evaluator, fit, refine=spec.refine)
-    if nominal.subject is not state.subject and not beyond_doubt(state.stack, nominal.refit, len(suspects)):
-        state.begin(settled(state.subject, state.stack, evaluator, fit, refine=False))
-        for fraction, stage in _suspected(state, spec, suspects, evaluator, at_least=nominal.refit):
+def _search_coarse_first(
+    state: SearchState, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
+) -> Steps:
+    """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
+    nominal = choose_discretisation(state.subject, state.data, evaluator, fit, refine=spec.refine)
+    if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
+        state.restart_from(choose_discretisation(state.subject, state.data, evaluator, fit, refine=False))
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator, at_least=nominal.refit):
             yield 0.3 * fraction, stage
-    if not any(improves(state.stack, one, nominal.refit) for one in state.refits):
-        state.begin(nominal)
-        for fraction, stage in _suspected(state, spec, suspects, evaluator):
+    if not any(improves(state.data, one, nominal.refit) for one in state.refits):
+        state.restart_from(nominal)
+        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
             yield 0.3 + 0.7 * fraction, stage
 
 
-def _ended(state: Assessment, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
-    """Weigh what there is, with the best explanation fitted to its end, and what is hard to tell from it as well."""
-    known = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
-    yield from _raced(state, evaluator, _alike(known) or _exchanges(state, decided(known).best))
-    yield "fitting the best explanation to its end"
-    for _ in range(CONTINUED):
-        state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
-        unended = _unended(state.weighed)
-        if unended is None:
+def _final_fits(state: SearchState, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
+    """Weigh the hypotheses, with the best one and those indistinguishable from it fitted until they converge."""
+    known = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
+    yield from _compete(state, evaluator, _indistinguishable(known) or _look_alikes(state, decide(known).best))
+    yield "fitting the best hypothesis until it converges"
+    for _ in range(MAX_CONTINUED):
+        state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
+        unconverged = _unconverged(state.weights)
+        if unconverged is None:
             return
-        state.add(continued(state.subject, state.stack, evaluator, unended, LAST))
-    state.weighed = weighed(state.stack, state.known.refit, state.refits, floor, suspects)
+        state.add(continue_fit(state.subject, state.data, evaluator, unconverged, FINAL_STEPS))
+    state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
 
 
-def _alike(weighed: Weighed) -> list[Entry]:
-    """Suspects that explain nearly as well each by itself, if several do: the right one's fit may have been caught."""
-    evidence = weighed.evidence[1:]
-    least = max(evidence.max(initial=0.0) - weighed.policy.overtake, 0.0)
-    close = [one for one, found in zip(weighed.refits[1:], evidence, strict=True) if found > least]
+def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
+    """Start points of single suspects that explain nearly equally well: the right one may be in a local minimum."""
+    evidence = weights.evidence[1:]
+    least = max(evidence.max(initial=0.0) - weights.policy.overtake, 0.0)
+    close = [one for one, found in zip(weights.refits[1:], evidence, strict=True) if found > least]
     several = len(close) > 1 and all(len(one.trials) == 1 for one in close)
-    return [entry for one in close for entry in entries(one.trials[0])] if several else []
+    return [entry for one in close for entry in start_points(one.trials[0])] if several else []
 
 
-def _exchanges(state: Assessment, best: Refit) -> list[Entry]:
-    """An explanation that leaves more than noise, with what is known to look like a part of it in its place.
+def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
+    """Start points in which an effect of the best hypothesis is replaced by one known to look similar.
 
-    A score test cannot tell what the nominal genes, and a look-alike, have taken up: of two that look alike the first
-    to be fitted may hide the other.
+    A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed.
     """
-    if best.excess <= tolerated(state.stack, 0.0, 0.0):
+    if best.excess <= tolerated_excess(state.data, 0.0, 0.0):
         return []
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
-    every = []
+    starts = []
     for part in best.trials:
-        beside = [trial for trial in best.trials if trial is not part]
-        for name in part.suspect.alike:
+        others = [trial for trial in best.trials if trial is not part]
+        for name in part.suspect.confused_with:
             if name in found and name not in best.names:
-                every += entries(found[name], beside, best)
-    return every
+                starts += start_points(found[name], others, best)
+    return starts
 
 
-def _unended(weighed: Weighed) -> Refit | None:
-    """The best explanation if its fit has not ended, else the first such rival that might overtake it."""
-    best = decided(weighed).best
-    if best.trials and not (best.fit.converged and best.fit.fresh):
+def _unconverged(weights: HypothesisWeights) -> Refit | None:
+    """The best hypothesis if its fit has not converged, else the first such rival that could overtake it."""
+    best = decide(weights).best
+    if best.trials and not (best.fit.converged and best.fit.jacobian_measured):
         return best
-    evidence = weighed.evidence[1:]
-    for k in np.argsort(-evidence, kind="stable")[: RIVALS if best.trials else 0]:
-        rival: Refit = weighed.refits[1:][k]
-        if evidence[k] > evidence.max() - weighed.policy.overtake and not rival.fit.converged:
+    evidence = weights.evidence[1:]
+    for k in np.argsort(-evidence, kind="stable")[: MAX_RIVALS if best.trials else 0]:
+        rival: Refit = weights.refits[1:][k]
+        if evidence[k] > evidence.max() - weights.policy.overtake and not rival.fit.converged:
             return rival
     return None
 
 
-def _refined(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> None:
-    """Go to the finer division with all explanations where that does better with the best of them.
+def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> None:
+    """Take a finer discretisation for all hypotheses where the best hypothesis fits better with it.
 
-    Beside a large effect a division's own misfit does not show before the effect is in the model.
+    The error of a discretisation may become visible only after a large effect is in the model.
     """
-    stack = state.stack
+    data = state.data
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    innocent, most = nominal.innocent, stack.policy.rivalry * best.excess + tolerated(stack, 0.0, 0.0)
-    leading = sorted((one for one in state.refits if one.excess <= most), key=lambda one: one.excess)[:CONTINUED]
-    for finer in nominal.subject.finer():
-        tried = [(one, _at_finer(finer, stack, evaluator, one)) for one in leading]
+    tried_finer = nominal.tried_finer
+    limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
+    leading = sorted((one for one in state.refits if one.excess <= limit), key=lambda one: one.excess)[:MAX_CONTINUED]
+    for finer in nominal.subject.finer_subjects():
+        tried = [(one, _fit_at_finer(finer, data, evaluator, one)) for one in leading]
         if any(found is not None and found is not one for one, found in tried):
-            innocent = finer.told
+            tried_finer = finer.description
         known = [found for one, found in tried if found is not None and found is not one]
         better = min(known, key=lambda one: one.excess, default=best)
-        if improves(state.stack, better, best):
+        if improves(state.data, better, best):
             break
     else:
-        state.nominal = replace(nominal, innocent=innocent)
+        state.nominal = replace(nominal, tried_finer=tried_finer)
         return
-    first = again(finer, stack, evaluator, nominal.refit)
+    first = refit_at(finer, data, evaluator, nominal.refit)
     if first is None:
         return
-    first = ended(finer, stack, evaluator, first)
-    most = stack.policy.rivalry * better.excess + tolerated(stack, 0.0, 0.0)
-    near = [one for one in state.refits if one.excess <= most or set(one.names) < set(better.names)]
+    first = fit_to_convergence(finer, data, evaluator, first)
+    limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
+    near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
-    followed = [_followed(finer, stack, evaluator, one, better) for one in others]
-    remark = f"the division limits the model beside the effect: {finer.told} was taken instead of {state.subject.told}"
-    remarks = (*nominal.remarks, remark)  # what the finer division itself leaves is not known
+    followed = [_follow(finer, data, evaluator, one, better) for one in others]
+    before = state.subject.description
+    remark = f"with the effect added, the discretisation limits the model: {finer.description} replaces {before}"
+    remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
     state.nominal = Nominal(finer, first, None, "", remarks)
     state.subject, state.refits = finer, [one for one in (*known, *followed) if one is not None]
 
 
-def _at_finer(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:
-    """``refit`` at a finer division, fitted where that promises to do better; None where it cannot be simulated."""
-    changes, takes = leaves(finer, stack, evaluator, refit)
+def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
+    """``refit`` with a finer discretisation, fitted if that is promising; None where it cannot be simulated."""
+    changes, gain = finer_change(finer, data, evaluator, refit)
     if not changes:
         return None
-    if not promises(stack, changes, takes, refit):
+    if not finer_is_promising(data, changes, gain, refit):
         return refit
-    found = again(finer, stack, evaluator, refit)
-    if found is None or found.fit.converged or improves(stack, found, refit) or found.excess >= refit.excess:
+    found = refit_at(finer, data, evaluator, refit)
+    if found is None or found.fit.converged or improves(data, found, refit) or found.excess >= refit.excess:
         return found
-    return continued(finer, stack, evaluator, found)
+    return continue_fit(finer, data, evaluator, found)
 
 
-def _followed(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
-    """``refit`` at a finer division; to its end where it is part of the ``best``, lest it lose for want of steps."""
-    found = again(finer, stack, evaluator, refit)
+def _follow(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
+    """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
+    found = refit_at(finer, data, evaluator, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
-    return continued(finer, stack, evaluator, found)
+    return continue_fit(finer, data, evaluator, found)
 
 
-def _suspected(
-    state: Assessment,
+def _try_suspects(
+    state: SearchState,
     spec: DiagnosisSpec,
     suspects: Sequence[Suspect],
     evaluator: Evaluator,
     at_least: Refit | None = None,
-) -> Iterator[tuple[float, str]]:
-    """Score tests about the nominal fit, then refits; yields the part of that done.
+) -> Steps:
+    """Score tests with the nominal fit, then refits; yields the fraction done and the stage.
 
-    Few or no refits where none does, or promises to do, better than the nominal model of a finer division
-    (``at_least``): a division may take up what an effect leaves, as an effect may take up what a division leaves.
+    There are few or no refits where none is, or is predicted to be, better than ``at_least``, the nominal model with a
+    finer discretisation: an effect and a discretisation error may each absorb the other's residual.
     """
-    nominal = state.known
-    for k, (suspect, trials) in enumerate(screened(state.subject, state.stack, nominal.refit.fit, evaluator, suspects)):
+    nominal = state.fitted_nominal
+    tests = score_tests(state.subject, state.data, nominal.refit.fit, evaluator, suspects)
+    for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    if beyond_doubt(state.stack, nominal.refit, len(suspects)):
+    if nominal_suffices(state.data, nominal.refit, len(suspects)):
         return
-    least = min((trial.leaves for trials in state.trials for trial in trials), default=np.inf)
-    if at_least is None or least < state.stack.chi_squared(at_least.fit.coefficients):
+    least = min((trial.remaining_chi_squared for trials in state.trials for trial in trials), default=np.inf)
+    if at_least is None or least < state.data.chi_squared(at_least.fit.coefficients):
         yield from _refits(state, nominal, spec, evaluator, at_least)
 
 
-def _elsewhere(state: Assessment, evaluator: Evaluator) -> Refit | None:
-    """The nominal model fitted from where the best explanation ended, if it does much better there.
+def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None:
+    """The nominal model fitted from the genes of the best hypothesis, if that is clearly better; else None.
 
-    An explanation may lead out of a minimum in which the nominal fit was caught, and is not the cause then.
+    Then the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
     """
-    nominal = state.known.refit
+    nominal = state.fitted_nominal.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
-    if best is nominal or not improves(state.stack, best, nominal):
+    if best is nominal or not improves(state.data, best, nominal):
         return None
-    found = resumed(state.subject, state.stack, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
-    return found if found is not None and improves(state.stack, found, nominal) else None
+    found = restart_fit(state.subject, state.data, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
+    return found if found is not None and improves(state.data, found, nominal) else None
 
 
 def _refits(
-    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
-) -> Iterator[tuple[float, str]]:
-    """Suspects one by one, from the estimates where none could be named, and together where that is not enough."""
-    yield from _alone(state, nominal, spec, evaluator)
+    state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
+) -> Steps:
+    """Refit single suspects, then some from the estimates and several together while the residual is not explained."""
+    yield from _single_refits(state, nominal, spec, evaluator)
     yield 0.72, "continuing the best refits"
-    if _solved(state, nominal, evaluator):
+    if _continue_best(state, nominal, evaluator):
         return
-    if at_least is not None and not any(improves(state.stack, one, at_least) for one in state.refits):
+    if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
         return
-    if not state.leaves_little:
-        yield from _afresh(state, spec, evaluator)
-    if not state.leaves_little:
-        yield from ((0.82, stage) for stage in _together(state, nominal, evaluator))
+    if not state.beats_unknown_law:
+        yield from _refits_from_estimates(state, spec, evaluator)
+    if not state.beats_unknown_law:
+        yield from ((0.82, stage) for stage in _combined_refits(state, nominal, evaluator))
         yield 0.97, "continuing the best refits"
-        _solved(state, nominal, evaluator)
+        _continue_best(state, nominal, evaluator)
 
 
-def _alone(
-    state: Assessment, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator
-) -> Iterator[tuple[float, str]]:
-    stack, fit = state.stack, nominal.refit.fit
-    chosen = worth_a_refit(state.stack, state.trials, spec.refits)
+def _single_refits(state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
+    """Refit the suspects with the strongest score tests one at a time."""
+    data, fit = state.data, nominal.refit.fit
+    chosen = strongest_trials(state.data, state.trials, spec.refits)
     for k, trial in enumerate(chosen):
-        if _outdone(state, nominal, trial, chosen[0]):
+        if _is_outperformed(state, nominal, trial, chosen[0]):
             continue
         yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
-        state.add(refitted(state.subject, stack, fit, evaluator, [trial]))
+        state.add(refit_with(state.subject, data, fit, evaluator, [trial]))
 
 
-def _afresh(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[tuple[float, str]]:
-    """Suspects that explain most about the estimates, from there.
+def _refits_from_estimates(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
+    """Refit suspects from the genes' estimates, those whose score tests are strongest there.
 
-    About the nominal fit a score test cannot see what its genes went far to make up for, such as a heavy mass.
+    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
     """
-    if state.begun is None:
+    if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
-    subject, begun = state.begun
+    subject, initial = state.initial_fit
     found = []
-    for suspect, trials in screened(subject, state.stack, begun, evaluator, suspected(subject, spec)):
+    for suspect, trials in score_tests(subject, state.data, initial, evaluator, select_suspects(subject, spec)):
         found.append(trials)
-        yield 0.74, f"score test of {suspect.name} about the estimates"
-    every = [entry for trial in _runners(state.stack, found) for entry in entries(trial)]
-    yield from ((0.77, stage) for stage in _raced(state, evaluator, every))
+        yield 0.74, f"score test of {suspect.name} at the estimates"
+    starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
+    yield from ((0.77, stage) for stage in _compete(state, evaluator, starts))
 
 
-def _runners(stack: Stack, found: Sequence[list[Trial]]) -> list[Trial]:
-    """The strongest, and all that act at a place: a score test at a few places tells little of these."""
-    strongest = worth_a_refit(stack, found, RUNNERS)
-    placed = [trials[0] for trials in found if trials and trials[0].suspect.places and not trials[0].suspect.spots]
-    return [*strongest, *(trial for trial in placed if all(trial is not one for one in strongest))]
+def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
+    """The strongest trials, and those of all suspects with a location: a few tested locations say little of these."""
+    strongest = strongest_trials(data, found, MAX_RESTARTED)
+    others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
+    return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
 
 
-def _raced(state: Assessment, evaluator: Evaluator, every: Sequence[Entry]) -> Iterator[str]:
-    """Keep what is in front when all have been fitted from the estimates."""
-    if not every or state.begun is None:
+def _compete(state: SearchState, evaluator: Evaluator, starts: Sequence[StartPoint]) -> Iterator[str]:
+    """Fit all start points in competition and store the best."""
+    if not starts or state.initial_fit is None:
         return
+    policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
     best = min(one.excess for one in state.refits)
-    noisy = tolerated(state.stack, 0.0, 0.0)
-    most = max(min(state.stack.policy.hopeful * state.known.refit.excess, state.stack.policy.rivalry * best), noisy)
-    wanted = max(state.stack.policy.unknown_residual**2 * state.known.refit.excess, noisy)
-    front: list[tuple[Entry, Fit]] = []
-    for front in afresh(state.subject, state.stack, evaluator, state.begun[1], every, most, wanted):
-        yield f"refit with {' and '.join(front[0][0].names)} from the estimates"
-    for entry, fit in front:
-        state.add(judged(state.stack, fit, entry.trials))
+    by_noise = tolerated_excess(state.data, 0.0, 0.0)
+    limit = max(min(policy.worth_continuing * nominal, policy.rivalry * best), by_noise)
+    target = max(policy.unknown_residual**2 * nominal, by_noise)
+    rivals: list[tuple[StartPoint, Fit]] = []
+    for rivals in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], starts, limit, target):
+        yield f"refit with {' and '.join(rivals[0][0].names)} from the estimates"
+    for entry, fit in rivals:
+        state.add(make_refit(state.data, fit, entry.trials))
 
 
-def _completed(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """The best explanation at a division that does not limit it, and what else is lacking if it leaves little then.
-
-    In this order: what a division leaves beside an effect may pass for a second one.
-    """
+def _refine_and_extend(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+    """Refine the discretisation, whose error may look like a second effect, then try second effects."""
     coarse = state.subject
     if spec.refine:
-        _refined(state, state.known, evaluator)
-    if state.leaves_little and not state.enough(state.known):
-        yield from _beside(state, spec, evaluator)
-        if state.subject is coarse and not state.enough(state.known):
-            yield from _together(state, state.known, evaluator)
+        _refine_with_effects(state, state.fitted_nominal, evaluator)
+    if state.beats_unknown_law and not state.is_explained(state.fitted_nominal):
+        yield from _second_effects(state, spec, evaluator)
+        if state.subject is coarse and not state.is_explained(state.fitted_nominal):
+            yield from _combined_refits(state, state.fitted_nominal, evaluator)
 
 
-def _beside(state: Assessment, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
-    """Partners of the best explanation, by score tests about it."""
-    best, stack = min(state.refits, key=lambda one: one.excess), state.stack
-    others, found = [one for one in suspected(state.subject, spec) if one.name not in best.names], []
-    for suspect, trials in screened(state.subject, stack, best.fit, evaluator, others, best.names):
+def _second_effects(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+    """Refit the best hypothesis with second effects chosen by score tests at its fit."""
+    best, data = min(state.refits, key=lambda one: one.excess), state.data
+    others, found = [one for one in select_suspects(state.subject, spec) if one.name not in best.names], []
+    for suspect, trials in score_tests(state.subject, data, best.fit, evaluator, others, best.names):
         found.append(trials)
-        yield f"score test of {suspect.name} beside {' and '.join(best.names)}"
-    for trial in partners(stack, best, found)[:PARTNERS]:
+        yield f"score test of {suspect.name} together with {' and '.join(best.names)}"
+    for trial in partner_trials(data, best, found)[:MAX_PARTNERS]:
         yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
-        state.add(refitted(state.subject, stack, best.fit, evaluator, [*best.trials, trial], best.fit))
+        state.add(refit_with(state.subject, data, best.fit, evaluator, [*best.trials, trial], best.fit))
 
 
-def _together(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
-    """Several at once: partners of the best, pairs of which neither explains much, and each part exchanged."""
-    stack, fit = state.stack, nominal.refit.fit
+def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
+    """Refit combinations: the best hypotheses with a second effect, pairs of weak effects, and substitutes."""
+    data, fit = state.data, nominal.refit.fit
     tried = {frozenset(one.names) for one in state.refits}
-    best = sorted(state.refits, key=lambda one: one.excess)[:RIVALS]
+    best = sorted(state.refits, key=lambda one: one.excess)[:MAX_RIVALS]
     for k, one in enumerate(best):
-        for trial in partners(stack, one, state.trials)[: PARTNERS if k == 0 else 1]:
+        for trial in partner_trials(data, one, state.trials)[: MAX_PARTNERS if k == 0 else 1]:
             names = frozenset((*one.names, trial.suspect.name))
             if names not in tried:
                 tried.add(names)
                 yield f"refit with {' and '.join(sorted(names))}"
-                state.add(refitted(state.subject, stack, fit, evaluator, [*one.trials, trial], one.fit))
-    least = min(stack.chi_squared(one.fit.coefficients) for one in state.refits)
-    for two in pairs(stack, fit, state.trials, least, 2):
+                state.add(refit_with(state.subject, data, fit, evaluator, [*one.trials, trial], one.fit))
+    least = min(data.chi_squared(one.fit.coefficients) for one in state.refits)
+    for two in suspect_pairs(data, fit, state.trials, least, 2):
         names = frozenset(trial.suspect.name for trial in two)
         if names not in tried:
             tried.add(names)
             yield f"refit with {' and '.join(sorted(names))}"
-            state.add(refitted(state.subject, stack, fit, evaluator, two))
-    yield from _exchanged(state, nominal, evaluator)
+            state.add(refit_with(state.subject, data, fit, evaluator, two))
+    yield from _substituted_refits(state, nominal, evaluator)
 
 
-def _exchanged(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
-    """Each part of the best explanation exchanged for what can do the same: one of two may have been found first."""
+def _substituted_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
+    """Replace each effect of the best combination by effects that can reproduce its contribution."""
     best = min(state.refits, key=lambda one: one.excess)
     if len(best.trials) < 2:
         return
     tried = {frozenset(one.names) for one in state.refits}
     for part in best.trials:
         others = [trial for trial in best.trials if trial is not part]
-        for trial in substitutes(state.stack, evaluator, best, part, state.trials, SUBSTITUTES):
+        for trial in substitute_trials(state.data, evaluator, best, part, state.trials, MAX_SUBSTITUTES):
             names = frozenset(one.suspect.name for one in (*others, trial))
             if names not in tried:
                 yield f"refit with {' and '.join(sorted(names))}"
-                state.add(refitted(state.subject, state.stack, nominal.refit.fit, evaluator, [*others, trial]))
+                state.add(refit_with(state.subject, state.data, nominal.refit.fit, evaluator, [*others, trial]))
 
 
-def _solved(state: Assessment, nominal: Nominal, evaluator: Evaluator) -> bool:
-    """Whether an explanation leaves so little that none needs a partner; the best are continued until one does."""
-    enough = state.tolerable(nominal)
-    for k in np.argsort([one.excess for one in state.refits])[:CONTINUED]:
+def _continue_best(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> bool:
+    """Continue the best refits until one needs no second effect; return whether one does not."""
+    enough = state.partner_threshold(nominal)
+    for k in np.argsort([one.excess for one in state.refits])[:MAX_CONTINUED]:
         one = state.refits[k]
-        if not one.fit.converged and enough < one.excess < state.stack.policy.hopeful * nominal.refit.excess:
-            state.refits[k] = continued(state.subject, state.stack, evaluator, one)
-    return state.enough(nominal)
+        if not one.fit.converged and enough < one.excess < state.data.policy.worth_continuing * nominal.refit.excess:
+            state.refits[k] = continue_fit(state.subject, state.data, evaluator, one)
+    return state.is_explained(nominal)
 
 
-def _outdone(state: Assessment, nominal: Nominal, trial: Trial, best: Trial) -> bool:
-    """Whether a refit has explained so much already that a trial so much weaker in its score test cannot compete."""
-    if not state.refits or trial.gain > state.stack.policy.weaker * best.gain:
+def _is_outperformed(state: SearchState, nominal: Nominal, trial: Trial, best: Trial) -> bool:
+    """Whether ``trial`` is too weak to compete with a refit that has already explained the residual."""
+    policy = state.data.policy
+    if not state.refits or trial.gain > policy.weak_after_success * best.gain:
         return False
-    left = min(one.excess for one in state.refits)
-    return left <= max(state.stack.policy.solved * nominal.refit.excess, tolerated(state.stack, 0.0, 0.0))
+    least = min(one.excess for one in state.refits)
+    return least <= max(policy.explained_excess * nominal.refit.excess, tolerated_excess(state.data, 0.0, 0.0))
 
 
-def suspected(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
-    """The suspects that ``spec`` asks for; ValueError for one that the rig has not."""
+def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
+    """The suspects that ``spec`` requests; ValueError for one that the rig does not have."""
     known = {suspect.name: suspect for suspect in subject.suspects}
     for name in spec.suspects:
         if name not in known:
-            raise ValueError(f"unknown suspect {name!r}: take it out; for this rig there are {', '.join(known)}")
+            raise ValueError(f"unknown suspect {name!r}: remove it; this rig has {', '.join(known)}")
     return [suspect for name, suspect in known.items() if not spec.suspects or name in spec.suspects]

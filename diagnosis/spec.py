@@ -1,4 +1,4 @@
-"""What a user asks of a diagnosis, and how it reports on its way."""
+"""What a user requests of a diagnosis, and the progress that it reports."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ class DiagnosisSpec:
     """What to diagnose and how.
 
     Attributes:
-        calibration: the nominal model (division, preset, terms, effects that it has already) and what is fitted
-            (recordings, genes, fixed values, low-pass). Force axes: those named, else all that every recording has.
-        start: genome to begin with, such as a calibration's best; genes that it does not name start at their estimates.
+        calibration: the nominal model (discretisation, preset, terms, effects already in it) and what is fitted
+            (recordings, genes, fixed values, low-pass).
+        start: initial genes, such as a calibration's best; genes that it does not name start at their estimates.
         suspects: names of the effects to consider; empty means the whole library.
-        refine: whether the model may go to a finer division by itself where the division limits it.
-        refits: how many effects are refitted in full at most.
+        refine: whether the model may take a finer discretisation where the discretisation limits it.
+        refits: largest number of suspects that are refitted in full.
         axes: force axes to fit; empty means all that every recording has.
         policy: thresholds.
     """
@@ -36,7 +36,7 @@ class DiagnosisSpec:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a diagnosis is: the part of the work done, what it does now, individuals evaluated; last: the finding."""
+    """Fraction of the work done, current stage, individuals evaluated so far, and with the last report the finding."""
 
     fraction: float
     stage: str

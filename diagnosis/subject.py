@@ -1,6 +1,7 @@
-"""What a diagnosis needs of a rig: a model that can be extended, the suspects, a finer model, and where channels lie.
+"""What a diagnosis needs of a rig.
 
-The two rigs that are known are adapted in :mod:`wingfit.diagnosis.rigs`; any other that meets :class:`Subject` will do.
+The two known rigs are adapted in :mod:`wingfit.diagnosis.rigs`; any other rig that meets :class:`Subject` works as
+well.
 """
 
 from __future__ import annotations
@@ -23,44 +24,44 @@ Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measureme
 
 @dataclass(frozen=True)
 class Suspect:
-    """A piece of physics, or a fault of the measurement, that the nominal model lacks and that may be put in.
+    """An effect that is considered as missing: physics, or a fault of the measurement, that can be added to the model.
 
     Attributes:
-        name: by which :meth:`Subject.extended` puts it in.
-        title: for people.
-        family: physics, or "measurement".
-        genes: those it adds; all sizes at zero switch it off exactly.
-        sizes: names of the genes that are its size.
-        places: names of genes that say where on the wing it acts: "span" and "chord" in parts, or nothing.
-        typical: values of all its genes at which it is as large as it is met in practice.
-        source: where its law is from.
+        name: by which :meth:`Subject.extended` adds it.
+        title: display name.
+        family: kind of physics, or "measurement".
+        genes: those it adds; with all sizes at zero it is exactly off.
+        size_genes: names of the genes that are its size.
+        typical: values of all its genes for an effect as large as in practice.
+        source: reference of its law.
         signature: what it looks like in a recording.
-        alike: names of others that look like it.
-        spots: values of its shapes that are tried, in their order, where it acts at these only; else any are.
+        location_genes: names of the genes that give its location along "span" and "chord" (0 to 1), if any.
+        confused_with: names of suspects that look similar.
+        candidate_shapes: values of its shape genes that are tried; empty means that the screening chooses them.
     """
 
     name: str
     title: str
     family: Family
     genes: tuple[Gene, ...]
-    sizes: tuple[str, ...]
+    size_genes: tuple[str, ...]
     typical: Mapping[str, float]
     source: str
     signature: str
-    places: Mapping[Literal["span", "chord"], str]
-    alike: tuple[str, ...] = ()
-    spots: tuple[tuple[float, ...], ...] = ()
+    location_genes: Mapping[Literal["span", "chord"], str]
+    confused_with: tuple[str, ...] = ()
+    candidate_shapes: tuple[tuple[float, ...], ...] = ()
 
     @property
-    def shapes(self) -> tuple[str, ...]:
+    def shape_genes(self) -> tuple[str, ...]:
         """Names of the genes that are not its size."""
-        return tuple(gene.name for gene in self.genes if gene.name not in self.sizes)
+        return tuple(gene.name for gene in self.genes if gene.name not in self.size_genes)
 
 
-class Place(NamedTuple):
-    """Where a channel is measured: ``name`` of the marker or force axis, ``axis`` ("x", "y", "z"), place on the wing.
+class ChannelLocation(NamedTuple):
+    """Where a channel is measured: marker or force axis ``name``, direction ``axis`` ("x", "y", "z"), location.
 
-    ``span`` and ``chord`` in parts, ``x`` and ``y`` in m; None for a force.
+    ``span`` and ``chord`` from 0 to 1, ``x`` and ``y`` in m; None for a force.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Place(NamedTuple):
 
 
 class Subject(Protocol):
-    """A rig under diagnosis."""
+    """The rig under diagnosis: its nominal model, the suspects, finer models, and where its channels are measured."""
 
     @property
     def model(self) -> Model:
@@ -81,7 +82,7 @@ class Subject(Protocol):
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """All that may be put in."""
+        """All effects that can be added."""
         ...
 
     @property
@@ -90,38 +91,38 @@ class Subject(Protocol):
         ...
 
     @property
-    def told(self) -> str:
-        """The model in words."""
+    def description(self) -> str:
+        """The nominal model in one line for the user."""
         ...
 
     def extended(self, names: Sequence[str]) -> Model:
-        """The nominal model with suspects put in; their genes follow its own, switched off."""
+        """The nominal model with the named suspects added; their genes follow its own and are off."""
         ...
 
-    def beside(self, model: Model, genome: Array) -> Model:
-        """``model``, told that individuals will be near ``genome`` [G], so that it may begin its search there."""
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:
+        """``model``, whose search for the periodic motion starts from the motion of ``genome`` [G]."""
         ...
 
-    def finer(self) -> Sequence[Subject]:
-        """The same with finer divisions, cheapest first; none where there is none, or it would cost too much."""
+    def finer_subjects(self) -> Sequence[Subject]:
+        """The subject with finer discretisations, cheapest first; empty where there is none or its cost is too high."""
         ...
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
         """Where each channel of ``recording`` is measured."""
         ...
 
-    def origin(self, recording: Recording) -> float:
-        """Phase 2 pi f t (rad) of ``recording`` at which a beat begins."""
+    def beat_start_phase(self, recording: Recording) -> float:
+        """Phase 2 pi f t (rad) of ``recording`` at which a beat starts."""
         ...
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """What ``model`` with ``genome`` [G] shows under ``condition``, recorded as the rig does; None if it fails."""
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+        """What the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails."""
         ...
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
-        """What the nominal model with ``genome`` [G] answers to known loads; None for a rig that cannot be probed."""
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+        """Responses of the nominal model with ``genome`` [G] to unit loads; None for a rig that cannot be probed."""
         ...
 
-    def conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that one might record next."""
+    def candidate_conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rig can run and that could be recorded next."""
         ...

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from statistics import fmean
 
-from wingfit.diagnosis.evidence.intervals import reach
+from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
 from wingfit.report.layout import figure, folded, panels
 from wingfit.report.markup import Markup, joined, tag
@@ -45,7 +45,7 @@ WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
-NINETY = reach()
+NINETY = standard_errors()
 MOST_ROWS, MOST_COLUMNS = 32, 64
 MOST_LOADS, MOST_FOLDED = 6, 30  # recordings whose missing load is drawn, and drawn at least in folded details
 Pool = Callable[[Sequence[float]], float]

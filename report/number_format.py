@@ -123,13 +123,13 @@ def listed(items: Iterable[str], last: str = "and") -> str:
 def best_of(finding: Finding) -> Hypothesis | None:
     """The hypothesis of the "after" model, else the most probable one besides the nominal model."""
     others = [h for h in finding.hypotheses if h.effects]
-    put_in = [h for h in others if set(h.effects) == set(finding.put_in)]
+    put_in = [h for h in others if set(h.effects) == set(finding.added_effects)]
     return next(iter([*put_in, *others]), None)
 
 
 def stages(finding: Finding) -> dict[str, str]:
     """Names of the models compared: "before" and, where effects were added, "after"."""
-    if not finding.put_in:
+    if not finding.added_effects:
         return {"before": "nominal model, refitted"}
     after = "the named effects" if finding.named else "the closest of the library"  # short: titles of maps
     return {"before": "before: nominal model, refitted", "after": f"after: with {after}"}

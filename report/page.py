@@ -52,7 +52,7 @@ def _parts(finding: Finding) -> list[object]:
     return [
         *_verdict(finding),
         _section(
-            _VALIDATION if finding.put_in else "How well the model fits",
+            _VALIDATION if finding.added_effects else "How well the model fits",
             misfits.proof(finding),
             misfits.recordings(finding),
         ),
@@ -98,9 +98,10 @@ def _verdict(finding: Finding) -> list[object]:
 
 def _tiles(finding: Finding) -> Markup:
     scale = channel_scale(finding)
+    correlation = number(finding.floors.lag1_autocorrelation, 2)
     tiles = [
         ("Strength d", number(finding.strength), "residual of the refitted nominal model / noise"),
-        ("Noise", scale.text(finding.floors.noise), f"lag-1 autocorrelation {number(finding.floors.memory, 2)}"),
+        ("Noise", scale.text(finding.floors.noise), f"lag-1 autocorrelation {correlation}"),
         ("Floor", scale.text(finding.floors.total), "expected misfit of a correct model"),
     ]
     if finding.proof is not None and "after" in stages(finding):
@@ -108,7 +109,7 @@ def _tiles(finding: Finding) -> Markup:
         tiles.append(("Held-out misfit / floor", change, f"nominal model → with {added_effects(finding)}"))
     best = best_of(finding)
     if best is not None and finding.verdict != "adequate":
-        by = best.title if finding.put_in else f"{best.title}, the closest"
+        by = best.title if finding.added_effects else f"{best.title}, the closest"
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {by}"))
     shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
     return tag("dl", *shown, class_="tiles")
@@ -123,8 +124,8 @@ def _floors(finding: Finding) -> Markup:
         ("floor: root sum of squares of these", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
-    if floors.division is not None:
-        rows.insert(1, ("discretisation error, from a finer model", floors.division, "pale"))
+    if floors.discretisation is not None:
+        rows.insert(1, ("discretisation error, from a finer model", floors.discretisation, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
     along = Axis(0, 1.1 * most, 12, 348)
     bottom = 8 + 34.0 * len(rows)
@@ -134,7 +135,7 @@ def _floors(finding: Finding) -> Markup:
         wide = along.at(value * scale.factor) - along.at(0)
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="value"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
-    note = f"The finer model: {floors.finer}." if floors.division is not None else None
+    note = f"The finer model: {floors.finer}." if floors.discretisation is not None else None
     return figure(
         _floors_caption(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note
     )

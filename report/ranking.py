@@ -46,7 +46,7 @@ def caption(finding: Finding) -> str:
 
 
 def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
-    selected = finding.alike if finding.verdict == "ambiguous" else [finding.named]
+    selected = finding.indistinguishable if finding.verdict == "ambiguous" else [finding.named]
     named = bool(hypothesis.effects) and any(set(hypothesis.effects) == set(names) for names in selected)
     scale = channel_scale(finding)
     evidence = hypothesis.evidence / top if top > 0 else 0.0
@@ -107,10 +107,10 @@ def _table(hypotheses: list[Hypothesis], finding: Finding) -> Markup:
 
 
 def _alike(finding: Finding) -> Markup | None:
-    if not finding.alike:
+    if not finding.indistinguishable:
         return None
     known = titles(finding)
-    sets = [tag("li", listed((title_of(name, known) for name in names), "and")) for names in finding.alike]
+    sets = [tag("li", listed((title_of(name, known) for name in names), "and")) for names in finding.indistinguishable]
     return joined(tag("h3", "Not distinguishable by these recordings"), tag("ul", *sets, class_="plain"))
 
 

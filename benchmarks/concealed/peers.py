@@ -125,16 +125,16 @@ def features(
         model = refit.model.with_effects(suspect.name)  # type: ignore[attr-defined]
         base = np.array([refit.start.get(gene.name, suspect.typical.get(gene.name, 0.0)) for gene in model.genes])
         index = {gene.name: k for k, gene in enumerate(model.genes)}
-        base[[index[size] for size in suspect.sizes]] = 0.0
-        batch = np.tile(base, (1 + len(suspect.sizes), 1))
-        for k, size in enumerate(suspect.sizes, 1):
+        base[[index[size] for size in suspect.size_genes]] = 0.0
+        batch = np.tile(base, (1 + len(suspect.size_genes), 1))
+        for k, size in enumerate(suspect.size_genes, 1):
             batch[k, index[size]] = NUDGE * suspect.typical[size]
         found = [model.observe(batch, one) for one in ordered]
         if any(reason for one in found for reason in one.reasons):
             continue
         channels = np.concatenate([one.channels.reshape(len(batch), -1) for one in found], axis=1)
         columns += list(channels[1:] - channels[0])
-        names += [suspect.name] * len(suspect.sizes)
+        names += [suspect.name] * len(suspect.size_genes)
     return tuple(names), np.array(columns).T
 
 

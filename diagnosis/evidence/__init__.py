@@ -1,1 +1,1 @@
-"""The noise of a recording, fits of hypotheses, and score tests."""
+"""Whitened recordings, fits of hypotheses, and score tests."""

@@ -1,4 +1,4 @@
-"""Fits of suspects from the estimates: several run a race, and those that may still win go on."""
+"""Competing fits of suspects from the genes' estimates: those that can no longer win are stopped."""
 
 from __future__ import annotations
 
@@ -11,155 +11,163 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import unit_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import CRAWLING, UNFIT, Fit, gained_little, thoroughly
+from wingfit.diagnosis.evidence.fit import FIT_ERRORS, SLOW_FACTOR, Fit, gauss_newton_fit, small_gain
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial, size_columns
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated
+from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
 
 Array = npt.NDArray[np.float64]
 
-STEPS = 14  # of a fit
-RACE = 5  # of each, its start among them, before those that leave least go on
-SAME = 0.05  # of a box: fits of the same suspects as near as this are one
+MAX_STEPS = 14  # of a fit
+FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
+SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this near are the same
 
 
 @dataclass(frozen=True)
-class Entry:
-    """The nominal model with the suspects of ``trials``, whose genes begin at ``unit`` [E] in parts of their boxes."""
+class StartPoint:
+    """The nominal model with the suspects of ``trials``, their genes at ``unit`` [E] in unit coordinates."""
 
     trials: tuple[Trial, ...]
     unit: Array
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the suspects."""
+        """Names of the suspects."""
         return tuple(trial.suspect.name for trial in self.trials)
 
 
-def entries(trial: Trial, beside: Sequence[Trial] = (), refit: Refit | None = None) -> list[Entry]:
-    """A suspect of typical size where ``trial`` is, and at the typical place; ``beside`` it those of a ``refit``."""
+def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
+    """A suspect of typical size at the location of ``trial`` and at its typical location.
+
+    It is combined with the suspects ``others`` of ``refit``, which keep their fitted genes.
+    """
     suspect = trial.suspect
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     size = size_columns(suspect)
     own = trial.unit[0].copy()
     own[size] = typical[size]
-    starts = [own, typical] if suspect.places and not np.allclose(own, typical) else [own]
-    kept = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
-    known = [kept[gene.name] for one in beside for gene in one.suspect.genes]
-    return [Entry((*beside, trial), np.array([*known, *start])) for start in starts]
+    starts = [own, typical] if suspect.location_genes and not np.allclose(own, typical) else [own]
+    fitted = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
+    known = [fitted[gene.name] for one in others for gene in one.suspect.genes]
+    return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]
 
 
-def afresh(
+def fit_from_estimates(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     evaluator: Evaluator,
-    begun: Fit,
-    every: Sequence[Entry],
-    most: float,
-    wanted: float = np.inf,
-) -> Iterator[list[tuple[Entry, Fit]]]:
-    """``every`` entry fitted from the estimates, where ``begun`` is.
+    initial: Fit,
+    starts: Sequence[StartPoint],
+    limit: float,
+    target: float = np.inf,
+) -> Iterator[list[tuple[StartPoint, Fit]]]:
+    """Fit all ``starts`` from the estimates, the genes of ``initial``; yields the rivals of the best after every step.
 
-    Where the nominal fit ended its genes have taken up what they could of a suspect, and may not find back. All run for
-    RACE steps; then each that may still overtake the best goes on to its end. A fit ends early where it crawls and
-    leaves far more than the best (`Policy.rivalry`), or more than ``most`` (m^2 or N^2 beyond the noise). One that does
-    not lead also ends where it would leave as much, or more than is ``wanted``, even if it went on faster than it does
-    (`Policy.speed`); and where another has come to the same.
-    Yields all that do not leave as much after every step, the best first; nothing where none can be simulated.
+    At the nominal fit the genes have absorbed what they could of a suspect, and may not return. Every fit runs for
+    FIRST_STEPS; then each that can still overtake the best continues. A fit is stopped
+
+    - where it gains little and has far more excess than the best (`Policy.rivalry`), or more than ``limit`` (m^2
+      or N^2);
+    - where it does not lead and would end above one of these, or above ``target``, even with faster progress
+      (`Policy.acceleration`);
+    - where a fit of the same suspects has come to the same genes.
+
+    Yields nothing where none can be simulated.
     """
-    race = _Race(stack, most, wanted)
-    for entry in every:
-        race.enter(entry, _from_estimates(subject, stack, evaluator, begun, entry))
-        yield from race.run(RACE)
-    yield from race.run(STEPS + 1)  # the last is where it ended, with its slopes
+    fits = _CompetingFits(data, limit, target)
+    for start in starts:
+        fits.add(start, _from_estimates(subject, data, evaluator, initial, start))
+        yield from fits.run(FIRST_STEPS)
+    yield from fits.run(MAX_STEPS + 1)  # the last is where it ended, with its slopes
 
 
-class _Race:
-    """Fits that compete: each is given up where it crawls and leaves far more than the best, or than ``most``."""
+class _CompetingFits:
+    """Fits that compete; hopeless ones are stopped."""
 
-    def __init__(self, stack: Stack, most: float, wanted: float) -> None:
-        self.stack, self.most, self.wanted = stack, most, wanted
-        self.runners = list[_Runner]()
+    def __init__(self, data: WhitenedData, limit: float, target: float) -> None:
+        self.data, self.limit, self.target = data, limit, target
+        self.fits = list[_CompetingFit]()
 
-    def enter(self, entry: Entry, steps: Iterator[Fit]) -> None:
-        """One more."""
-        self.runners.append(_Runner(entry, steps))
+    def add(self, start: StartPoint, steps: Iterator[Fit]) -> None:
+        """Add the fit from ``start``."""
+        self.fits.append(_CompetingFit(start, steps))
 
-    def run(self, steps: int) -> Iterator[list[tuple[Entry, Fit]]]:
-        """All to as many ``steps``, those that leave least first; yields what is in front after each."""
-        for runner in sorted(self.runners, key=lambda one: one.cost):
-            while runner.taken < steps and not self._given_up(runner) and runner.step():
-                yield self._in_front()
+    def run(self, steps: int) -> Iterator[list[tuple[StartPoint, Fit]]]:
+        """Run all fits to ``steps`` steps, those with the lowest cost first; yields the rivals after each step."""
+        for fit in sorted(self.fits, key=lambda one: one.cost):
+            while fit.steps_taken < steps and not self._should_stop(fit) and fit.step():
+                yield self._rivals()
 
-    def _given_up(self, runner: _Runner) -> bool:
-        if len(runner.fits) < 2:
+    def _should_stop(self, fit: _CompetingFit) -> bool:
+        if len(fit.last_fits) < 2:
             return False
-        before, now = runner.fits
-        if gained_little(self.stack, before, now, CRAWLING) and self._left(runner) > min(self.most, self._behind()):
+        (before, now), excess, rivalry = fit.last_fits, self._excess(fit), self._rivalry_limit()
+        if small_gain(self.data, before, now, SLOW_FACTOR) and excess > min(self.limit, rivalry):
             return True
-        if runner.taken < RACE or self._left(runner) <= min(self._left(one) for one in self.runners):
+        if fit.steps_taken < FIRST_STEPS or excess <= min(self._excess(one) for one in self.fits):
             return False
-        return self._foreseen(runner) > min(self.wanted, self._behind()) or any(
-            self._left(other) <= self._left(runner) and other.at_the_same(runner) for other in self.runners
-        )
+        repeated = any(self._excess(other) <= excess and other.same_as(fit) for other in self.fits)
+        return self._expected_excess(fit) > min(self.target, rivalry) or repeated
 
-    def _foreseen(self, runner: _Runner) -> float:
-        """What a fit leaves in the end if it goes on faster than in its last step (`Policy.speed`)."""
-        before, now = (self.stack.excess(fit.coefficients) for fit in runner.fits)
+    def _expected_excess(self, fit: _CompetingFit) -> float:
+        """Excess at the last step if the fit progresses faster than in its latest step (`Policy.acceleration`)."""
+        before, now = (self.data.excess(one.coefficients) for one in fit.last_fits)
         if now <= 0.0 or now >= before:
             return now
-        return float(now * (now / before) ** (self.stack.policy.speed * (STEPS + 1 - runner.taken)))
+        return float(now * (now / before) ** (self.data.policy.acceleration * (MAX_STEPS + 1 - fit.steps_taken)))
 
-    def _left(self, runner: _Runner) -> float:
-        return self.stack.excess(runner.fits[-1].coefficients) if runner.fits else np.inf
+    def _excess(self, fit: _CompetingFit) -> float:
+        return self.data.excess(fit.last_fits[-1].coefficients) if fit.last_fits else np.inf
 
-    def _behind(self) -> float:
-        """What leaves more is no rival of the best; above what noise may make of nothing."""
-        return max(
-            self.stack.policy.rivalry * min(self._left(one) for one in self.runners), tolerated(self.stack, 0.0, 0.0)
-        )
+    def _rivalry_limit(self) -> float:
+        """Excess above which a fit is no rival of the best, and at least what noise may produce."""
+        least = min(self._excess(one) for one in self.fits)
+        return max(self.data.policy.rivalry * least, tolerated_excess(self.data, 0.0, 0.0))
 
-    def _in_front(self) -> list[tuple[Entry, Fit]]:
-        begun = sorted((one for one in self.runners if one.fits), key=lambda one: one.cost)
-        return [(one.entry, one.fits[-1]) for one in begun if one is begun[0] or self._left(one) <= self._behind()]
+    def _rivals(self) -> list[tuple[StartPoint, Fit]]:
+        first, *others = sorted((one for one in self.fits if one.last_fits), key=lambda one: one.cost)
+        rivals = [first, *(one for one in others if self._excess(one) <= self._rivalry_limit())]
+        return [(one.start, one.last_fits[-1]) for one in rivals]
 
 
 @dataclass
-class _Runner:
-    """A fit on its way, with its last two steps."""
+class _CompetingFit:
+    """A running fit with its last two steps."""
 
-    entry: Entry
+    start: StartPoint
     steps: Iterator[Fit]
-    fits: list[Fit] = field(default_factory=list)
-    taken: int = 0
+    last_fits: list[Fit] = field(default_factory=list)
+    steps_taken: int = 0
 
     @property
     def cost(self) -> float:
-        """Of the last step; infinite before the first."""
-        return self.fits[-1].cost if self.fits else np.inf
+        """Cost at the last step; infinite before the first."""
+        return self.last_fits[-1].cost if self.last_fits else np.inf
 
-    def at_the_same(self, other: _Runner) -> bool:
-        """Whether two fits of the same suspects, each begun, have come to the same."""
-        if self is other or self.entry.names != other.entry.names:
+    def same_as(self, other: _CompetingFit) -> bool:
+        """Whether two fits of the same suspects have come to the same genes."""
+        if self is other or self.start.names != other.start.names:
             return False
-        return bool(np.abs(self.fits[-1].unit - other.fits[-1].unit).max() <= SAME)
+        return bool(np.abs(self.last_fits[-1].unit - other.last_fits[-1].unit).max() <= SAME_FIT_DISTANCE)
 
     def step(self) -> bool:
-        """Whether there was another step."""
+        """Take a step; return whether there was one."""
         try:
-            self.fits = [*self.fits[-1:], next(self.steps)]
-        except (StopIteration, *UNFIT):
+            self.last_fits = [*self.last_fits[-1:], next(self.steps)]
+        except (StopIteration, *FIT_ERRORS):
             return False
-        self.taken += 1
+        self.steps_taken += 1
         return True
 
 
-def _from_estimates(subject: Subject, stack: Stack, evaluator: Evaluator, begun: Fit, entry: Entry) -> Iterator[Fit]:
-    """Fits of the nominal model with the suspects of ``entry``; CannotBeginError where they cannot begin."""
-    suspects = [trial.suspect for trial in entry.trials]
+def _from_estimates(
+    subject: Subject, data: WhitenedData, evaluator: Evaluator, initial: Fit, start: StartPoint
+) -> Iterator[Fit]:
+    """Fits of the nominal model with the suspects of ``start``; InitialSimulationError where it cannot be simulated."""
+    suspects = [trial.suspect for trial in start.trials]
     model = subject.extended([suspect.name for suspect in suspects])
-    free = (*begun.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
-    problem = Problem(model, stack.recordings, free, base_genome(model, begun.problem.base.as_dict()), stack.axes)
-    return thoroughly(subject, stack, problem, evaluator, np.concatenate([begun.unit, entry.unit]), STEPS)
+    free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
+    problem = Problem(model, data.recordings, free, base_genome(model, initial.problem.base.as_dict()), data.axes)
+    return gauss_newton_fit(subject, data, problem, evaluator, np.concatenate([initial.unit, start.unit]), MAX_STEPS)

@@ -1,8 +1,8 @@
-"""Fits in coefficients of the beat: Gauss-Newton in the box of the genes, with a Jacobian that learns on its way.
+"""Gauss-Newton fits of Fourier coefficients in the box of the genes, with a Jacobian that is updated or measured.
 
-A diagnosis refits a dozen extended models that differ little from the nominal one. Their Jacobian is taken over from
-it; only the columns of what was added are measured. Every step then improves it by what the step has shown (Broyden
-1965), and it is measured anew where it no longer foretells what a step does.
+A diagnosis refits a dozen extended models that differ little from the nominal one. They take over its Jacobian; only
+the columns of added genes are measured. Each step updates it (Broyden 1965), and it is measured again where it no
+longer predicts what a step does.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
 from wingfit.inference.differences import Outputs, differences
 from wingfit.inference.gauss_newton import Quadratic, Trials
@@ -24,27 +24,27 @@ from wingfit.inference.gauss_newton import Quadratic, Trials
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-PRIOR = 0.5  # standard deviation of a gene in parts of its box
-# Steps tried at once: a group of lanes. Damping by parts of each gene's own curvature (Marquardt 1963), about
-# the last good part, suits genes that are told one by one; damping by parts of the box (Levenberg 1944) leads along
-# the bent valleys of stiffnesses that make up for each other.
-TRIED = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
-FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # of each gene's curvature
+PRIOR_SD = 0.5  # standard deviation of a gene's prior, unit coordinates
+# Dampings tried at once, a group of lanes. Relative to each gene's own curvature (Marquardt 1963), about the last good
+# factor, they suit genes that are identifiable one by one; relative to the box (Levenberg 1944), they follow the curved
+# valleys of stiffnesses that compensate each other.
+DAMPING_FACTORS = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # relative to each gene's curvature
 SINGULAR = 1e-12  # of the largest curvature, added to every damping so that no curvature is singular
-GOOD = 0.6  # of the decrease that was promised: the Jacobian need not be measured anew
-SETTLED = 2e-3  # of chi-squared, as far as it counts: a fit ends where a step takes less
-SMALLEST = 0.3  # decrease of the cost that is worth another step
-CRAWLING = 5.0  # times that, below which a step is a small one: the valley is bent, or its slopes are not known well
-PROBE = 0.02  # of the box: how far along a step its bend is measured
-BESIDE = 0.05  # of a box: a motion as near as this is near enough to begin beside
-FAILED = 1e12  # coefficients of an individual that cannot be simulated count as this
+GOOD_STEP_RATIO = 0.6  # of the predicted decrease; below it the Jacobian is measured again
+RELATIVE_TOLERANCE = 2e-3  # of the weighted chi-squared; a fit has converged where a step gains less
+COST_TOLERANCE = 0.3  # least decrease of the cost that is worth another step
+SLOW_FACTOR = 5.0  # times that: a step that gains less is small, because the valley is curved or the slopes are inexact
+ACCELERATION_STEP = 0.02  # of the box: length along a step over which the second derivative is measured
+SAME_MOTION_DISTANCE = 0.05  # of the box: an initial motion of genes this near is reused
+FAILED_COEFFICIENT = 1e12  # coefficient of an individual that cannot be simulated
 
 
-class CannotBeginError(ValueError):
-    """The model cannot be simulated where a fit begins."""
+class InitialSimulationError(ValueError):
+    """The model cannot be simulated at the start of a fit."""
 
 
-UNFIT = (CannotBeginError, np.linalg.LinAlgError)  # ends one fit, and not a diagnosis
+FIT_ERRORS = (InitialSimulationError, np.linalg.LinAlgError)  # end one fit, not the diagnosis
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,15 @@ class Fit:
 
     Attributes:
         problem: the model with its free genes.
-        unit: [F] in parts of the boxes.
-        coefficients: [D] of the residuals there.
-        jacobian: [D, F] of the coefficients, per part of the box.
+        unit: [F] genes in unit coordinates (0 to 1 across each box).
+        coefficients: [D] of the residuals.
+        jacobian: [D, F] derivatives of the coefficients with the unit coordinates.
         residuals: per recording [T, C].
-        cost: surprise at what is left (`Stack.surprise` in `whitened_recordings.py`), and at the genes by their prior.
-        near: [F] whose motion individuals about this fit begin beside: its own, or that of one shortly before.
-        damping: last good one.
-        fresh: whether the Jacobian was measured there.
-        converged: whether it ended because nothing was to be gained.
+        cost: deviance of the coefficients plus the squared distance of the genes from their prior.
+        motion_genes: [F] genes whose motion is the initial motion of simulations near this fit.
+        damping: last good damping factor.
+        jacobian_measured: whether all columns were measured at this fit.
+        converged: whether the fit ended because no step gained enough.
     """
 
     problem: Problem
@@ -70,21 +70,21 @@ class Fit:
     jacobian: Array
     residuals: tuple[Array, ...]
     cost: float
-    near: Array
+    motion_genes: Array
     damping: float = FIRST_DAMPING
-    fresh: bool = False
+    jacobian_measured: bool = False
     converged: bool = False
 
     @property
     def values(self) -> dict[str, float]:
-        """Of the free genes."""
+        """Values of the free genes by name."""
         found = values_at(free_genes(self.problem), self.unit[None])[0]
         return dict(zip(self.problem.free, found.tolist(), strict=True))
 
 
-def fitted(
+def broyden_fit(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     problem: Problem,
     evaluator: Evaluator,
     start: Array,
@@ -93,151 +93,157 @@ def fitted(
     known: Flags | None = None,
     steps: int = 8,
 ) -> Fit:
-    """Fit the free genes from ``start`` [F]; CannotBeginError where that cannot be simulated.
+    """Fit the free genes from ``start`` [F] with Broyden updates; InitialSimulationError where it cannot be simulated.
 
-    ``jacobian`` [D, F] may be given where ``known`` [F]; the other columns are measured first, and again where a step
-    does not keep its promise; if that does not help, all are, once.
+    ``jacobian`` [D, F] is used in the columns ``known`` [F]; the others are measured first, and again where a step
+    gains much less than predicted. If that does not help, all columns are measured, once.
     """
-    look = _Look(subject, stack, problem, evaluator)
-    first = _at(look, start)
+    simulator = _Simulator(subject, data, problem, evaluator)
+    first = _initial_fit(simulator, start)
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
-    now = replace(_measured(look, replace(first, jacobian=own), ~columns), fresh=not columns.any())
-    again = [np.ones(len(start), bool)]
+    now = _measure_columns(simulator, replace(first, jacobian=own), ~columns)
+    now = replace(now, jacobian_measured=not columns.any())
+    pending = [np.ones(len(start), bool)]
     if columns.any() and not columns.all():
-        again.append(~columns)
+        pending.append(~columns)
     for _ in range(steps):
-        better, gain = _step(look, now)
+        better, gain = _step(simulator, now)
         if better is None:
-            if now.fresh or not again:
-                return replace(now, converged=now.fresh)
-            now = _measured(look, now, again.pop())
+            if now.jacobian_measured or not pending:
+                return replace(now, converged=now.jacobian_measured)
+            now = _measure_columns(simulator, now, pending.pop())
             continue
-        ends, now = _settles(stack, now, better, gain), better
+        ends, now = _converges(data, now, better, gain), better
         if ends:
             return replace(now, converged=True)
-        if gain < GOOD and again:
-            now = _measured(look, now, again.pop())
+        if gain < GOOD_STEP_RATIO and pending:
+            now = _measure_columns(simulator, now, pending.pop())
     return now
 
 
-def thoroughly(
-    subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, steps: int
+def gauss_newton_fit(
+    subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, steps: int
 ) -> Iterator[Fit]:
-    """The same with the Jacobian measured anew at every step, and where it ends; yields every step, the fit last.
+    """Fit with the Jacobian measured at every step and at the end; yields every step, the final fit last.
 
-    One-sided differences point the way until they lead no further, or hardly. Then they are central, and steps follow
-    the bend of the valley as well (geodesic acceleration: Transtrum and Sethna 2012, Sec. 3).
+    Differences are one-sided until steps gain little. Then they are central, and steps include geodesic acceleration
+    (Transtrum and Sethna 2012, Sec. 3), which follows a curved valley.
     """
-    look, every, bent = _Look(subject, stack, problem, evaluator), np.ones(len(start), bool), False
-    now = _measured(look, _at(look, start), every, 1)
+    simulator, every, accelerated = _Simulator(subject, data, problem, evaluator), np.ones(len(start), bool), False
+    now = _measure_columns(simulator, _initial_fit(simulator, start), every, 1)
     for _ in range(steps):
         yield now
-        better, gain = _step(look, now, bent=bent)
-        ends = better is None or _settles(stack, now, better, 1.0 if bent else gain)
-        if ends and bent:
-            yield replace(_measured(look, better, every), converged=True) if better else replace(now, converged=True)
+        better, gain = _step(simulator, now, accelerated=accelerated)
+        ends = better is None or _converges(data, now, better, 1.0 if accelerated else gain)
+        if ends and accelerated:
+            yield replace(_measure_columns(simulator, better, every) if better else now, converged=True)
             return
-        bent = bent or better is None or gained_little(stack, now, better, CRAWLING)
-        now = _measured(look, better or now, every, 2 if bent else 1)
-    yield now if bent else _measured(look, now, every)
+        accelerated = accelerated or better is None or small_gain(data, now, better, SLOW_FACTOR)
+        now = _measure_columns(simulator, better or now, every, 2 if accelerated else 1)
+    yield now if accelerated else _measure_columns(simulator, now, every)
 
 
-def measured(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit) -> Fit:
-    """``fit`` with all slopes measured where it ended: those that steps have learnt lead on, and make no intervals."""
-    if fit.fresh:
+def with_measured_jacobian(subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit) -> Fit:
+    """``fit`` with all columns of its Jacobian measured.
+
+    Broyden-updated columns are good enough for stepping, but not for confidence intervals.
+    """
+    if fit.jacobian_measured:
         return fit
-    return _measured(_Look(subject, stack, fit.problem, evaluator), fit, np.ones(len(fit.unit), bool))
+    return _measure_columns(_Simulator(subject, data, fit.problem, evaluator), fit, np.ones(len(fit.unit), bool))
 
 
-def _settles(stack: Stack, before: Fit, after: Fit, gain: float) -> bool:
-    """Whether a step gained so little, though it kept its promise, that no other is worth its cost."""
-    return gained_little(stack, before, after) and gain > GOOD / 2
+def _converges(data: WhitenedData, before: Fit, after: Fit, gain: float) -> bool:
+    """Whether a step gained too little, although nearly as much as predicted."""
+    return small_gain(data, before, after) and gain > GOOD_STEP_RATIO / 2
 
 
-def gained_little(stack: Stack, before: Fit, after: Fit, times: float = 1.0) -> bool:
-    """Whether the step gained no more than some ``times`` what makes one worth its cost."""
-    whole = stack.trust(before.coefficients) * stack.chi_squared(before.coefficients)
-    return before.cost - after.cost <= times * max(SMALLEST, SETTLED * whole)
+def small_gain(data: WhitenedData, before: Fit, after: Fit, times: float = 1.0) -> bool:
+    """Whether a step decreased the cost by at most ``times`` the gain that is worth a step."""
+    whole = data.likelihood_weight(before.coefficients) * data.chi_squared(before.coefficients)
+    return before.cost - after.cost <= times * max(COST_TOLERANCE, RELATIVE_TOLERANCE * whole)
 
 
-def _cost(stack: Stack, coefficients: Array, unit: Array) -> Array:
-    return np.asarray(stack.surprise(coefficients) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR**2)
+def _cost(data: WhitenedData, coefficients: Array, unit: Array) -> Array:
+    return np.asarray(data.deviance(coefficients) + ((unit - 0.5) ** 2).sum(axis=-1) / PRIOR_SD**2)
 
 
 @dataclass(frozen=True)
-class _Look:
-    """How a fit sees its problem."""
+class _Simulator:
+    """Simulates individuals of a fit's problem."""
 
     subject: Subject
-    stack: Stack
+    data: WhitenedData
     problem: Problem
     evaluator: Evaluator
 
-    def at(self, units: Array, near: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """As :meth:`diagnosis.evidence.whitened_recordings.Stack.evaluate`, for individuals [B, F] near another [F]."""
+    def at(self, units: Array, motion_genes: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
+        """Evaluate ``units`` [B, F], starting from the motion of ``motion_genes`` [F]; as WhitenedData.evaluate."""
         problem, genes = self.problem, free_genes(self.problem)
-        genome = problem.genomes(values_at(genes, near[None]))[0]
-        model = self.subject.beside(problem.model, genome)
+        genome = problem.genomes(values_at(genes, motion_genes[None]))[0]
+        model = self.subject.with_initial_motion(problem.model, genome)
         here = Problem(model, problem.recordings, problem.free, problem.base, problem.axes)
-        return self.stack.evaluate(here, self.evaluator, values_at(genes, units))
+        return self.data.evaluate(here, self.evaluator, values_at(genes, units))
 
 
-def _at(look: _Look, unit: Array) -> Fit:
-    found, reasons, residuals = look.at(unit[None], unit)
+def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
+    found, reasons, residuals = simulator.at(unit[None], unit)
     if reasons[0] is not None:
-        values = values_at(free_genes(look.problem), unit[None])[0]
-        told = ", ".join(f"{name} = {value:.4g}" for name, value in zip(look.problem.free, values, strict=True))
-        raise CannotBeginError(
-            f"the model cannot be simulated where the fit begins ({told}): {reasons[0]}; start from other genes, or "
-            "check the rig's estimates"
+        values = values_at(free_genes(simulator.problem), unit[None])[0]
+        values_text = ", ".join(
+            f"{name} = {value:.4g}" for name, value in zip(simulator.problem.free, values, strict=True)
         )
-    cost = float(_cost(look.stack, found[0], unit))
+        raise InitialSimulationError(
+            f"the model cannot be simulated at the start of the fit ({values_text}): {reasons[0]}; "
+            "start from other genes, or check the rig's estimates"
+        )
+    cost = float(_cost(simulator.data, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
-    return Fit(look.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, unit)
+    return Fit(simulator.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, unit)
 
 
-def _measured(look: _Look, fit: Fit, which: Flags, sides: int = 2) -> Fit:
-    """``fit`` with the columns ``which`` of its Jacobian measured by differences to one or two sides in the box."""
+def _measure_columns(simulator: _Simulator, fit: Fit, which: Flags, sides: int = 2) -> Fit:
+    """``fit`` with the columns ``which`` of its Jacobian measured by one-sided or central differences in the box."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
 
     def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        found, reasons, _ = look.at(units, fit.near)
+        found, reasons, _ = simulator.at(units, fit.motion_genes)
         return [found], reasons
 
     found = differences(simulate, fit.unit, columns, at=[fit.coefficients], sides=sides)
     jacobian = fit.jacobian.copy()
     jacobian[:, columns] = found.slopes[0]
-    return replace(fit, jacobian=jacobian, fresh=bool(which.all()))
+    return replace(fit, jacobian=jacobian, jacobian_measured=bool(which.all()))
 
 
-def _step(look: _Look, fit: Fit, *, bent: bool = False) -> tuple[Fit | None, float]:
-    """The best of several damped steps, its Jacobian improved by what they show, and gain over promise.
+def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tuple[Fit | None, float]:
+    """The best of several damped steps, with its updated Jacobian, and the ratio of actual to predicted decrease.
 
-    ``bent`` asks for steps along the bend of the valley as well.
+    ``accelerated``: try steps with geodesic acceleration as well. (None, 0) where no step decreases the cost.
     """
-    damped = _Damped(look.stack, fit)
+    damped = _DampedSteps(simulator.data, fit)
     moves = np.array([damped.move(d) for d in damped.dampings])
-    bends = np.zeros((len(moves), len(fit.coefficients)))
-    if bent:
-        every, bends = _bends(look, fit, moves[::2]), np.concatenate([bends, bends[::2]])
-        moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], every, strict=True)]])
-        bends[-len(every) :] = every
+    accelerations = np.zeros((len(moves), len(fit.coefficients)))
+    if accelerated:
+        added = _second_order(simulator, fit, moves[::2])
+        moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], added, strict=True)]])
+        accelerations = np.concatenate([accelerations, added])
     units = np.clip(fit.unit + moves, 0.0, 1.0)
-    promised = fit.cost - _cost(look.stack, fit.coefficients + moves @ fit.jacobian.T + bends, units)
-    if promised.max() <= 1e-9 * fit.cost:
+    predicted = fit.cost - _cost(simulator.data, fit.coefficients + moves @ fit.jacobian.T + accelerations, units)
+    if predicted.max() <= 1e-9 * fit.cost:
         return None, 0.0
-    found, reasons, residuals = look.at(units, fit.near)
+    found, reasons, residuals = simulator.at(units, fit.motion_genes)
     bad = np.array([reason is not None for reason in reasons])
-    after = _cost(look.stack, np.where(bad[:, None], FAILED, found), units)
-    trials = Trials.of(units, promised, fit.cost, after, reasons)
+    after = _cost(simulator.data, np.where(bad[:, None], FAILED_COEFFICIENT, found), units)
+    trials = Trials.of(units, predicted, fit.cost, after, reasons)
     k = trials.best()
     if k is None:
         return None, 0.0
     jacobian = fit.jacobian
-    for j in np.argsort(trials.decrease):  # the best last: what it shows holds exactly
+    for j in np.argsort(trials.decrease):  # the best last, so that the Jacobian reproduces it exactly
         if not bad[j]:
             jacobian = _broyden(jacobian, units[j] - fit.unit, found[j] - fit.coefficients)
     better = Fit(
@@ -247,37 +253,37 @@ def _step(look: _Look, fit: Fit, *, bent: bool = False) -> tuple[Fit | None, flo
         jacobian,
         tuple(r[k] for r in residuals),
         float(fit.cost - trials.decrease[k]),
-        fit.near if np.abs(units[k] - fit.near).max() <= BESIDE else units[k],
+        fit.motion_genes if np.abs(units[k] - fit.motion_genes).max() <= SAME_MOTION_DISTANCE else units[k],
         float(damped.own[k]) if k < len(damped.own) else fit.damping,
     )
     return better, trials.gain(k)
 
 
-class _Damped:
-    """Steps from a fit with several dampings: [S, F] of all, ``own`` by parts of each gene's own curvature."""
+class _DampedSteps:
+    """Steps from a fit with several ``dampings`` [S, F]; ``own``: factors relative to each gene's own curvature."""
 
-    def __init__(self, stack: Stack, fit: Fit) -> None:
-        white, self.slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
-        self.trust, self.unit, self.scale = stack.trust(fit.coefficients), fit.unit, stack.scale
-        curvature = self.trust * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR**2
-        self.quadratic = Quadratic(curvature, self.trust * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR**2)
-        self.own = np.clip(fit.damping * TRIED[0], LEAST_DAMPING, LARGEST_DAMPING)
-        by_box = np.outer(TRIED[1] / PRIOR**2, np.ones(len(fit.unit)))
+    def __init__(self, data: WhitenedData, fit: Fit) -> None:
+        white, self.slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
+        self.weight, self.unit, self.scale = data.likelihood_weight(fit.coefficients), fit.unit, data.scale
+        curvature = self.weight * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
+        self.quadratic = Quadratic(curvature, self.weight * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR_SD**2)
+        self.own = np.clip(fit.damping * DAMPING_FACTORS[0], LEAST_DAMPING, LARGEST_DAMPING)
+        by_box = np.outer(DAMPING_FACTORS[1] / PRIOR_SD**2, np.ones(len(fit.unit)))
         self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
-    def move(self, damping: Array, bend: Array | float = 0.0) -> Array:
-        """The step [F] with a ``damping`` [F], where coefficients change by ``bend`` [D] beside its slopes."""
-        bent = self.trust * self.slopes.T @ np.broadcast_to(bend / self.scale, len(self.scale))
-        return self.quadratic.step(self.unit, damping, self.quadratic.slope + bent)
+    def move(self, damping: Array, acceleration: Array | float = 0.0) -> Array:
+        """The step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
+        accelerated = self.weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
+        return self.quadratic.step(self.unit, damping, self.quadratic.slope + accelerated)
 
 
-def _bends(look: _Look, fit: Fit, moves: Array) -> Array:
-    """[S, D] of ``moves`` [S, F]: what coefficients change along each beside its slopes, by their second derivative."""
-    part = np.minimum(1.0, PROBE / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
-    found, reasons, _ = look.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.near)
-    bends = (found - fit.coefficients - part * moves @ fit.jacobian.T) / part**2
-    bends[[reason is not None for reason in reasons]] = 0.0
-    return np.asarray(bends)
+def _second_order(simulator: _Simulator, fit: Fit, moves: Array) -> Array:
+    """Second-order changes [S, D] of the coefficients along ``moves`` [S, F], by finite differences."""
+    part = np.minimum(1.0, ACCELERATION_STEP / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
+    found, reasons, _ = simulator.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.motion_genes)
+    accelerations = (found - fit.coefficients - part * moves @ fit.jacobian.T) / part**2
+    accelerations[[reason is not None for reason in reasons]] = 0.0
+    return np.asarray(accelerations)
 
 
 def _broyden(jacobian: Array, move: Array, change: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How well each gene is told: intervals from noise, and from what a model that is not perfect leaves."""
+"""Confidence intervals of genes from noise and from model error."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from wingfit.calibration.estimates.linearised import free_genes
-from wingfit.diagnosis.evidence.fit import PRIOR, Fit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import GeneValue, Interval
 
 Array = npt.NDArray[np.float64]
@@ -18,41 +18,44 @@ Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.9
 
 
-def reach(freedom: float = np.inf) -> float:
-    """Standard errors to either side that an interval of CONFIDENCE has, if they are known with so much ``freedom``."""
+def standard_errors(freedom: float = np.inf) -> float:
+    """Half-width of a CONFIDENCE interval in standard errors, for errors known with ``freedom`` degrees of freedom."""
     return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
-def covariance(stack: Stack, fit: Fit) -> Array:
-    """[F, F] of the genes in parts of their boxes.
+def covariance(data: WhitenedData, fit: Fit) -> Array:
+    """Covariance [F, F] of the genes in unit coordinates.
 
-    By noise, by what the model misses in a few independent pieces
-    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`), which is taken to be no less than the
-    tolerance, and the box as a weak prior. Of forces also the scatter of what each recording by itself asks for (a
-    sandwich with recordings as clusters: Liang and Zeger 1986).
+    It includes noise; the model error as a few independent samples (:meth:`WhitenedData.likelihood_weight`), no smaller
+    than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores (a sandwich with
+    recordings
+    as clusters: Liang and Zeger 1986).
     """
-    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
-    trust, recordings = min(stack.trust(fit.coefficients), stack.most_trust), len(stack.recordings)
-    prior = np.eye(len(fit.unit)) / PRIOR**2
-    meat = trust * slopes.T @ slopes + prior
+    white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
+    weight, recordings = (
+        min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight),
+        len(data.recordings),
+    )
+    prior = np.eye(len(fit.unit)) / PRIOR_SD**2
+    meat = weight * slopes.T @ slopes + prior
     bread = np.linalg.inv(meat)
-    if _clustered(stack) and recordings > 1:
-        scores = trust * np.array([slopes[part].T @ white[part] for part in stack.parts])
+    if _clustered(data) and recordings > 1:
+        scores = weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
         scores -= scores.mean(axis=0)
         meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
     return np.asarray(bread @ meat @ bread)
 
 
-def _clustered(stack: Stack) -> bool:
-    """Whether recordings are the only independent pieces: beats of a force differ in size with all their harmonics."""
-    return any(recording.kind == "forces" for recording in stack.recordings)
+def _clustered(data: WhitenedData) -> bool:
+    """Whether only recordings are independent: beats of a force differ in size with all their harmonics."""
+    return any(recording.kind == "forces" for recording in data.recordings)
 
 
-def gene_values(stack: Stack, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
-    """Values and 90 % intervals of the free genes; ``sizes`` names those that switch an effect off, with that value."""
-    errors = np.sqrt(np.diag(covariance(stack, fit)))
-    freedom = max(len(stack.recordings) - 1, 1) if _clustered(stack) else np.inf
-    wide = reach(freedom)
+def gene_values(data: WhitenedData, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
+    """Values and 90 % intervals of the free genes; ``sizes`` maps size genes to the value that is off."""
+    errors = np.sqrt(np.diag(covariance(data, fit)))
+    freedom = max(len(data.recordings) - 1, 1) if _clustered(data) else np.inf
+    wide = standard_errors(freedom)
     off = sizes or {}
     found = []
     for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):

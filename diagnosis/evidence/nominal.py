@@ -1,4 +1,4 @@
-"""The nominal model at its best: fitted, at a division that does not limit it."""
+"""The nominal model, fitted with a sufficient discretisation."""
 
 from __future__ import annotations
 
@@ -11,114 +11,118 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import Fit, thoroughly
-from wingfit.diagnosis.evidence.refit import Refit, again, ended, judged
+from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
+from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_at
 from wingfit.diagnosis.evidence.screen import Nuisance
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
 
 Array = npt.NDArray[np.float64]
 
-STEPS = 20
-ROUNDS = 3  # of refinement
+NOMINAL_STEPS = 20
+MAX_REFINEMENTS = 3  # successive finer discretisations
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """The nominal model fitted.
+    """The fitted nominal model.
 
     Attributes:
-        subject: with the division that was settled on.
+        subject: with the discretisation that was chosen.
         refit: its fit.
-        division: misfit (m or N) that its division leaves, by the next finer one; None where there is none.
-        finer: in words.
-        innocent: finer division, in words, that was fitted and hardly did better, so that it is not the division that
-            limits; "" where there is none.
-        remarks: for the reader.
+        discretisation_error: misfit (m or N) by the discretisation, from the next finer one; None where there is none.
+        finer: description of the next finer one.
+        remarks: for the user.
+        tried_finer: description of a finer discretisation that was fitted with little gain; it shows that
+            discretisation is not the cause of the residual. "" where none was fitted.
     """
 
     subject: Subject
     refit: Refit
-    division: float | None
+    discretisation_error: float | None
     finer: str
     remarks: tuple[str, ...]
-    innocent: str = ""
+    tried_finer: str = ""
 
 
-def first_fit(
+def fit_nominal(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     evaluator: Evaluator,
     free: tuple[str, ...],
     values: Mapping[str, float],
     fixed: Mapping[str, float],
 ) -> Iterator[Fit]:
-    """Fit the ``free`` genes from ``values``, step by step; ValueError where the model cannot be simulated there."""
+    """Fit the ``free`` genes from ``values``; yields every step. ValueError where that cannot be simulated."""
     base = base_genome(subject.model, {**values, **fixed})
-    problem = Problem(subject.model, stack.recordings, free, base, stack.axes)
+    problem = Problem(subject.model, data.recordings, free, base, data.axes)
     genes = free_genes(problem)
     start = unit_at(genes, np.array([base[gene.name] for gene in genes]))
-    return thoroughly(subject, stack, problem, evaluator, start, STEPS)
+    return gauss_newton_fit(subject, data, problem, evaluator, start, NOMINAL_STEPS)
 
 
-def settled(subject: Subject, stack: Stack, evaluator: Evaluator, fit: Fit, *, refine: bool) -> Nominal:
-    """Go to finer divisions while these fit much better, and say what the last one's division leaves."""
-    now, remarks = judged(stack, fit), list[str]()
-    for _ in range(ROUNDS):
-        left, finest, better, tried = 0.0, "", None, ""
-        for finer in subject.finer():
-            changes, takes = leaves(finer, stack, evaluator, now)
-            if changes <= left:
+def choose_discretisation(
+    subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit, *, refine: bool
+) -> Nominal:
+    """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
+    current, remarks = make_refit(data, fit), list[str]()
+    for _ in range(MAX_REFINEMENTS):
+        error, finest, ineffective, better = 0.0, "", "", None
+        for finer in subject.finer_subjects():
+            changes, gain = finer_change(finer, data, evaluator, current)
+            if changes <= error:
                 continue
-            left, finest, tried = changes, finer.told, ""
-            if refine and promises(stack, changes, takes, now):
-                found = again(finer, stack, evaluator, now)
-                better = ended(finer, stack, evaluator, found) if found and improves(stack, found, now) else None
-                tried = finer.told if found is not None else ""
-            if better is not None:
-                break
+            error, finest, ineffective = changes, finer.description, ""
+            if refine and finer_is_promising(data, changes, gain, current):
+                found = refit_at(finer, data, evaluator, current)
+                ineffective = finer.description if found else ""
+                if found and improves(data, found, current):
+                    better = fit_to_convergence(finer, data, evaluator, found)
+                    break
         if better is None:
-            return Nominal(subject, now, left if finest else None, finest, tuple(remarks), tried)
+            return Nominal(subject, current, error if finest else None, finest, tuple(remarks), ineffective)
         remarks.append(
-            f"the division limits the model: {finest} leaves {_percent(better.excess, now.excess)} of the excess "
-            f"misfit that {subject.told} leaves, and was taken instead"
+            f"the discretisation limits the model: {finest} replaces {subject.description} and reduces the excess "
+            f"misfit to {_percent(better.excess, current.excess)}"
         )
-        subject, now = finer, better
-    return Nominal(subject, now, None, "", tuple(remarks))
+        subject, current = finer, better
+    return Nominal(subject, current, None, "", tuple(remarks))
 
 
-def promises(stack: Stack, changes: float, takes: float, now: Refit) -> bool:
-    """Whether a division that ``changes`` as much (m or N) and ``takes`` such a part of a misfit is worth a fit.
+def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:
+    """Whether a finer discretisation is worth a fit.
 
-    Of one that changes more than the whole misfit the linearised model knows nothing.
+    ``changes`` (m or N) is the change that it makes, ``gain`` the fraction of the excess that it is predicted to
+    remove. A linearised prediction does not hold where the change exceeds the whole residual.
     """
-    policy = stack.policy
-    matters = changes >= policy.finer_matters * stack.noise and now.excess >= (policy.finer_limit * stack.noise) ** 2
-    return matters and (takes > policy.finer_promise or changes**2 >= now.excess)
+    policy = data.policy
+    matters = changes >= policy.finer_matters * data.noise and current.excess >= (policy.finer_limit * data.noise) ** 2
+    return matters and (gain > policy.finer_predicted_gain or changes**2 >= current.excess)
 
 
-def leaves(finer: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
-    """What the finer model says differently and the genes cannot make up for: root mean square (m or N).
+def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
+    """Change by a finer model that the genes cannot compensate (root mean square, m or N), and the gain.
 
-    And which part of the misfit that would take away, as far as the linearised model knows; zeros if it fails.
+    The gain is the fraction of the excess that the change removes by the linearised model; zeros where the simulation
+    fails.
     """
     fit = refit.fit
-    problem = Problem(finer.extended(refit.names), stack.recordings, fit.problem.free, fit.problem.base, stack.axes)
-    found, reasons, _ = stack.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+    problem = Problem(finer.extended(refit.names), data.recordings, fit.problem.free, fit.problem.base, data.axes)
+    found, reasons, _ = data.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
     if reasons[0] is not None:
         return 0.0, 0.0
-    nuisance = Nuisance(stack, fit)
-    rest, left = nuisance.rest(found[0] - fit.coefficients), nuisance.left
-    power = float(rest @ rest)
-    amount = float(np.clip(-(rest @ left) / max(power, 1e-300), 0.0, stack.policy.division_factor))
-    excess = max(float(left @ left) - len(left), 1e-300)
-    taken = (float(left @ left) - float(np.sum((left + amount * rest) ** 2))) / excess
-    return float(np.sqrt(stack.weight @ (rest[: len(stack.scale)] * stack.scale) ** 2)), taken
+    nuisance = Nuisance(data, fit)
+    change, residual = nuisance.project_out(found[0] - fit.coefficients), nuisance.residual
+    power = float(change @ change)
+    amount = float(np.clip(-(change @ residual) / max(power, 1e-300), 0.0, data.policy.discretisation_factor))
+    excess = max(float(residual @ residual) - len(residual), 1e-300)
+    gain = (float(residual @ residual) - float(np.sum((residual + amount * change) ** 2))) / excess
+    return float(np.sqrt(data.weight @ (change[: len(data.scale)] * data.scale) ** 2)), gain
 
 
-def improves(stack: Stack, finer: Refit, coarse: Refit) -> bool:
-    """Whether a finer division takes away so much of the excess that it is worth its cost."""
-    return finer.excess < (1.0 - stack.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
+def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
+    """Whether ``finer`` removes so much of the excess of ``coarse`` that it is worth its cost."""
+    return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
 
 
 def _percent(part: float, whole: float) -> str:

@@ -1,4 +1,4 @@
-"""Full refits of the strongest suspects, alone and together, and what they predict of recordings left out."""
+"""Full refits of the strongest suspects, alone and together, and their cross-validation."""
 
 from __future__ import annotations
 
@@ -12,30 +12,36 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import PRIOR, UNFIT, Fit, fitted, measured, thoroughly
+from wingfit.diagnosis.evidence.fit import (
+    FIT_ERRORS,
+    PRIOR_SD,
+    Fit,
+    broyden_fit,
+    gauss_newton_fit,
+    with_measured_jacobian,
+)
 from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
 from wingfit.inference.score_test import explained
 
 Array = npt.NDArray[np.float64]
 
-STEPS = 6  # of a refit
-FURTHER = 10  # of one that is continued
-LAST = 20  # of the best, to its end
-PARTNERS = 4  # tried beside the best, and as pairs without it
-HALVINGS = 3  # of a start that cannot be simulated
+REFIT_STEPS = 6  # of a refit
+CONTINUED_STEPS = 10  # of a refit that is continued
+FINAL_STEPS = 20  # of the best hypothesis, until it converges
+MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
 @dataclass(frozen=True)
 class Refit:
-    """The nominal model with suspects put in, fitted in full.
+    """The nominal model with suspects added, fitted in full.
 
     Attributes:
-        trials: the trial that each suspect began from; empty for the nominal model.
+        trials: the trial from which each suspect started; empty for the nominal model.
         fit: the fit.
-        excess: mean square beyond the noise that it leaves, m^2 or N^2.
-        predicted: the same for each recording when the others were fitted, averaged; None with a single recording.
+        excess: mean square beyond the noise, m^2 or N^2.
+        predicted: the same cross-validated, recordings left out one at a time; None with a single recording.
     """
 
     trials: tuple[Trial, ...]
@@ -45,228 +51,238 @@ class Refit:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the suspects."""
+        """Names of the suspects."""
         return tuple(trial.suspect.name for trial in self.trials)
 
     @property
     def freedom(self) -> int:
-        """Genes that the suspects add."""
+        """Number of genes that the suspects add."""
         return sum(trial.freedom for trial in self.trials)
 
 
-def judged(stack: Stack, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
-    """``fit`` with what it leaves and predicts."""
-    return Refit(tuple(trials), fit, stack.excess(fit.coefficients), left_out(stack, fit))
+def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
+    """``fit`` with its excess, fitted and cross-validated."""
+    return Refit(tuple(trials), fit, data.excess(fit.coefficients), cross_validated_excess(data, fit))
 
 
-def left_out(stack: Stack, fit: Fit) -> float | None:
-    """Mean square beyond the noise in each recording when the others alone were fitted, by the linearised model.
+def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
+    """Mean square beyond the noise of each recording when only the others are fitted, by the linearised model.
 
-    Genes move about the fit with a prior: what only one recording can tell is no fault of the explanation, nor is what
-    noise in the others makes of a prediction.
+    A prior limits how far genes move, and the move that noise in the other recordings makes is allowed for: neither a
+    gene that only one recording identifies nor noise counts against the hypothesis. None for a single recording.
     """
-    if len(stack.recordings) < 2:
+    if len(data.recordings) < 2:
         return None
-    white, slopes = fit.coefficients / stack.scale, fit.jacobian / stack.scale[:, None]
-    grams = [slopes[part].T @ slopes[part] for part in stack.parts]
-    scores = [slopes[part].T @ white[part] for part in stack.parts]
-    trust, prior = stack.trust(fit.coefficients), (fit.unit - 0.5) / PRIOR**2
-    gram = trust * sum(grams) + np.eye(len(fit.unit)) * (stack.policy.gene_freedom**-2 + PRIOR**-2)
-    score = trust * sum(scores) + prior
+    white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
+    grams = [slopes[part].T @ slopes[part] for part in data.recording_slices]
+    scores = [slopes[part].T @ white[part] for part in data.recording_slices]
+    likelihood_weight, prior = data.likelihood_weight(fit.coefficients), (fit.unit - 0.5) / PRIOR_SD**2
+    gram = likelihood_weight * sum(grams) + np.eye(len(fit.unit)) * (data.policy.gene_freedom**-2 + PRIOR_SD**-2)
+    score = likelihood_weight * sum(scores) + prior
     total = 0.0
-    for r, part in enumerate(stack.parts):
-        others, spread = sum(grams) - grams[r], np.linalg.inv(gram - trust * grams[r])
-        move = np.clip(fit.unit - spread @ (score - trust * scores[r]), 0.0, 1.0) - fit.unit
+    for r, part in enumerate(data.recording_slices):
+        others, spread = sum(grams) - grams[r], np.linalg.inv(gram - likelihood_weight * grams[r])
+        move = np.clip(fit.unit - spread @ (score - likelihood_weight * scores[r]), 0.0, 1.0) - fit.unit
         here, own = fit.coefficients[part], fit.jacobian[part]
-        weight = stack.weight[part]
+        weight = data.weight[part]
         worse = float(weight @ ((here + own @ move) ** 2 - here**2))
-        noisy = trust**2 * spread @ others @ spread
+        noisy = likelihood_weight**2 * spread @ others @ spread
         by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
-        total += float(weight @ (here**2 - stack.variance[part])) + max(
-            worse - stack.policy.prediction_noise * by_noise, 0.0
+        total += float(weight @ (here**2 - data.variance[part])) + max(
+            worse - data.policy.prediction_noise * by_noise, 0.0
         )
     return total
 
 
-def refitted(
-    subject: Subject, stack: Stack, nominal: Fit, evaluator: Evaluator, trials: Sequence[Trial], base: Fit | None = None
+def refit_with(
+    subject: Subject,
+    data: WhitenedData,
+    nominal: Fit,
+    evaluator: Evaluator,
+    trials: Sequence[Trial],
+    base: Fit | None = None,
 ) -> Refit | None:
-    """Fit the nominal model with the suspects of ``trials``, each beginning at its trial's place and size.
+    """Fit the nominal model with the suspects of ``trials``, each from its trial's location and size.
 
-    ``base`` is a fit that contains all but the last of them already. None where no start can be simulated.
+    ``base`` is a fit that contains all but the last of them. None where no start can be simulated.
     """
     before = base or nominal
     model = subject.extended([trial.suspect.name for trial in trials])
     added = [trials[-1]] if base else list(trials)
     genes = [(gene.name, trial) for trial in added for gene in trial.suspect.genes]
     values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
-    problem = Problem(
-        model, stack.recordings, (*before.problem.free, *(g for g, _ in genes)), base_genome(model, values), stack.axes
-    )
-    for part in 0.5 ** np.arange(HALVINGS):
-        start = np.concatenate([before.unit, *(_scaled(trial, part) for trial in added)])
+    free = (*before.problem.free, *(name for name, _ in genes))
+    problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
+    for part in 0.5 ** np.arange(MAX_HALVINGS):
+        start = np.concatenate([before.unit, *(_scaled_start(trial, part) for trial in added)])
         try:
-            fit = _widened(subject, stack, problem, evaluator, start, before)
-        except UNFIT:
+            fit = _fit_added_genes(subject, data, problem, evaluator, start, before)
+        except FIT_ERRORS:
             continue
-        sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.sizes for gene, trial in genes])
-        astray = stack.chi_squared(fit.coefficients) > stack.policy.astray * trials[0].leaves
-        if len(trials) == 1 and astray and not sizes.all():
-            with suppress(*UNFIT):
-                first = _some(subject, stack, problem, evaluator, start, before, sizes)
-                first = _widened(subject, stack, problem, evaluator, first.unit, first)
+        sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.size_genes for gene, trial in genes])
+        diverged = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
+        if len(trials) == 1 and diverged and not sizes.all():
+            with suppress(*FIT_ERRORS):
+                first = _fit_subset(subject, data, problem, evaluator, start, before, sizes)
+                first = _fit_added_genes(subject, data, problem, evaluator, first.unit, first)
                 fit = min((fit, first), key=lambda one: one.cost)
-        return judged(stack, fit, trials)
+        return make_refit(data, fit, trials)
     return None
 
 
-def _widened(subject: Subject, stack: Stack, problem: Problem, evaluator: Evaluator, start: Array, before: Fit) -> Fit:
-    """Fit all genes of ``problem``; the slopes of the first of them are those of ``before``."""
+def _fit_added_genes(
+    subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, before: Fit
+) -> Fit:
+    """Fit all genes of ``problem``; the first columns of the Jacobian are those of ``before``."""
     known = np.arange(len(start)) < before.jacobian.shape[1]
     jacobian = np.zeros((len(before.jacobian), len(start)))
     jacobian[:, known] = before.jacobian[:, : known.sum()]
-    return fitted(subject, stack, problem, evaluator, start, jacobian, known=known, steps=STEPS)
+    return broyden_fit(subject, data, problem, evaluator, start, jacobian, known=known, steps=REFIT_STEPS)
 
 
-def _some(
+def _fit_subset(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     problem: Problem,
     evaluator: Evaluator,
     start: Array,
     before: Fit,
     which: npt.NDArray[np.bool_],
 ) -> Fit:
-    """Fit the genes ``which`` [F] of ``problem`` alone; the others stay where they start, with slopes of zero.
+    """Fit the genes ``which`` [F] of ``problem`` only; the others stay at ``start``, with zero slopes.
 
-    A shape that moves before its size is known may be led astray.
+    Shape genes that move before the size is known may diverge.
     """
     genes = free_genes(problem)
     base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
     free = tuple(name for name, one in zip(problem.free, which, strict=True) if one)
     part = Problem(problem.model, problem.recordings, free, base, problem.axes)
-    found = _widened(subject, stack, part, evaluator, start[which], before)
+    found = _fit_added_genes(subject, data, part, evaluator, start[which], before)
     unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
     unit[which], jacobian[:, which] = found.unit, found.jacobian
     return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
 
 
-def again(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit | None:
-    """The same fitted with another subject's model, from where it ended; None where that cannot be simulated."""
+def refit_at(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
+    """``refit`` fitted with the model of ``subject`` from its current genes; None where that cannot be simulated."""
     before = refit.fit
     model = subject.extended(refit.names)
-    problem = Problem(model, stack.recordings, before.problem.free, before.problem.base, stack.axes)
+    problem = Problem(model, data.recordings, before.problem.free, before.problem.base, data.axes)
     known = np.ones(len(before.unit), bool)
     try:
-        fit = fitted(subject, stack, problem, evaluator, before.unit, before.jacobian, known=known, steps=STEPS)
-    except UNFIT:
+        fit = broyden_fit(
+            subject, data, problem, evaluator, before.unit, before.jacobian, known=known, steps=REFIT_STEPS
+        )
+    except FIT_ERRORS:
         return None
-    return judged(stack, fit, refit.trials)
+    return make_refit(data, fit, refit.trials)
 
 
-def continued(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, steps: int = FURTHER) -> Refit:
-    """``refit`` fitted further, with all slopes measured at every step; as it is where that cannot be simulated.
+def continue_fit(
+    subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, steps: int = CONTINUED_STEPS
+) -> Refit:
+    """``refit`` fitted further with the Jacobian measured at every step; unchanged where that cannot be simulated.
 
-    An individual that was reached beside another may flutter when it begins from rest.
+    An individual that was reached from a nearby motion may flutter when it is simulated from rest.
     """
     fit = refit.fit
     try:
-        for better in thoroughly(subject, stack, fit.problem, evaluator, fit.unit, steps):
+        for better in gauss_newton_fit(subject, data, fit.problem, evaluator, fit.unit, steps):
             fit = better
-    except UNFIT:
+    except FIT_ERRORS:
         return refit
-    return judged(stack, fit, refit.trials)
+    return make_refit(data, fit, refit.trials)
 
 
-def ended(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit) -> Refit:
-    """``refit`` to its end, with all slopes measured there: what suspects are tried about."""
+def fit_to_convergence(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit:
+    """``refit`` fitted until it converges, with a measured Jacobian; score tests need that."""
     if not refit.fit.converged:
-        refit = continued(subject, stack, evaluator, refit)
-    return judged(stack, measured(subject, stack, evaluator, refit.fit), refit.trials)
+        refit = continue_fit(subject, data, evaluator, refit)
+    return make_refit(data, with_measured_jacobian(subject, data, evaluator, refit.fit), refit.trials)
 
 
-def resumed(subject: Subject, stack: Stack, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
-    """``refit`` fitted anew from other genes ``start`` [F]; None where these cannot be simulated."""
+def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
+    """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
     try:
-        return judged(stack, fitted(subject, stack, refit.fit.problem, evaluator, start, steps=STEPS), refit.trials)
-    except UNFIT:
+        fit = broyden_fit(subject, data, refit.fit.problem, evaluator, start, steps=REFIT_STEPS)
+    except FIT_ERRORS:
         return None
+    return make_refit(data, fit, refit.trials)
 
 
-def worth_a_refit(stack: Stack, found: Sequence[list[Trial]], most: int) -> list[Trial]:
-    """The best trial of each suspect worth a refit (`Policy.worth_refit`), strongest first."""
-    policy = stack.policy
+def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
+    """The best trial of each suspect that is worth a refit (`Policy.worth_refit`), strongest first."""
+    policy = data.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
-    return [trial for trial in best[:most] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
+    return [trial for trial in best[:limit] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
-def partners(stack: Stack, base: Refit, found: Sequence[list[Trial]], most: int = PARTNERS) -> list[Trial]:
-    """Trials that would take most of what ``base`` leaves, by their fields about the nominal fit; strongest first."""
-    nuisance = Nuisance(stack, base.fit)
-    left = nuisance.left
-    worth = stack.policy.partner_gain * (float(left @ left) - len(left))
-    return [trial for gain, trial in _takers(nuisance, left, found, base.names)[:most] if gain > worth]
+def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]) -> list[Trial]:
+    """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
+    nuisance = Nuisance(data, base.fit)
+    residual = nuisance.residual
+    least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
+    return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names) if gain > least_gain]
 
 
-def action(stack: Stack, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
-    """What switching off the suspects of ``trials`` (all, if none is given) changes of the coefficients [D].
+def contribution(data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
+    """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
 
-    All other genes stay as they are. None where that cannot be simulated.
+    All other genes stay the same. None where that cannot be simulated.
     """
     fit, off = refit.fit, dict(refit.fit.values)
     for trial in trials or refit.trials:
-        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.sizes}
-    found, reasons, _ = stack.evaluate(fit.problem, evaluator, np.array([list(off.values())]))
+        off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.size_genes}
+    found, reasons, _ = data.evaluate(fit.problem, evaluator, np.array([list(off.values())]))
     return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
 
 
-def substitutes(
-    stack: Stack, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], most: int
+def substitute_trials(
+    data: WhitenedData, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
 ) -> list[Trial]:
-    """Trials of other suspects that can do nearly all of what one of those of ``refit`` does; the likest first."""
-    change = action(stack, evaluator, refit, [trial])
+    """Trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``, best first."""
+    change = contribution(data, evaluator, refit, [trial])
     if change is None:
         return []
     own = {gene.name for gene in trial.suspect.genes}
     kept = np.array([name not in own for name in refit.fit.problem.free])
-    nuisance = Nuisance(stack, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
-    done = nuisance.rest(change)
-    worth = stack.policy.substitute * float(done @ done)
-    return [one for gain, one in _takers(nuisance, done, found, refit.names)[:most] if gain > worth]
+    nuisance = Nuisance(data, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
+    done = nuisance.project_out(change)
+    least_gain = data.policy.substitute * float(done @ done)
+    return [one for gain, one in _by_explained(nuisance, done, found, refit.names)[:limit] if gain > least_gain]
 
 
-def _takers(
+def _by_explained(
     nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
 ) -> list[tuple[float, Trial]]:
-    """Of each suspect but the ``known`` the trial that takes most of a ``misfit``, with how much; strongest first."""
+    """The trial of each suspect not ``known`` that explains most of ``misfit``, with the decrease; strongest first."""
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
-            gains = [explained(nuisance.rest(trial.fields), misfit) for trial in trials]
+            gains = [explained(nuisance.project_out(trial.changes), misfit) for trial in trials]
             k = int(np.argmax(gains))
             best.append((gains[k], trials[k]))
     return sorted(best, key=lambda pair: -pair[0])
 
 
-def pairs(
-    stack: Stack, nominal: Fit, found: Sequence[list[Trial]], beyond: float, most: int = PARTNERS
+def suspect_pairs(
+    data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, limit: int
 ) -> Iterator[tuple[Trial, Trial]]:
-    """Pairs of suspects that together would leave less than a chi-squared of ``beyond``, best first."""
-    nuisance = Nuisance(stack, nominal)
-    left = nuisance.left
+    """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
+    nuisance = Nuisance(data, nominal)
+    residual = nuisance.residual
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
-    own = [nuisance.rest(trial.fields) for trial in best]
-    scored = [
-        (explained(np.vstack([own[i], own[j]]), left), best[i], best[j]) for i in range(len(best)) for j in range(i)
-    ]
+    own = [nuisance.project_out(trial.changes) for trial in best]
+    indices = [(i, j) for i in range(len(best)) for j in range(i)]
+    scored = [(explained(np.vstack([own[i], own[j]]), residual), best[i], best[j]) for i, j in indices]
     scored.sort(key=lambda triple: -triple[0])
-    for gain, one, other in scored[:most]:
-        if float(left @ left) - gain < beyond:
+    for gain, one, other in scored[:limit]:
+        if float(residual @ residual) - gain < beyond:
             yield (one, other) if one.gain >= other.gain else (other, one)
 
 
-def _scaled(trial: Trial, part: float) -> Array:
-    """Start of the suspect's genes with its size at ``part`` of what the trial says."""
+def _scaled_start(trial: Trial, part: float) -> Array:
+    """Initial genes of the suspect with its size multiplied by ``part``."""
     start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
     start[size] = off[size] + part * (start[size] - off[size])
     return start

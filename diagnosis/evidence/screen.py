@@ -1,8 +1,8 @@
-"""The score test of every suspect: how much of the misfit it would take, the nominal genes free to adapt.
+"""The score test of every suspect: how much of the residual it would explain, the nominal genes free to adapt.
 
-A suspect is put in at the sizes at which it is met in practice, at several places and shapes, and the changes that this
-makes to the simulated recordings are fitted to what is left, after what the nominal genes can do has been taken out of
-both (a score test with nuisance parameters: Rao 1948; here with finite sizes: many effects have no slope at zero).
+A suspect is added at typical sizes, at several locations and shapes. The changes that it makes to the simulated
+recordings are fitted to the residual, after what the nominal genes can explain has been projected out of both (a score
+test with nuisance parameters: Rao 1948; with finite sizes, because many effects have zero slope at zero size).
 """
 
 from __future__ import annotations
@@ -16,136 +16,138 @@ import numpy.typing as npt
 from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.evidence.fit import PRIOR, Fit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject, Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
 
 Array = npt.NDArray[np.float64]
 
-PLACES = 15  # of a suspect that acts at a place, beside the typical one: two groups of lanes
-SHAPES = 7  # of one with other shape genes
-SEEN = 1e-3  # of the noise: a suspect that moves less than this in all is not seen
+LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
+SHAPE_SAMPLES = 7  # for a suspect with other shape genes
+VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that changes less in all is not visible
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One size (or several, one by one) of a suspect at one place: what it does.
+    """A suspect with one or several sizes at one location and shape: what it changes.
 
     Attributes:
         suspect: which.
-        unit: [S, E] its genes in parts of their boxes, one row for each size.
-        fields: [S, D] what each changes of the coefficients.
+        unit: [S, E] its genes in unit coordinates, one row for each size.
+        changes: [S, D] change of the coefficients by each size.
         gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
-        amounts: [S] by how much each must be multiplied.
-        freedom: degrees of freedom, genes of place and shape included.
-        leaves: chi-squared that is then left, by the linearised model.
+        multiples: [S] fitted multiples of the sizes.
+        freedom: degrees of freedom, location and shape genes included.
+        remaining_chi_squared: after that fit, by the linearised model.
     """
 
     suspect: Suspect
     unit: Array
-    fields: Array
+    changes: Array
     gain: float
-    amounts: Array
+    multiples: Array
     freedom: int
-    leaves: float
+    remaining_chi_squared: float
 
     @property
     def start(self) -> Array:
-        """Genes [E] of the suspect, in parts of their boxes, where the fit puts them."""
+        """Genes [E] of the suspect in unit coordinates, at the fitted sizes."""
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
         start = self.unit[0].copy()
-        start[size] = off[size] + self.amounts @ (self.unit[:, size] - off[size])
+        start[size] = off[size] + self.multiples @ (self.unit[:, size] - off[size])
         return np.asarray(np.clip(start, 0.0, 1.0), float)
 
 
 class Nuisance:
-    """What the nominal genes can do about a fit; their prior counts as F further samples.
+    """The nominal genes as nuisance parameters; their prior counts as F further samples.
 
-    The prior counts as much as it does beside the misfit
-    (:meth:`wingfit.diagnosis.evidence.whitened_recordings.Stack.trust`). ``left`` [D + F] is the whitened residual that
-    they cannot make up for.
+    The prior is weighted against the likelihood at this fit (:meth:`WhitenedData.likelihood_weight`). ``residual`` [D +
+    F] is the whitened residual that the genes cannot explain.
     """
 
-    def __init__(self, stack: Stack, fit: Fit) -> None:
-        weight = 1.0 / (PRIOR * np.sqrt(stack.trust(fit.coefficients)))
-        slopes = fit.jacobian / stack.scale[:, None]
-        self.scale = stack.scale
+    def __init__(self, data: WhitenedData, fit: Fit) -> None:
+        weight = 1.0 / (PRIOR_SD * np.sqrt(data.likelihood_weight(fit.coefficients)))
+        slopes = fit.jacobian / data.scale[:, None]
+        self.scale = data.scale
         self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
-        self.left = self.genes.rest(np.concatenate([fit.coefficients / stack.scale, weight * (fit.unit - 0.5)]))
+        self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
-    def rest(self, changes: Array) -> Array:
-        """Whitened changes [..., D + F] of coefficients [..., D], without what the genes can make up for."""
+    def project_out(self, changes: Array) -> Array:
+        """Whitened changes [..., D + F] of coefficients [..., D] without what the genes can explain."""
         return self.genes.rest(changes / self.scale)
 
 
 def off_units(suspect: Suspect) -> Array:
-    """Genes [E] in parts of their boxes with the suspect switched off."""
+    """Genes [E] in unit coordinates with the suspect switched off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
 
 
 def size_columns(suspect: Suspect) -> list[int]:
-    """Columns of the genes that are its size."""
-    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.sizes]
+    """Columns of the suspect's size genes."""
+    return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]
 
 
-def screened(
+def score_tests(
     subject: Subject,
-    stack: Stack,
+    data: WhitenedData,
     nominal: Fit,
     evaluator: Evaluator,
     suspects: Sequence[Suspect],
     known: Sequence[str] = (),
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
-    """Try every suspect about a fit; yields its trials, best first (none where it cannot be simulated).
+    """Test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
 
-    The fit is the nominal one, or has in it the suspects that are ``known``; all its genes may adapt.
+    ``nominal`` is the nominal fit, or a fit with the suspects ``known`` added; all its genes may adapt.
     """
-    nuisance = Nuisance(stack, nominal)
+    nuisance = Nuisance(data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
         genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
-        model = subject.beside(subject.extended([*known, suspect.name]), genome)
+        model = subject.with_initial_motion(subject.extended([*known, suspect.name]), genome)
         free = tuple(gene.name for gene in suspect.genes)
-        problem = Problem(model, stack.recordings, free, base_genome(model, values), stack.axes)
-        yield suspect, _tried(stack, problem, nominal, evaluator, suspect, nuisance)
+        problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
+        yield suspect, _suspect_trials(data, problem, nominal, evaluator, suspect, nuisance)
 
 
-def _tried(
-    stack: Stack,
-    problem: Problem,
-    nominal: Fit,
-    evaluator: Evaluator,
-    suspect: Suspect,
-    nuisance: Nuisance,
+def _suspect_trials(
+    data: WhitenedData, problem: Problem, nominal: Fit, evaluator: Evaluator, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
-    blocks = list(_blocks(suspect))
-    units = np.concatenate(blocks)
-    found, reasons, _ = stack.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    groups = list(_genes_to_try(suspect))
+    units = np.concatenate(groups)
+    found, reasons, _ = data.evaluate(problem, evaluator, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
     trials, row = [], 0
-    for block in blocks:
-        rows = slice(row, row + len(block))
-        row += len(block)
+    for genes in groups:
+        rows = slice(row, row + len(genes))
+        row += len(genes)
         if not bad[rows].any():
-            trials.append(_trial(suspect, block, changes[rows], nuisance))
+            trials.append(_trial(suspect, genes, changes[rows], nuisance))
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
-def _trial(suspect: Suspect, block: Array, fields: Array, nuisance: Nuisance) -> Trial:
-    own, left = nuisance.rest(fields), nuisance.left
-    found = amounts(own, left, _limits(suspect, block), SEEN * np.sqrt(len(left)))
-    leaves = remaining(own, left, found)
-    return Trial(suspect, block, fields, max(float(left @ left) - leaves, 0.0), found, len(suspect.genes), leaves)
+def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -> Trial:
+    own, residual = nuisance.project_out(changes), nuisance.residual
+    found = amounts(own, residual, _multiple_limits(suspect, genes), VISIBLE_CHANGE * np.sqrt(len(residual)))
+    remaining_chi_squared = remaining(own, residual, found)
+    return Trial(
+        suspect,
+        genes,
+        changes,
+        max(float(residual @ residual) - remaining_chi_squared, 0.0),
+        found,
+        len(suspect.genes),
+        remaining_chi_squared,
+    )
 
 
-def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
-    """Least and largest multiples [S] of each size that stay in the box."""
-    off, low, high = off_units(suspect), np.zeros(len(block)), np.zeros(len(block))
-    for row, unit in enumerate(block):
+def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
+    """Smallest and largest multiples [S] of each size that stay in the box."""
+    off, low, high = off_units(suspect), np.zeros(len(genes)), np.zeros(len(genes))
+    for row, unit in enumerate(genes):
         column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
         move = unit[column] - off[column]
         ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
@@ -153,28 +155,28 @@ def _limits(suspect: Suspect, block: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _spots(suspect: Suspect, typical: Array) -> list[Array]:
-    """Shapes [E'] in parts of their boxes to be tried: its spots if it has any, else the ``typical`` one and others."""
-    if suspect.spots:
-        genes = [gene for gene in suspect.genes if gene.name in suspect.shapes]
-        return [unit_at(genes, np.array(spot)) for spot in suspect.spots]
-    count = PLACES if suspect.places else SHAPES
+def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
+    """Shapes [E'] in unit coordinates: the suspect's candidate shapes, else ``typical`` and an even spread."""
+    if suspect.candidate_shapes:
+        genes = [gene for gene in suspect.genes if gene.name in suspect.shape_genes]
+        return [unit_at(genes, np.array(spot)) for spot in suspect.candidate_shapes]
+    count = LOCATION_SAMPLES if suspect.location_genes else SHAPE_SAMPLES
     return [typical, *spread(count, len(typical))]
 
 
-def _blocks(suspect: Suspect) -> Iterator[Array]:
-    """Genes [S, E] in parts of their boxes to be tried: one row for each size, at one place and shape."""
+def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
+    """Genes [S, E] in unit coordinates, one row for each size, at one location and shape."""
     off, size = off_units(suspect), size_columns(suspect)
     typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
     shape = [k for k in range(len(off)) if k not in size]
-    for spot in _spots(suspect, typical[shape]) if shape else [typical[shape]]:
+    for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):
-            block = []
+            genes = []
             for k in size:
                 row = off.copy()
                 row[shape] = spot
                 row[k] = np.clip(off[k] + part * (typical[k] - off[k]), 0.0, 1.0)
                 if row[k] != off[k]:
-                    block.append(row)
-            if len(block) == len(size):
-                yield np.array(block)
+                    genes.append(row)
+            if len(genes) == len(size):
+                yield np.array(genes)

@@ -1,10 +1,11 @@
-"""Recordings stacked into one vector of coefficients, whitened, and the misfit that is left beyond the noise."""
+"""Recordings as one whitened vector of Fourier coefficients, and the excess of a residual beyond the noise."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -20,78 +21,74 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Stack:
+class WhitenedData:
     """Recordings with their noise.
 
-    A stacked vector [D] holds the coefficients of all used channels, recording by recording, channel by channel.
+    A coefficient vector [D] holds the coefficients of all used channels, recording by recording, channel by channel.
 
     Attributes:
         recordings: R of them.
-        views: each as coefficients of its beat.
-        axes: force axes that are compared; of tracks nothing.
-        tolerance: root mean square that no model is asked to be better than, m or N.
+        beat_fits: the harmonic fit of each recording.
+        axes: force axes that are compared; empty for tracks.
+        tolerance: root mean square (m or N) below which no model is required to be.
     """
 
     recordings: tuple[Recording, ...]
-    views: tuple[HarmonicFit, ...]
+    beat_fits: tuple[HarmonicFit, ...]
     axes: tuple[str, ...]
     tolerance: float
     policy: Policy = POLICY
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> Stack:
-        """Reduce ``recordings``; ValueError for one that is of no use, or for none."""
+    def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> WhitenedData:
+        """Reduce ``recordings`` to coefficients; ValueError for one that cannot be used, or for none."""
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
-        views = tuple(
+        beat_fits = tuple(
             harmonic_fit(one, compared(one, axes) if one.kind == "forces" else whole_markers(one)) for one in recordings
         )
-        noise = np.sqrt(np.mean(np.concatenate([view.noise[view.used] ** 2 for view in views])))
+        noise = np.sqrt(np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in beat_fits])))
         largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
-        return cls(tuple(recordings), views, axes, max(policy.tolerance * float(noise), 1e-6 * largest), policy)
+        return cls(tuple(recordings), beat_fits, axes, max(policy.tolerance * float(noise), 1e-6 * largest), policy)
 
     @cached_property
-    def noiseless(self) -> Stack:
-        """For coefficients that a simulation made, of which noise has no part."""
-        views = tuple(replace(view, variance=np.zeros_like(view.variance)) for view in self.views)
-        return replace(self, views=views)
+    def noiseless(self) -> WhitenedData:
+        """The same with zero noise variance, for coefficients that were simulated."""
+        beat_fits = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.beat_fits)
+        return replace(self, beat_fits=beat_fits)
 
     @cached_property
     def noise(self) -> float:
         """Root mean square of the noise of a sample, m or N; not below the tolerance."""
-        square = np.mean(np.concatenate([view.noise[view.used] ** 2 for view in self.views]))
+        square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.beat_fits]))
         return max(float(np.sqrt(square)), self.tolerance)
 
     @cached_property
-    def ends(self) -> npt.NDArray[np.int64]:
-        """[R], where each recording ends in the stacked vector."""
-        return np.asarray(np.cumsum([view.used.sum() * len(view.order) for view in self.views]))
-
-    @cached_property
-    def parts(self) -> tuple[slice, ...]:
-        """Each recording's part of the stacked vector."""
-        return tuple(slice(a, b) for a, b in zip([0, *self.ends[:-1].tolist()], self.ends.tolist(), strict=True))
+    def recording_slices(self) -> tuple[slice, ...]:
+        """Slice of each recording in the coefficient vector."""
+        ends = np.cumsum([0, *(fit.used.sum() * len(fit.order) for fit in self.beat_fits)]).tolist()
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def variance(self) -> Array:
-        """[D] of the noise of each coefficient."""
-        return np.concatenate([view.variance[view.used].ravel() for view in self.views])
+        """[D] noise variance of the coefficients."""
+        return np.concatenate([fit.variance[fit.used].ravel() for fit in self.beat_fits])
 
     @cached_property
     def weight(self) -> Array:
-        """[D]: part of a coefficient's square in the mean square over all samples of all channels."""
-        channels = sum(int(view.used.sum()) for view in self.views)
-        return np.concatenate([np.tile(view.weight, int(view.used.sum())) for view in self.views]) / channels
+        """[D] weight of a coefficient's square in the mean square over all samples of all channels."""
+        channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
+        return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
 
     @cached_property
     def scale(self) -> Array:
-        """[D] by which coefficients are divided: their noise, and what no model is asked to be better than."""
-        allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.views]
+        """[D] standard deviation of the coefficients by noise and tolerance together; whitening divides by it."""
+        allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.beat_fits]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
-    def stacked(self, residuals: Sequence[Array]) -> Array:
-        """Coefficients [..., D] of residuals [..., T, C] of each recording."""
-        found = [view.of(one)[..., view.used, :] for view, one in zip(self.views, residuals, strict=True)]
+    def coefficients_of(self, residuals: Sequence[Array]) -> Array:
+        """Coefficients [..., D] of the residuals [..., T, C] of each recording."""
+        found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
     def chi_squared(self, coefficients: Array) -> float:
@@ -99,68 +96,67 @@ class Stack:
         return float(np.sum((coefficients / self.scale) ** 2))
 
     @cached_property
-    def pieces(self) -> float:
-        """Number of independent pieces that what a model misses has: a few for each recording, however long."""
-        return min(self.policy.pieces * len(self.recordings), self.policy.most_pieces)
+    def effective_samples(self) -> float:
+        """Number of independent samples of a model's error: a few for each recording, however long it is."""
+        return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
 
-    def surprise(self, coefficients: Array) -> Array:
-        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise, and beyond it a misfit of unknown size.
+    def deviance(self, coefficients: Array) -> Array:
+        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise plus a model error of unknown size.
 
-        A misfit far beyond the noise is a model's error, of which ``pieces`` are independent, and not that many samples
-        that each know the genes: sums of squares beyond the noise's count by their logarithm.
+        The chi-squared beyond its expectation D is a model's error, of which only ``effective_samples`` are
+        independent, not as many as there are samples; its logarithm counts (a Student-like likelihood).
         """
-        beyond = self._beyond(coefficients)
+        beyond = self._chi_squared_excess(coefficients)
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
-        return np.asarray(whole - beyond + self.pieces * np.log1p(beyond / self.pieces))
+        return np.asarray(whole - beyond + self.effective_samples * np.log1p(beyond / self.effective_samples))
 
-    def trust(self, coefficients: Array) -> float:
-        """How much a unit of chi-squared counts beside these coefficients [D]: the slope of :meth:`surprise`."""
-        return float(1.0 / (1.0 + self._beyond(coefficients) / self.pieces))
+    def likelihood_weight(self, coefficients: Array) -> float:
+        """Slope of :meth:`deviance` with chi-squared at coefficients [D], as in iteratively reweighted fits."""
+        return float(1.0 / (1.0 + self._chi_squared_excess(coefficients) / self.effective_samples))
 
     @cached_property
-    def most_trust(self) -> float:
-        """The same beside a misfit as large as the tolerance: no fit ends nearer to the best, and no model is exact."""
-        return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.pieces))
+    def max_likelihood_weight(self) -> float:
+        """The weight at a model error as large as the tolerance; no model is taken to be more exact."""
+        return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.effective_samples))
 
-    def _beyond(self, coefficients: Array) -> Array:
+    def _chi_squared_excess(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Array) -> float:
-        """Mean square beyond the noise of residuals with these coefficients [D], m^2 or N^2; noise may make it < 0."""
+        """Mean square beyond the noise of residuals with coefficients [D], m^2 or N^2; noise may make it negative."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
-    def excess_of(self, coefficients: Array) -> Array:
-        """[R], the same of each recording by itself."""
+    def excess_by_recording(self, coefficients: Array) -> Array:
+        """Excess [R] of each recording."""
         every = self.weight * (coefficients**2 - self.variance)
-        return np.array([every[part].sum() / self.share[r] for r, part in enumerate(self.parts)])
+        return np.array([every[part].sum() / self.recording_weights[r] for r, part in enumerate(self.recording_slices)])
 
     @cached_property
-    def share(self) -> Array:
-        """[R] part of each recording in the mean square."""
-        used = np.array([int(view.used.sum()) for view in self.views], float)
+    def recording_weights(self) -> Array:
+        """[R] weight of each recording in the mean square."""
+        used = np.array([int(fit.used.sum()) for fit in self.beat_fits], float)
         return np.asarray(used / used.sum())
 
     @cached_property
-    def uncertainty(self) -> float:
+    def excess_standard_error(self) -> float:
         """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
-        What noise does to means and trends comes from below the lowest line between harmonics, and is known to a factor
-        only; half of it counts. Else markers are independent of each other. Harmonics are not: where beats differ in
-        size or timing, all of them do together; so each marker, and a recording of forces as a whole, counts as one
-        sample of its noise.
+        The noise of means and trends lies below the lowest line between harmonics and is known up to a factor only;
+        half of it counts. Markers are independent of each other. Harmonics are not, since beats differ in size or
+        timing as a whole; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
         """
         independent = sum(
-            1.0 if recording.kind == "forces" else view.used.sum() / 3.0
-            for recording, view in zip(self.recordings, self.views, strict=True)
+            1.0 if recording.kind == "forces" else fit.used.sum() / 3.0
+            for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
         every = self.weight * self.variance
-        slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.views])
+        slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
         return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Array
     ) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """Coefficients [B, D] of the residuals of ``values`` [B, F], why individuals failed, and the residuals."""
+        """Coefficients [B, D] of the residuals of ``values`` [B, F], reasons of failed individuals, and residuals."""
         evaluation = evaluator.evaluate(problem, values, residuals=True)
         residuals = residuals_of(evaluation)
-        return self.stacked(residuals), evaluation.reasons, residuals
+        return self.coefficients_of(residuals), evaluation.reasons, residuals

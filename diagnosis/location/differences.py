@@ -1,4 +1,4 @@
-"""Where the nominal model and the recordings differ, in numbers and in words."""
+"""Where the nominal model differs from the recordings, in numbers and as text."""
 
 from __future__ import annotations
 
@@ -7,102 +7,108 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.evidence.intervals import reach
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.intervals import standard_errors
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Exponent, Interval, Where
-from wingfit.diagnosis.location.maps import PHASES, Piece, harmonics
+from wingfit.diagnosis.location.maps import PHASES, RecordingResidual, harmonics
 from wingfit.records import Condition
 from wingfit.sim.atmosphere import density
 
 Array = npt.NDArray[np.float64]
 
-EDGES = (0.05, 0.95)  # of the misfit's mass: the extent that is told
-GATHERED = 0.35  # length of the mean vector of phases from which a misfit lies at a phase
-WIDE = 0.8  # of the span or chord: a misfit that reaches over as much has no place
-APART = 1.05  # ratio of two values of a variable that differ
+EXTENT_QUANTILES = (0.05, 0.95)  # of the excess: ends of the reported extent
+MIN_PHASE_CONCENTRATION = 0.35  # length of the mean phase vector from which a misfit has a phase
+WHOLE_EXTENT = 0.8  # of the span or chord: a misfit that extends over as much has no location
+MIN_RATIO = 1.05  # of two values of a variable that differ
 
 
-def where(stack: Stack, pieces: Sequence[Piece], coefficients: Array) -> Where:
-    """Where the misfit [D], cut into ``pieces``, lies."""
-    spread = harmonics(stack, coefficients)
-    span, chord = (_along(pieces, name) for name in ("span", "chord"))
-    phase, axis = _phase(pieces), _axis(pieces)
-    exponents = _exponents(stack, coefficients)
-    words = _words(span, chord, phase, axis, spread, exponents)
+def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Array) -> Where:
+    """Location, phase, axis, harmonics and scaling of coefficients [D], split into ``residuals``."""
+    spread = harmonics(data, coefficients)
+    span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))
+    phase, axis = _phase(residuals), _axis(residuals)
+    exponents = _exponents(data, coefficients)
+    words = _sentence(span, chord, phase, axis, spread, exponents)
     return Where(words, span, chord, phase, axis, spread, exponents)
 
 
-def _masses(pieces: Sequence[Piece]) -> list[Array]:
-    """Excess mean square of each channel of each piece."""
-    return [np.maximum((piece.coefficients**2 - piece.variance) @ piece.view.weight, 0.0) for piece in pieces]
+def _channel_excess(residuals: Sequence[RecordingResidual]) -> list[Array]:
+    """Excess of each channel of each recording."""
+    return [
+        np.maximum((residual.coefficients**2 - residual.variance) @ residual.beat_fit.weight, 0.0)
+        for residual in residuals
+    ]
 
 
-def _along(pieces: Sequence[Piece], name: str) -> Interval | None:
-    """Middle and extent of the misfit along the span or the chord, by markers; None for forces."""
+def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval | None:
+    """Median and extent of the misfit along the span or the chord, from markers; None for forces."""
     at, mass = [], []
-    for piece, masses in zip(pieces, _masses(pieces), strict=True):
-        for place, one in zip(piece.places, masses, strict=True):
+    for residual, masses in zip(residuals, _channel_excess(residuals), strict=True):
+        for place, one in zip(residual.locations, masses, strict=True):
             value = place.span if name == "span" else place.chord
             if value is None:
                 return None
             at.append(value)
             mass.append(one)
-    places, which = np.unique(at, return_inverse=True)
+    positions, which = np.unique(at, return_inverse=True)
     weight = np.bincount(which, weights=mass)
     if weight.sum() <= 0:
         return None
     total = np.concatenate([[0.0], np.cumsum(weight)]) / weight.sum()
-    low, middle, high = (float(np.interp(part, total, _cells(places))) for part in (EDGES[0], 0.5, EDGES[1]))
+    low, middle, high = (
+        float(np.interp(part, total, _cell_edges(positions)))
+        for part in (EXTENT_QUANTILES[0], 0.5, EXTENT_QUANTILES[1])
+    )
     return Interval(middle, low, high)
 
 
-def _cells(places: Array) -> Array:
-    """Edges [n + 1] of the parts of the span or chord for which markers at ``places`` [n] stand, in order."""
-    if len(places) < 2:
-        return np.repeat(places, 2)
-    half = 0.5 * (places[1:] + places[:-1])
-    ends = np.clip([2 * places[0] - half[0], 2 * places[-1] - half[-1]], 0.0, 1.0)
-    return np.array([min(ends[0], places[0]), *half, max(ends[1], places[-1])])
+def _cell_edges(positions: Array) -> Array:
+    """Edges [n + 1] of the cells of the span or chord that markers at sorted ``positions`` [n] represent."""
+    if len(positions) < 2:
+        return np.repeat(positions, 2)
+    half = 0.5 * (positions[1:] + positions[:-1])
+    ends = np.clip([2 * positions[0] - half[0], 2 * positions[-1] - half[-1]], 0.0, 1.0)
+    return np.array([min(ends[0], positions[0]), *half, max(ends[1], positions[-1])])
 
 
-def _phase(pieces: Sequence[Piece]) -> Interval | None:
-    """Middle and extent of the misfit in the beat; None where it is spread over all of it.
+def _phase(residuals: Sequence[RecordingResidual]) -> Interval | None:
+    """Centre and extent of the misfit in the beat; None where it is spread over the whole beat.
 
-    The middle is that of what is larger than half of the most: a fit smears a misfit over the beat.
+    The centre is that of the misfit above half of its maximum, because a fit spreads a misfit over the beat.
     """
-    mass = np.sum([(piece.beat**2).mean(axis=1) for piece in pieces], axis=0)
+    mass = np.sum([(residual.beat**2).mean(axis=1) for residual in residuals], axis=0)
     peak = np.where(mass > 0.5 * mass.max(), mass, 0.0)
     mass = np.maximum(mass - mass.min(), 0.0)
     if mass.sum() <= 0:
         return None
     turn = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
-    if abs(complex((mass * turn).sum() / mass.sum())) < GATHERED:
+    if abs(complex((mass * turn).sum() / mass.sum())) < MIN_PHASE_CONCENTRATION:
         return None
     mean = complex((peak * turn).sum())
     middle = float(np.angle(mean) / (2 * np.pi)) % 1.0
     start = round(middle * PHASES) - PHASES // 2
     rolled = np.roll(mass, -start)
     total = (np.cumsum(rolled) - 0.5 * rolled) / rolled.sum()
-    low, high = (float(np.interp(part, total, np.arange(PHASES))) + start for part in EDGES)
+    low, high = (float(np.interp(part, total, np.arange(PHASES))) + start for part in EXTENT_QUANTILES)
     return Interval(middle, low / PHASES, high / PHASES)
 
 
-def _axis(pieces: Sequence[Piece]) -> str:
+def _axis(residuals: Sequence[RecordingResidual]) -> str:
     totals = dict.fromkeys("xyz", 0.0)
-    for piece, masses in zip(pieces, _masses(pieces), strict=True):
-        for place, one in zip(piece.places, masses, strict=True):
+    for residual, masses in zip(residuals, _channel_excess(residuals), strict=True):
+        for place, one in zip(residual.locations, masses, strict=True):
             totals[place.axis] += float(one)
     return max(totals, key=lambda axis: totals[axis])
 
 
-def _exponents(stack: Stack, coefficients: Array) -> tuple[Exponent, ...]:
-    """Powers with which the misfit grows with what differs between the recordings."""
-    excess = stack.excess_of(coefficients)
+def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
+    """Exponents with which the misfit scales with each variable that differs between the recordings."""
+    excess = data.excess_by_recording(coefficients)
     level = 0.02 * max(float(excess.max()), 0.0)
     if len(excess) < 3 or level <= 0.0:
         return ()
     size = 0.5 * np.log(np.maximum(excess, level))
-    variables = [v for v in _variables([r.condition for r in stack.recordings]) if v[3].max() > APART * v[3].min()]
+    variables = [v for v in _variables([r.condition for r in data.recordings]) if v[3].max() > MIN_RATIO * v[3].min()]
     while variables:
         design = np.stack([np.ones(len(size)), *(np.log(v[3]) for v in variables)], axis=1)
         scaled = design[:, 1:] - design[:, 1:].mean(axis=0)
@@ -113,9 +119,9 @@ def _exponents(stack: Stack, coefficients: Array) -> tuple[Exponent, ...]:
     if not variables:
         return ()
     best, *_ = np.linalg.lstsq(design, size, rcond=None)
-    left, freedom = size - design @ best, len(size) - design.shape[1]
-    cover = np.linalg.inv(design.T @ design) * max(float(left @ left) / freedom, 0.05**2)
-    errors = reach(freedom) * np.sqrt(np.diag(cover))
+    remainder, freedom = size - design @ best, len(size) - design.shape[1]
+    cover = np.linalg.inv(design.T @ design) * max(float(remainder @ remainder) / freedom, 0.05**2)
+    errors = standard_errors(freedom) * np.sqrt(np.diag(cover))
     return tuple(
         Exponent(name, Interval(float(b), float(b - d), float(b + d)), *ends, unit)
         for (name, unit, ends, _), b, d in zip(variables, best[1:], errors[1:], strict=True)
@@ -123,7 +129,7 @@ def _exponents(stack: Stack, coefficients: Array) -> tuple[Exponent, ...]:
 
 
 def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[float, float], Array]]:
-    """Name, unit, range and values of what may matter, all above zero."""
+    """Name, unit, range and values of the variables, all positive."""
     f = np.array([c.flap_frequency for c in conditions])
     rho = np.array([density(c.pressure, c.temperature) for c in conditions])
     speed = np.array([c.airspeed for c in conditions])
@@ -135,7 +141,7 @@ def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[fl
     return found
 
 
-def _words(
+def _sentence(
     span: Interval | None,
     chord: Interval | None,
     phase: Interval | None,
@@ -143,43 +149,45 @@ def _words(
     spread: Sequence[float],
     exponents: Sequence[Exponent],
 ) -> str:
-    place = _place(span, chord)
-    when = "over the whole beat" if phase is None else f"{_beat(phase)}"
+    place = _span_text(span, chord)
+    when = "over the whole beat" if phase is None else f"{_phase_text(phase)}"
     largest = int(np.argmax(spread))
     line = "a constant offset" if largest == 0 else f"mostly at {largest} per beat"
-    grows = [_growth(one) for one in exponents]
+    grows = [_scaling_text(one) for one in exponents]
     scaling = f"; {', '.join(g for g in grows if g)}" if any(grows) else ""
     return f"{place}, {when}, along {axis}, {line}{scaling}"
 
 
-def acting(span: Interval | None, chord: Interval | None, phase: Interval | None, *, driven: bool = False) -> str:
-    """Where the cause of a misfit acts, in words that follow those of the misfit; "" where that is not known.
+def cause_location(
+    span: Interval | None, chord: Interval | None, phase: Interval | None, *, drive_error: bool = False
+) -> str:
+    """Where the cause of a misfit acts, as text that continues the misfit's location; "" where it is not known.
 
-    ``driven``: rods that move otherwise than they are said to.
+    ``drive_error``: the cause is an error of the drive rods.
     """
-    told = [
-        f"{100 * one.value:.0f} % of the {name}{_between(one, 100, 0, ' %')}"
+    parts = [
+        f"{100 * one.value:.0f} % of the {name}{_range_text(one, 100, 0, ' %')}"
         for name, one in (("span", span), ("chord", chord))
         if one is not None
     ]
     if phase is not None:
-        told.append(f"{phase.value % 1.0:.2f} of the beat{_between(phase, 1, 2, '', -(phase.value // 1.0))}")
-    if driven:
-        return "; as a drive that moves otherwise than it is said to" + (f", most at {told[-1]}" if phase else "")
-    return f"; its cause acts at {', '.join(told)}" if told else ""
+        parts.append(f"{phase.value % 1.0:.2f} of the beat{_range_text(phase, 1, 2, '', -(phase.value // 1.0))}")
+    if drive_error:
+        return "; its cause is an error of the drive's motion" + (f", largest at {parts[-1]}" if phase else "")
+    return f"; its cause acts at {', '.join(parts)}" if parts else ""
 
 
-def _between(one: Interval, factor: float, digits: int, unit: str, shift: float = 0.0) -> str:
+def _range_text(one: Interval, factor: float, digits: int, unit: str, shift: float = 0.0) -> str:
     if one.low is None or one.high is None:
         return ""
     return f" ({factor * one.low + shift:.{digits}f} to {factor * one.high + shift:.{digits}f}{unit})"
 
 
-def _place(span: Interval | None, chord: Interval | None) -> str:
+def _span_text(span: Interval | None, chord: Interval | None) -> str:
     if span is None or span.low is None or span.high is None:
         return "in the forces"
     low, high = span.low, span.high
-    if high - low >= WIDE:
+    if high - low >= WHOLE_EXTENT:
         words = "over the whole span"
     elif high > 0.9:
         words = f"outer {100 * (1 - low):.0f} % of the span"
@@ -187,24 +195,24 @@ def _place(span: Interval | None, chord: Interval | None) -> str:
         words = f"inner {100 * high:.0f} % of the span"
     else:
         words = f"between {100 * low:.0f} and {100 * high:.0f} % of the span"
-    if chord and chord.low is not None and chord.high is not None and chord.high - chord.low < WIDE:
+    if chord and chord.low is not None and chord.high is not None and chord.high - chord.low < WHOLE_EXTENT:
         side = "front" if chord.value < 0.4 else "rear" if chord.value > 0.6 else "middle"
         words += f", {side} of the chord"
     return words
 
 
-def _beat(phase: Interval) -> str:
+def _phase_text(phase: Interval) -> str:
     low, high = phase.low or 0.0, phase.high or 0.0
     return f"from {low % 1.0:.2f} to {high % 1.0:.2f} of the beat"
 
 
-def _growth(one: Exponent) -> str:
+def _scaling_text(one: Exponent) -> str:
     low, high, power = one.power.low, one.power.high, one.power.value
     if low is None or high is None or high - low > 2.0:
         return ""
     if low <= 0.0 <= high:
         return f"independent of {one.variable}" if high - low < 1.0 else ""
-    name = {1: f"{one.variable}", 2: f"{one.variable} squared"}.get(round(power), f"{one.variable} to the {power:.1f}")
+    name = {1: f"{one.variable}", 2: f"{one.variable} squared"}.get(round(power), f"{one.variable}^{power:.1f}")
     return (
         f"grows with {name}"
         if power > 0.5

@@ -1,11 +1,10 @@
-"""A free-form law for a load that nothing in the library explains, found so that it predicts other recordings.
+"""A free-form law for a load that no effect of the library explains, selected by cross-validation.
 
-The missing load of every recording is a sum of few terms, each a coefficient, the same for all recordings, times a
-product of the local motion, the air and the wing (:mod:`wingfit.diagnosis.location.law_features`). Terms are taken one
-by one (forward selection), each time the one with which recordings left out one by one are predicted best; the law is
-fitted to the tracks themselves, through their responses to loads, and not to an inferred load, which a prior has
-smoothed. What is reported as explained is predicted by laws that were selected without the recording in question; the
-nominal genes, as refitted to all recordings, are projected out first.
+The missing load is a sum of few terms, each a coefficient, the same for all recordings, times a product of the local
+motion, the air and the wing (:mod:`wingfit.diagnosis.location.law_features`). Terms are added by forward selection: the
+term that best predicts recordings left out one at a time. The law is fitted to the tracks through their responses to
+loads, not to an inferred load, which a prior has smoothed. The reported explained fraction is nested: each recording is
+predicted by a law selected without it. The nominal genes, refitted to all recordings, are projected out first.
 """
 
 from __future__ import annotations
@@ -16,28 +15,28 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.evidence.intervals import reach
+from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import FreeLaw, Interval, Term
 from wingfit.diagnosis.location.law_features import Candidate, Motion, candidates
-from wingfit.diagnosis.location.missing_load import GENES, Case
+from wingfit.diagnosis.location.missing_load import GENE_ERROR_SD, Case
 from wingfit.sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
-MOST = 3  # terms
-GAIN = 0.02  # of the excess misfit, that a term must take away of recordings left out
-PLAIN = 0.02  # of it: a plainer term is taken before a better one, if no more is lost
-PREDICTS = 0.1  # of the excess misfit: a law that takes less is none
-FEWEST = 3  # recordings
+MAX_TERMS = 3  # of a law
+MIN_GAIN = 0.02  # of the excess of left-out recordings that a term must explain
+SIMPLER_LOSS = 0.02  # of it: a simpler term is preferred if it explains at most this much less
+MIN_EXPLAINED = 0.1  # of the excess: a law that explains less is rejected
+MIN_RECORDINGS = 3  # for a law
 
 
 @dataclass(frozen=True)
-class _Sums:
-    """Normal equations of R recordings in M coefficients, the nominal genes refitted to all of them projected out.
+class _NormalEquations:
+    """Normal equations of R recordings in M coefficients, with the nominal genes projected out.
 
-    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R]: sum of squares of what is lacking, ``count`` [R] of
-    samples. ``size`` [M] by which coefficients were multiplied to be comparable.
+    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R] sum of squares of the residual, ``count`` [R] of samples,
+    ``size`` [M] by which coefficients were scaled.
     """
 
     curvature: Array
@@ -46,10 +45,10 @@ class _Sums:
     count: Array
     size: Array
 
-    def without(self, left: int) -> _Sums:
+    def without(self, remaining: int) -> _NormalEquations:
         """All recordings but one."""
-        kept = np.arange(len(self.power)) != left
-        return _Sums(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
+        kept = np.arange(len(self.power)) != remaining
+        return _NormalEquations(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
     def fit(self, terms: Index, which: npt.NDArray[np.bool_]) -> Array:
         """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
@@ -58,17 +57,17 @@ class _Sums:
         slope = self.slope[which].sum(axis=0)[terms]
         return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
-    def left(self, recording: int, terms: Index, found: Array) -> Array:
-        """Sum of squares [B] that coefficients ``found`` [B, N] of ``terms`` [B, N] leave of a recording."""
+    def remaining(self, recording: int, terms: Index, found: Array) -> Array:
+        """Sum of squares [B] of a recording's residual with coefficients ``found`` [B, N] of ``terms`` [B, N]."""
         matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
         along = (found * self.slope[recording][terms]).sum(axis=1)
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
     def explained(self, terms: Index) -> Array:
-        """Part [B] of the excess misfit that ``terms`` [B, N] take away of recordings left out one by one."""
+        """Fraction [B] of the excess that ``terms`` [B, N] explain, recordings left out one at a time."""
         after = np.zeros(len(terms))
         for r in range(len(self.power)):
-            after += self.left(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]
+            after += self.remaining(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]
         return np.asarray(1.0 - after / self.excess)
 
     @property
@@ -78,46 +77,50 @@ class _Sums:
 
 
 def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> FreeLaw | None:
-    """The law of the load that ``cases`` lack, from the ``motions`` of the nominal model at the stations of ``probe``.
+    """The law of the missing load of ``cases``, from the ``motions`` of the nominal model at the stations of ``probe``.
 
-    None for fewer than three recordings, or where there is no misfit beyond the noise. A law without terms says that
-    none was found that predicts another recording.
+    None for fewer than three recordings, or without a misfit beyond the noise. A law without terms means that none
+    predicts left-out recordings.
     """
     dictionary = list(candidates())
-    if len(cases) < FEWEST:
+    if len(cases) < MIN_RECORDINGS:
         return None
     sums = _sums(cases, probe, motions, dictionary)
     if sums.excess <= 1e-6:
         return None
-    terms = _selected(sums)
-    explained = _predicted(sums)
-    if not len(terms) or explained < PREDICTS:
-        part = f"the best takes {100 * max(explained, 0.0):.0f} % of the excess misfit of recordings left out"
-        return FreeLaw(f"no simple law of the local motion predicts another recording: {part}", (), explained)
-    return _told(sums, dictionary, terms, explained)
+    terms = _select_terms(sums)
+    explained = _cross_validated(sums)
+    if not len(terms) or explained < MIN_EXPLAINED:
+        best = f"the best explains {100 * max(explained, 0.0):.0f} % of the excess misfit of left-out recordings"
+        return FreeLaw(f"no simple law of the local motion predicts another recording: {best}", (), explained)
+    return _fitted_law(sums, dictionary, terms, explained)
 
 
-def _sums(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]) -> _Sums:
+def _sums(
+    cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]
+) -> _NormalEquations:
     M, F = len(dictionary), cases[0].sensitivities.shape[1]
-    loads = [_loads(probe, case.crossing, motion, dictionary) for case, motion in zip(cases, motions, strict=True)]
+    loads = [
+        _probe_sizes(probe, case.crossing, motion, dictionary) for case, motion in zip(cases, motions, strict=True)
+    ]
     every = np.array([_products(case, U) for case, U in zip(cases, loads, strict=True)])
-    size = np.sqrt(np.einsum("rmm->m", every[:, :M, :M]) / sum(len(case.lacking) for case in cases))
+    size = np.sqrt(np.einsum("rmm->m", every[:, :M, :M]) / sum(len(case.residual) for case in cases))
     size = np.where(size > 0, size, 1.0)
     genes = slice(M, M + F)
     total = every.sum(axis=0)
-    taken = np.linalg.solve(total[genes, genes] + np.eye(F) / GENES**2, total[genes])  # by a refit of the genes
+    taken = np.linalg.solve(total[genes, genes] + np.eye(F) / GENE_ERROR_SD**2, total[genes])  # refitted genes
     project = np.eye(M + F + 1)
     project[genes] -= taken
     project = np.delete(project, np.arange(M, M + F), axis=1)
     project[:, :M] /= size
-    left = np.einsum("ap,rab,bq->rpq", project, every, project, optimize=True)
-    count = np.array([float(len(case.lacking)) for case in cases])
-    return _Sums(left[:, :M, :M], left[:, :M, M], left[:, M, M], count, size)
+    remaining = np.einsum("ap,rab,bq->rpq", project, every, project, optimize=True)
+    count = np.array([float(len(case.residual)) for case in cases])
+    return _NormalEquations(remaining[:, :M, :M], remaining[:, :M, M], remaining[:, M, M], count, size)
 
 
 def _products(case: Case, loads: Array) -> Array:
-    """All products [M + F + 1, M + F + 1] of what a recording shows of the dictionary, of the genes, and lacks."""
-    both = np.concatenate([case.responses[:, : len(loads)], case.sensitivities, case.lacking[:, None]], axis=1)
+    """All products [M + F + 1, M + F + 1] of a recording's responses to candidates and genes, and its residual."""
+    both = np.concatenate([case.responses[:, : len(loads)], case.sensitivities, case.residual[:, None]], axis=1)
     others = both.shape[1] - len(loads)
     shown = np.zeros((both.shape[1], loads.shape[1] + others))
     shown[: len(loads), : loads.shape[1]] = loads
@@ -125,58 +128,54 @@ def _products(case: Case, loads: Array) -> Array:
     return np.asarray(shown.T @ (both.T @ both) @ shown)
 
 
-def _loads(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
-    """Sizes of the probe's unit forces [P, M] that make each of the dictionary's loads, as well as they can."""
+def _probe_sizes(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
+    """Sizes of the probe's unit forces [P, M] that best reproduce each candidate load."""
     series = np.linalg.pinv(probe.terms(motion.phase + crossing))
     hats = np.linalg.pinv(probe.hats(motion.stations))
     fields = np.array([candidate.field(motion) for candidate in dictionary])
     return np.asarray(np.einsum("sj,mjn,kn->skm", hats, fields, series, optimize=True).reshape(probe.forces, -1))
 
 
-def _selected(sums: _Sums) -> Index:
-    """Terms, each earning its place by what recordings left out are predicted better; plain ones come first."""
+def _select_terms(sums: _NormalEquations) -> Index:
+    """Terms that improve the prediction of left-out recordings enough; simpler ones are preferred."""
     terms, before = np.zeros(0, np.int64), 0.0
-    told = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
-    while len(terms) < MOST:
-        tried = np.array([[*terms, k] for k in told if k not in terms])
+    usable = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
+    while len(terms) < MAX_TERMS:
+        tried = np.array([[*terms, k] for k in usable if k not in terms])
         explained = sums.explained(tried)
-        if not explained.max() > before + GAIN:
+        if not explained.max() > before + MIN_GAIN:
             break
-        best = int(np.argmax(explained >= explained.max() - PLAIN))
+        best = int(np.argmax(explained >= explained.max() - SIMPLER_LOSS))
         terms, before = tried[best], float(explained[best])
     return terms
 
 
-def _predicted(sums: _Sums) -> float:
-    """Part of the excess misfit of each recording that a law takes away which was selected and fitted without it."""
+def _cross_validated(sums: _NormalEquations) -> float:
+    """Fraction of the excess explained by laws that were selected and fitted without the recording in question."""
     after = 0.0
     for r in range(len(sums.power)):
-        terms = _selected(sums.without(r))[None]
+        terms = _select_terms(sums.without(r))[None]
         found = sums.fit(terms, np.arange(len(sums.power)) != r)
-        after += float(sums.left(r, terms, found)[0] - sums.count[r])
+        after += float(sums.remaining(r, terms, found)[0] - sums.count[r])
     return 1.0 - after / sums.excess
 
 
-def _told(sums: _Sums, dictionary: Sequence[Candidate], terms: Index, explained: float) -> FreeLaw:
+def _fitted_law(sums: _NormalEquations, dictionary: Sequence[Candidate], terms: Index, explained: float) -> FreeLaw:
     every = np.ones(len(sums.power), bool)
     size = sums.size[terms]
     value = sums.fit(terms[None], every)[0] / size
-    error = reach(len(sums.power) - 1) * _jackknife(sums, terms) / size
+    error = standard_errors(len(sums.power) - 1) * _jackknife(sums, terms) / size
     found = tuple(
-        Term(
-            dictionary[k].name,
-            Interval(float(v), float(v - e), float(v + e)),
-            dictionary[k].feature.unit,
-        )
+        Term(dictionary[k].name, Interval(float(v), float(v - e), float(v + e)), dictionary[k].feature.unit)
         for k, v, e in zip(terms, value, error, strict=True)
     )
-    said = "; and ".join(dictionary[k].words for k in terms)
-    share = f"{100 * explained:.0f} % of the excess misfit of recordings left out"
-    return FreeLaw(f"{said}: it predicts {share}", found, explained)
+    words = "; and ".join(dictionary[k].words for k in terms)
+    share = f"{100 * explained:.0f} % of the excess misfit of left-out recordings"
+    return FreeLaw(f"{words}: it predicts {share}", found, explained)
 
 
-def _jackknife(sums: _Sums, terms: Index) -> Array:
-    """Standard errors [N] from what each recording changes (Efron, The Jackknife, 1982, Eq. 3.1)."""
+def _jackknife(sums: _NormalEquations, terms: Index) -> Array:
+    """Standard errors [N] by the jackknife over recordings (Efron, The Jackknife, 1982, Eq. 3.1)."""
     count = len(sums.power)
     each = np.array([sums.fit(terms[None], np.arange(count) != r)[0] for r in range(count)])
     return np.asarray(np.sqrt((count - 1) / count * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))

@@ -1,4 +1,4 @@
-"""What a load on a wing may be made of: products of the local motion, the air and the wing, of physical meaning."""
+"""Candidate terms of a load law: products of the local motion, the air and the wing with physical meaning."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-OUTER, INNER = 0.6, 0.4  # of the span: where the outer part begins and the inner part ends
+OUTER, INNER = 0.6, 0.4  # of the span: start of the outer part, end of the inner part
 
 
 class Motion(Protocol):
-    """How J stations of a wing move over N instants of a beat, as :class:`sim.wing.probing.StationMotion` has it."""
+    """Motion of J stations of a wing at N instants of a beat; see :class:`sim.wing.probing.StationMotion`."""
 
     @property
     def stations(self) -> Array: ...  # noqa: D102
@@ -45,7 +45,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Feature:
-    """A load per metre of span: a coefficient in ``unit`` times ``field`` [J, N] of a motion. ``words``: what it is."""
+    """A load per metre of span: a coefficient in ``unit`` times ``field`` [J, N] of a motion; ``words`` describe it."""
 
     name: str
     unit: str
@@ -65,11 +65,11 @@ def _wave(order: int, power: int, sine: bool) -> Feature:
     turn = np.sin if sine else np.cos
     name = f"f^{power} {'sin' if sine else 'cos'} {order} psi" if power else f"{'sin' if sine else 'cos'} {order} psi"
     unit = {0: "N/m", 2: "N s^2/m"}[power]
-    grows = " and grows with the square of the flap frequency" if power else " whatever the flap frequency"
+    grows = " and scales with flap frequency squared" if power else " independent of flap frequency"
     return Feature(
         name,
         unit,
-        f"that beats {'once' if order == 1 else 'twice'} a beat{grows}",
+        f"at {order} per beat{grows}",
         lambda m: m.flap_frequency**power * turn(2 * np.pi * order * m.phase) + 0.0 * m.velocity,
     )
 
@@ -78,52 +78,50 @@ FEATURES: tuple[Feature, ...] = (
     Feature(
         "rho c |V_n| V_n",
         "1",
-        "that grows with air density and the square of the local normal velocity",
+        "proportional to air density and the square of the local normal velocity",
         lambda m: m.density * m.chord[:, None] * np.abs(m.velocity) * m.velocity,
     ),
     Feature(
         "rho c |V| V_n",
         "1",
-        "that grows with air density, the speed through the air and the local normal velocity",
+        "proportional to air density, the speed through the air and the local normal velocity",
         lambda m: m.density * m.chord[:, None] * np.hypot(m.velocity, m.forward) * m.velocity,
     ),
     Feature(
         "rho c V_n^2",
         "1",
-        "that grows with air density and the square of the local normal velocity, to the same side on both strokes",
+        "proportional to air density and the square of the local normal velocity, with the same sign on both strokes",
         lambda m: m.density * m.chord[:, None] * m.velocity**2,
     ),
     Feature(
         "rho c^2 V_c theta'",
         "1",
-        "that grows with air density, the speed along the chord and the pitch rate",
+        "proportional to air density, the speed along the chord and the pitch rate",
         lambda m: m.density * m.chord[:, None] ** 2 * m.forward * m.pitch_rate,
     ),
     Feature(
         "rho c^2 a_n",
         "1",
-        "that grows with air density and the local normal acceleration",
+        "proportional to air density and the local normal acceleration",
         lambda m: m.density * m.chord[:, None] ** 2 * m.acceleration,
     ),
     Feature(
         "rho c U^2",
         "1",
-        "that grows with air density and the square of the airspeed",
+        "proportional to air density and the square of the airspeed",
         lambda m: m.density * m.chord[:, None] * m.airspeed**2 + 0.0 * m.velocity,
     ),
     Feature(
         "m a_n",
         "1",
-        "that grows with the wing's own mass and the local normal acceleration",
+        "proportional to the wing's own mass and the local normal acceleration",
         lambda m: m.mass[:, None] * m.acceleration,
     ),
-    Feature(
-        "V_n", "N s/m^2", "that grows with the local normal velocity, whatever the air", lambda m: 1.0 * m.velocity
-    ),
-    Feature("sign V_n", "N/m", "of constant size that turns with the local velocity", lambda m: np.sign(m.velocity)),
-    Feature("w", "N/m^2", "that grows with how far the wing is bent there", lambda m: 1.0 * m.deflection),
-    Feature("w^3", "N/m^4", "that grows with the cube of how far the wing is bent there", lambda m: m.deflection**3),
-    Feature("1", "N/m", "that is constant", lambda m: np.ones_like(m.velocity)),
+    Feature("V_n", "N s/m^2", "proportional to the local normal velocity", lambda m: 1.0 * m.velocity),
+    Feature("sign V_n", "N/m", "of constant size, with the sign of the local velocity", lambda m: np.sign(m.velocity)),
+    Feature("w", "N/m^2", "proportional to the local deflection", lambda m: 1.0 * m.deflection),
+    Feature("w^3", "N/m^4", "proportional to the cube of the local deflection", lambda m: m.deflection**3),
+    Feature("1", "N/m", "that is constant in time", lambda m: np.ones_like(m.velocity)),
     *(_wave(order, power, sine) for order in (1, 2) for power in (0, 2) for sine in (False, True)),
 )
 
@@ -145,7 +143,7 @@ def _where(motion: Motion, inside: npt.NDArray[np.bool_]) -> Array:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A feature in windows of the span and of the beat."""
+    """A feature restricted to a window of the span and one of the beat."""
 
     feature: Feature
     span: Window
@@ -163,12 +161,12 @@ class Candidate:
 
     @property
     def words(self) -> str:
-        """What it is, for people."""
+        """Description for the user."""
         return ", ".join(text for text in (f"a load {self.feature.words}", self.span.words, self.beat.words) if text)
 
 
 def candidates() -> Iterator[Candidate]:
-    """All features in all windows, plain ones first."""
+    """All features in all windows, unrestricted ones first."""
     for span in SPAN_WINDOWS:
         for beat in BEAT_WINDOWS:
             for feature in FEATURES:

@@ -1,4 +1,4 @@
-"""Where a misfit lies: by marker, over the beat, along the span, in which harmonics and directions."""
+"""Maps of a misfit: by marker, over the beat, along the span, by harmonic and direction."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
-from wingfit.diagnosis.subject import Place, Subject
+from wingfit.diagnosis.subject import ChannelLocation, Subject
 from wingfit.inference.noise.harmonic import HarmonicFit
 
 Array = npt.NDArray[np.float64]
@@ -20,60 +20,62 @@ BANDS = 6  # along the span
 
 
 @dataclass(frozen=True)
-class Piece:
-    """One recording's part of a misfit.
+class RecordingResidual:
+    """Residual of one recording.
 
-    ``coefficients`` and ``variance`` [C, P] of its used channels, ``places`` of these, ``beat`` [PHASES, C] the
-    periodic misfit from the start of the beat on.
+    ``coefficients`` and ``variance`` [C, P] of its used channels, their ``locations``, and ``beat`` [PHASES, C], the
+    periodic residual from the start of the beat.
     """
 
-    view: HarmonicFit
-    places: tuple[Place, ...]
+    beat_fit: HarmonicFit
+    locations: tuple[ChannelLocation, ...]
     coefficients: Array
     variance: Array
     beat: Array
 
 
-def pieces(subject: Subject, stack: Stack, coefficients: Array) -> list[Piece]:
-    """A stacked misfit [D] cut into its recordings."""
+def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Array) -> list[RecordingResidual]:
+    """Split a coefficient vector [D] by recording."""
     found = []
-    for recording, view, part in zip(stack.recordings, stack.views, stack.parts, strict=True):
-        own = coefficients[part].reshape(-1, len(view.order))
-        places = [p for p, used in zip(subject.places(recording), view.used, strict=True) if used]
-        beat = wave(view, subject.origin(recording)) @ own.T
-        found.append(Piece(view, tuple(places), own, view.variance[view.used], beat))
+    for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
+        own = coefficients[part].reshape(-1, len(beat_fit.order))
+        places = [p for p, used in zip(subject.channel_locations(recording), beat_fit.used, strict=True) if used]
+        beat = beat_series(beat_fit, subject.beat_start_phase(recording)) @ own.T
+        found.append(RecordingResidual(beat_fit, tuple(places), own, beat_fit.variance[beat_fit.used], beat))
     return found
 
 
-def wave(view: HarmonicFit, origin: float, count: int = PHASES) -> Array:
-    """[count, P] of the coefficients at equal steps of the beat; slow trends are left out."""
+def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Array:
+    """[count, P] value of each coefficient's basis function at equal steps of the beat; zero for slow trends."""
     psi = origin + 2 * np.pi * np.arange(count) / count
     columns = []
-    sine = np.zeros(len(view.order), bool)
-    kept = int(view.order[~view.trend].max())
+    sine = np.zeros(len(beat_fit.order), bool)
+    kept = int(beat_fit.order[~beat_fit.trend].max())
     sine[kept + 1 : 2 * kept + 1] = True
-    for order, odd, slow in zip(view.order, sine, view.trend, strict=True):
+    for order, odd, slow in zip(beat_fit.order, sine, beat_fit.trend, strict=True):
         columns.append(np.zeros(count) if slow else (np.sin if odd else np.cos)(order * psi))
     return np.stack(columns, axis=1)
 
 
-def markers(before: Sequence[Piece], after: Sequence[Piece]) -> tuple[MarkerMisfit, ...]:
-    """Misfit of each marker, or force axis, over all recordings in which it was seen."""
-    places: dict[str, Place] = {}
-    for piece in before:
-        for place in piece.places:
+def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> tuple[MarkerMisfit, ...]:
+    """Misfit of each marker, or force axis, over all recordings that contain it."""
+    places: dict[str, ChannelLocation] = {}
+    for residual in before:
+        for place in residual.locations:
             places.setdefault(place.name, place)
     return tuple(_marker(place, before, after) for place in places.values())
 
 
-def _marker(place: Place, before: Sequence[Piece], after: Sequence[Piece]) -> MarkerMisfit:
-    first, then = (_mean_square(place.name, pieces) for pieces in (before, after))
+def _marker(
+    place: ChannelLocation, before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]
+) -> MarkerMisfit:
+    first, then = (_mean_square(place.name, recording_residuals) for recording_residuals in (before, after))
     total, beats = np.zeros(PHASES), {axis: np.zeros(PHASES) for axis in "xyz"}
-    for piece in before:
-        for column, other in enumerate(piece.places):
+    for residual in before:
+        for column, other in enumerate(residual.locations):
             if other.name == place.name:
-                total += piece.beat[:, column] ** 2
-                beats[other.axis] += piece.beat[:, column]
+                total += residual.beat[:, column] ** 2
+                beats[other.axis] += residual.beat[:, column]
     worst = int(np.argmax(total))
     direction = np.array([beats[axis][worst] for axis in "xyz"])
     length = float(np.linalg.norm(direction))
@@ -81,22 +83,24 @@ def _marker(place: Place, before: Sequence[Piece], after: Sequence[Piece]) -> Ma
     return MarkerMisfit(place.name, place.span, place.chord, place.x, place.y, first, then, worst / PHASES, (x, y, z))
 
 
-def _mean_square(name: str, pieces: Sequence[Piece]) -> float:
+def _mean_square(name: str, recording_residuals: Sequence[RecordingResidual]) -> float:
     squares = [
-        float(piece.view.weight @ (piece.coefficients[c] ** 2 - piece.variance[c]))
-        for piece in pieces
-        for c, place in enumerate(piece.places)
+        float(residual.beat_fit.weight @ (residual.coefficients[c] ** 2 - residual.variance[c]))
+        for residual in recording_residuals
+        for c, place in enumerate(residual.locations)
         if place.name == name
     ]
     return float(np.sqrt(max(sum(squares) / len(squares), 0.0)))
 
 
-def phase_map(before: Sequence[Piece], after: Sequence[Piece]) -> PhaseMap:
+def phase_map(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> PhaseMap:
     """Root mean square of the periodic misfit over span bands and phase."""
-    known = np.array([p.span for piece in before for p in piece.places if p.span is not None], float)
+    known = np.array([p.span for residual in before for p in residual.locations if p.span is not None], float)
     edges = np.linspace(known.min(), known.max() + 1e-9, BANDS + 1) if len(known) else np.zeros(2)
-    first, then = (np.sqrt(_squares(pieces, edges)) for pieces in (before, after))
-    periodic = [(piece.variance * piece.view.weight)[:, ~piece.view.trend].sum(axis=1) for piece in before]
+    first, then = (np.sqrt(_squares(recording_residuals, edges)) for recording_residuals in (before, after))
+    periodic = [
+        (residual.variance * residual.beat_fit.weight)[:, ~residual.beat_fit.trend].sum(axis=1) for residual in before
+    ]
     noise = float(np.mean(np.concatenate(periodic)))
     return PhaseMap(
         tuple((0.5 * (edges[:-1] + edges[1:])).tolist()),
@@ -107,43 +111,44 @@ def phase_map(before: Sequence[Piece], after: Sequence[Piece]) -> PhaseMap:
     )
 
 
-def _squares(pieces: Sequence[Piece], edges: Array) -> Array:
+def _squares(recording_residuals: Sequence[RecordingResidual], edges: Array) -> Array:
     total, count = np.zeros((len(edges) - 1, PHASES)), np.zeros((len(edges) - 1, 1))
-    for piece in pieces:
-        for column, place in enumerate(piece.places):
+    for residual in recording_residuals:
+        for column, place in enumerate(residual.locations):
             at = 0.0 if place.span is None else place.span
             band = int(np.clip(np.searchsorted(edges, at, side="right") - 1, 0, len(edges) - 2))
-            total[band] += piece.beat[:, column] ** 2
+            total[band] += residual.beat[:, column] ** 2
             count[band] += 1
     return np.asarray(total / np.maximum(count, 1))
 
 
-def harmonics(stack: Stack, coefficients: Array) -> tuple[float, ...]:
-    """Part of the excess mean square in each harmonic of the beat, from the mean on; trends are left out."""
-    order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in stack.views])
-    trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in stack.views])
-    every = np.where(trend, 0.0, stack.weight * (coefficients**2 - stack.variance))
+def harmonics(data: WhitenedData, coefficients: Array) -> tuple[float, ...]:
+    """Fraction of the excess in each harmonic of the beat, from 0; trends are ignored."""
+    order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in data.beat_fits])
+    trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in data.beat_fits])
+    every = np.where(trend, 0.0, data.weight * (coefficients**2 - data.variance))
     found = np.maximum(np.bincount(order, weights=every), 0.0)
     return tuple((found / max(found.sum(), 1e-300)).tolist())
 
 
 def overlays(
-    subject: Subject, stack: Stack, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
+    subject: Subject, data: WhitenedData, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
 ) -> Iterator[Overlay]:
-    """Channels in which the two models differ most (one that differs nowhere: that the nominal one misses most).
+    """The channel in which the two models differ most, for the ``most`` recordings that changed most.
 
-    One from each of the recordings that changed most.
-
-    ``before`` and ``after`` are residuals [T, C] of each recording.
+    Where they do not differ, the channel with the largest misfit of the nominal model. ``before`` and ``after`` are
+    residuals [T, C] of each recording.
     """
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:
-        recording = stack.recordings[r]
+        recording = data.recordings[r]
         apart = before[r] - after[r] if change[r] > 0.0 else before[r]
-        square = np.where(stack.views[r].used, np.nan_to_num(apart**2).sum(axis=0), 0.0)
+        square = np.where(data.beat_fits[r].used, np.nan_to_num(apart**2).sum(axis=0), 0.0)
         channel = int(np.argmax(square))
         seen = np.isfinite(before[r][:, channel])
-        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen] - subject.origin(recording)
+        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen] - subject.beat_start_phase(
+            recording
+        )
         phase = (psi / (2 * np.pi)) % 1.0
         turn = np.argsort(phase)
         recorded = recording.values[seen, channel]

@@ -1,12 +1,11 @@
-"""The load that a model lacks, from what its tracks answer to known loads: Bayesian linear inversion.
+"""The missing load, inferred from the responses of the tracks to unit loads: Bayesian linear inversion.
 
-A recording shows y = H w + S g + noise: y what was recorded less what the nominal model says, H the responses to unit
-loads (a :class:`wingfit.sim.effects.probe.Probe`), w their sizes under this condition, S the sensitivities to the
-nominal genes and g what the genes are wrong by, the same for all recordings. Tracks tell well when a load acts, and its
-moment about the root, but hardly how it is spread along the span. So several kinds of load are possible a priori,
-smooth ones and those of one place, of free shape in the beat; the evidence (MacKay, Neural Computation 4, 1992, Eqs.
-2.8-2.14) says how probable each kind is and how strong the load under each condition, and all that is told is averaged
-over the kinds. Genes may be wrong by a good part of their box.
+A recording is y = H w + S g + noise: y recorded minus simulated by the nominal model, H the responses to unit loads (a
+:class:`wingfit.sim.effects.probe.Probe`), w the load's sizes under this condition, S the sensitivities to the nominal
+genes and g their errors, the same for all recordings. Tracks identify well when a load acts and its moment about the
+root, but hardly its distribution along the span. So several kinds of load are considered, smooth and localised, with
+free time courses. The evidence (MacKay, Neural Computation 4, 1992, Eqs. 2.8-2.14) gives the probability of each kind
+and the strength of the load under each condition; results are averaged over the kinds.
 """
 
 from __future__ import annotations
@@ -19,110 +18,112 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.diagnosis.finding import Interval, MissingLoad, table
-from wingfit.diagnosis.location.load_kinds import Form, driven, placed, smooth, spreads
+from wingfit.diagnosis.location.load_kinds import LoadForm, drive_errors, localised, smooth, spreads
 from wingfit.sim.effects.probe import Probe
 
 Array = npt.NDArray[np.float64]
 
-PHASES = 36  # instants of a beat that loads are told at
-GENES = 0.3  # unit coordinates: standard deviation of what the nominal genes may be wrong by
-LINEAR = 0.03  # of a response: what is not proportional to the load
-TOLD = 5.0  # natural logarithm of the evidence for a load over none: less is none
-_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m; any unit in which responses are told
-_LIKELY = 0.005  # probability, in parts of the most probable kind's, below which a kind is left out
-_MOST = 60  # kinds to average over
-DOUBT = 0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
+PHASES = 36  # instants of a beat at which loads are reported
+GENE_ERROR_SD = 0.3  # standard deviation of the nominal genes' errors, unit coordinates
+NONLINEARITY = 0.03  # of a response: the part that is not proportional to the load
+MIN_EVIDENCE = 5.0  # log evidence relative to no load; below it there is none
+_STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m, or the unit of the responses
+_MIN_RELATIVE_PROBABILITY = 0.005  # relative to the most probable kind; less probable kinds are ignored
+_MAX_KINDS = 60  # that are averaged
+RESPONSE_ERROR = (  # fraction by which errors of the model's responses may change the evidence
+    0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
+)
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
-SPREAD = 0.3  # mean direction of the phase: less, and the load is spread over the beat
+MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the load is spread over the beat
 
 
 @dataclass(frozen=True)
 class Case:
-    """One recording, whitened: every number in standard deviations of independent noise.
+    """One recording, whitened: all numbers in standard deviations of independent noise.
 
     Attributes:
         name: of the recording.
-        lacking: [D] recorded less simulated by the refitted nominal model.
+        residual: [D] recorded minus simulated by the refitted nominal model.
         responses: [D, P] to unit loads, in the order of the probe's genes.
         sensitivities: [D, F] to the nominal genes, unit coordinates.
         crossing: drive phase (beats) at which the recorded beat starts.
     """
 
     name: str
-    lacking: Array
+    residual: Array
     responses: Array
     sensitivities: Array
     crossing: float
 
 
-def decorrelated(values: Array, place: npt.NDArray[np.int64], memory: float) -> Array:
-    """Rows [n, ...] at samples ``place``, of noise with correlation memory^apart, as rows with independent noise."""
+def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
+    """Whiten rows [n, ...] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
     if not len(values):
         return values
-    kept = memory ** np.diff(place)[:, None]
+    kept = lag1 ** np.diff(place)[:, None]
     return np.concatenate([values[:1], (values[1:] - kept * values[:-1]) / np.sqrt(1.0 - kept**2)])
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A kind of load and what it says: ``probability``, sizes [R, P], covariance [R, P, P].
+class LoadKind:
+    """A kind of load and its posterior: ``probability``, mean sizes [R, P], covariance [R, P, P].
 
-    ``centre`` and ``width`` (standard deviation) of loads of one place, parts of the span, and where along the chord
-    they act; None for smooth loads, and without a probe that turns. ``driven``: a motion of the rods instead.
+    ``centre``, ``width`` (standard deviation) and ``chord`` (0 to 1) of localised loads; None for smooth loads, and
+    ``chord`` for a probe without moments. ``drive_error``: turns of the rods instead.
     """
 
     probability: float
     centre: float | None
     width: float | None
     chord: float | None
-    driven: bool
+    drive_error: bool
     sizes: Array
     covariance: Array
 
 
 @dataclass(frozen=True)
-class Inferred:
+class InferredLoads:
     """Loads under each of R conditions.
 
     Attributes:
-        probe: whose unit loads they are made of.
+        probe: its unit loads.
         names: of the recordings.
         crossings: of the recordings, :attr:`Case.crossing`.
         kinds: of load, the most probable first.
-        evidence: [R] natural logarithm, for a load in this recording over none.
-        floor: [R], by which the noise was taken to be larger than told, because no load explains the rest.
+        evidence: [R] log evidence for a load in this recording relative to none.
+        floor: [R] factor by which the noise was raised to the residual that no load explains.
     """
 
     probe: Probe
     names: tuple[str, ...]
     crossings: tuple[float, ...]
-    kinds: tuple[Kind, ...]
+    kinds: tuple[LoadKind, ...]
     evidence: Array
     floor: Array
 
     @property
-    def placed(self) -> float:
-        """Probability of loads of one place."""
+    def localised(self) -> float:
+        """Probability of localised loads."""
         return sum(kind.probability for kind in self.kinds if kind.centre is not None)
 
     @property
-    def driven(self) -> bool:
-        """Whether the rods move otherwise, and no load acts."""
-        return self.kinds[0].driven
+    def drive_error(self) -> bool:
+        """Whether the drive rods are in error, and no load acts."""
+        return self.kinds[0].drive_error
 
     def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
-        """Forces and standard errors [R, span, phase] at parts of the ``span`` and ``phase`` (beats) of the beat.
+        """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
 
-        Of rods that move otherwise their turns, deg, [R, 2, phase].
+        For errors of the drive, the rods' turns, deg, [R, 2, phase].
         """
         values, errors = [], []
         weight = np.array([kind.probability for kind in self.kinds])
-        places = np.eye(2) if self.driven else self.probe.hats(span)
+        places = np.eye(2) if self.drive_error else self.probe.hats(span)
         for r, crossing in enumerate(self.crossings):
             basis = np.kron(places, self.probe.terms(phase + crossing))
-            each = np.array([basis @ kind.sizes[r, self.told] for kind in self.kinds])
-            covariances = [kind.covariance[r, self.told, self.told] for kind in self.kinds]
+            each = np.array([basis @ kind.sizes[r, self.reported] for kind in self.kinds])
+            covariances = [kind.covariance[r, self.reported, self.reported] for kind in self.kinds]
             own = [np.einsum("np,pq,nq->n", basis, one, basis, optimize=True) for one in covariances]
             mean = weight @ each
             values.append(mean)
@@ -131,56 +132,57 @@ class Inferred:
         return np.reshape(values, shape), np.reshape(errors, shape)
 
     @property
-    def told(self) -> slice:
-        """The forces among the sizes, or the turns of the rods."""
-        return slice(self.probe.loads, None) if self.driven else slice(0, self.probe.forces)
+    def reported(self) -> slice:
+        """The sizes that are reported: forces, or turns of the rods."""
+        return slice(self.probe.loads, None) if self.drive_error else slice(0, self.probe.forces)
 
     @property
-    def left(self) -> float:
-        """Mean square of what is left, in parts of the noise's: of two models, the one with less is nearer."""
+    def noise_inflation(self) -> float:
+        """Mean square of the remaining residual divided by the noise variance; of two models the lower is better."""
         return float(np.mean(self.floor**2))
 
 
 @dataclass(frozen=True)
 class LoadPlace:
-    """Where and when the missing load acts: centres with 90 % intervals, and the parts in which it mostly acts.
+    """Where and when the missing load acts: centres with 90 % intervals, and extents.
 
-    ``span`` in parts of it, ``reach`` the part of the span that holds 90 % of it; ``phase`` in beats from the start of
-    the beat, None where it is spread over the whole beat, ``lasts`` the part of the beat that holds 90 % of what is
-    larger than half of the most (it may begin below 0 or end beyond 1 where it passes the start); ``chord`` in parts of
-    it from the leading edge, None where the load is spread smoothly, or the probe does not turn. Of rods that move
-    otherwise there is a phase only.
+    ``span`` and ``extent``, which holds 90 % of the load, from 0 to 1; ``phase`` in beats from the start of the beat,
+    None where the load is spread over the beat; ``duration``, which holds 90 % of the load above half of its maximum
+    (it may start below 0 or end beyond 1); ``chord`` from the leading edge, None for a smooth load or a probe without
+    moments. Errors of the drive have a phase only.
     """
 
     span: Interval | None
-    reach: tuple[float, float]
+    extent: tuple[float, float]
     phase: Interval | None
-    lasts: tuple[float, float]
+    duration: tuple[float, float]
     chord: Interval | None = None
 
 
-class _Normal:
-    """Normal equations of one recording, the noise raised to what no load and no gene explains."""
+class _NormalEquations:
+    """Normal equations of one recording, with the noise raised to the residual that no load and no gene explains."""
 
     def __init__(self, case: Case) -> None:
-        H, S, y = case.responses, case.sensitivities, case.lacking
+        H, S, y = case.responses, case.sensitivities, case.residual
         both = np.concatenate([H, S], axis=1)
-        left = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
-        size, left_over = both.shape[1], float(left @ left)
-        told = max(float(y @ y) - left_over - size, 0.0) / size  # mean square, in the directions of loads and genes
-        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + LINEAR**2 * told))
+        remainder = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
+        size, left_over = both.shape[1], float(remainder @ remainder)
+        explained = (
+            max(float(y @ y) - left_over - size, 0.0) / size
+        )  # mean square, in the directions of loads and genes
+        self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + NONLINEARITY**2 * explained))
         scale = self.floor**-2
         self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
         self.h, self.s = scale * (H.T @ y), scale * (S.T @ y)
-        genes = np.linalg.inv(self.C + np.eye(len(self.C)) / GENES**2)
-        self.alone = self.A - self.B @ genes @ self.B.T
-        self.force = self.h - self.B @ genes @ self.s
+        genes = np.linalg.inv(self.C + np.eye(len(self.C)) / GENE_ERROR_SD**2)
+        self.load_information = self.A - self.B @ genes @ self.B.T
+        self.load_score = self.h - self.B @ genes @ self.s
 
     def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
-        """Logarithm of the evidence over that of no load, [K, strengths].
+        """Log evidence relative to no load, [K, strengths].
 
-        Of loads that are sums of ``shapes``, K times [Z, stations], each times independent normal numbers for every one
-        of M terms, with standard deviations ``spread`` [M] times the strength.
+        A load is the sum of one of K ``shapes``, [Z, stations] each, times independent normal numbers for each of M
+        terms, with standard deviations ``spread`` [M] times the strength.
         """
         return np.concatenate(
             [self._evidence(np.array(list(alike)), spread) for _, alike in groupby(shapes, key=len)]
@@ -189,33 +191,36 @@ class _Normal:
 
     def _evidence(self, shapes: Array, spread: Array) -> Array:
         M = len(spread)
-        Q = len(self.force) // M
-        inner = self.alone.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
+        Q = len(self.load_score) // M
+        inner = self.load_information.reshape(Q, M, Q, M).transpose(0, 2, 1, 3).reshape(Q * Q, M * M)
         K, Z = shapes.shape[:2]
         pairs = np.einsum("kyq,kzr->kyzqr", shapes, shapes).reshape(K * Z * Z, Q * Q)
         blocks = (pairs @ inner).reshape(K, Z, Z, M, M).transpose(0, 1, 3, 2, 4)
         whole = (blocks * spread[:, None, None] * spread).reshape(K, Z * M, Z * M)
-        along = ((shapes @ self.force.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
+        along = ((shapes @ self.load_score.reshape(Q, M)) * spread).reshape(K, 1, Z * M)
         size, turn = np.linalg.eigh(whole)
-        told = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
+        power = np.maximum(size, 0.0)[:, None, :] * _STRENGTHS[:, None] ** 2
         along = (along @ turn) * _STRENGTHS[:, None]
-        return np.asarray(0.5 * (along**2 / (1.0 + told) - np.log1p(told)).sum(axis=2))
+        return np.asarray(0.5 * (along**2 / (1.0 + power) - np.log1p(power)).sum(axis=2))
 
 
-def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt: float = DOUBT) -> Inferred:
-    """Invert ``cases``, which share the nominal genes; ValueError where there is none.
+def infer(
+    cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
+) -> InferredLoads:
+    """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 
-    Kinds of load are averaged over; rods that move otherwise are told where nothing else does as well.
-    ``chord`` [stations] of the wing at the probe's (m), for one that turns; ``doubt`` about the model's responses, as a
-    part of the evidence.
+    Averages over kinds of load; errors of the drive are reported where no load explains as much. ``chord`` [stations]
+    (m) of the wing, for a probe with moments; ``response_error``: uncertainty of the evidence by the model's responses.
     """
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
     if probe.turning and (chord is None or len(chord) != len(probe.stations)):
-        raise ValueError(f"a probe that turns needs the chord at each of its {len(probe.stations)} stations")
-    normals = [_Normal(case) for case in cases]
-    families = [smooth(probe, chord), placed(probe, chord), driven(probe)]
-    forms = [Form(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))]
+        raise ValueError(f"a probe with moments needs the chord at each of its {len(probe.stations)} stations")
+    normals = [_NormalEquations(case) for case in cases]
+    families = [smooth(probe, chord), localised(probe, chord), drive_errors(probe)]
+    forms = [
+        LoadForm(family, k, spread) for family in families for spread in spreads(probe) for k in range(len(family))
+    ]
     evidence = np.array(
         [
             np.concatenate([normal.evidence(family.shapes, s) for family in families for s in spreads(probe)])
@@ -224,17 +229,19 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     ).transpose(1, 0, 2)  # [forms, R, strengths]
     best = evidence.max(axis=2)
     total = best.sum(axis=1) + np.log([form.family.share / len(spreads(probe)) for form in forms])
-    weight = np.exp((total - total.max()) / max(doubt * float(total.max()), 1.0))
-    driving = np.array([form.family.driven for form in forms])
-    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that do as well as rods are huge ones at the root
-    kept = [int(k) for k in np.argsort(-weight)[:_MOST] if weight[k] >= _LIKELY]
+    weight = np.exp((total - total.max()) / max(response_error * float(total.max()), 1.0))
+    driving = np.array([form.family.drive_error for form in forms])
+    weight[driving != driving[np.argmax(total)]] = 0.0  # loads that imitate rods are huge ones at the root
+    kept = [int(k) for k in np.argsort(-weight)[:_MAX_KINDS] if weight[k] >= _MIN_RELATIVE_PROBABILITY]
     kinds = []
     for k in kept:
         family, number, _ = form = forms[k]
         strengths = _STRENGTHS[evidence[k].argmax(axis=1)]
-        solved = _solved(normals, [strength * form.root for strength in strengths])
-        kinds.append(Kind(float(weight[k] / weight[kept].sum()), *family.places[number], family.driven, *solved))
-    return Inferred(
+        solved = _posterior(normals, [strength * form.root for strength in strengths])
+        kinds.append(
+            LoadKind(float(weight[k] / weight[kept].sum()), *family.places[number], family.drive_error, *solved)
+        )
+    return InferredLoads(
         probe,
         tuple(case.name for case in cases),
         tuple(case.crossing for case in cases),
@@ -244,10 +251,10 @@ def infer(cases: Sequence[Case], probe: Probe, chord: Array | None = None, doubt
     )
 
 
-def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, Array]:
-    """Loads [R, P] and their covariance [R, P, P], the genes free: the loads are eliminated first."""
+def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> tuple[Array, Array]:
+    """Loads [R, P] and their covariance [R, P, P] with free genes; the loads are eliminated first."""
     F = len(normals[0].s)
-    precision, slope = np.eye(F) / GENES**2, np.zeros(F)
+    precision, slope = np.eye(F) / GENE_ERROR_SD**2, np.zeros(F)
     inner = []
     for one, root in zip(normals, roots, strict=True):
         V = root @ np.linalg.solve(np.eye(root.shape[1]) + root.T @ one.A @ root, root.T)
@@ -261,15 +268,15 @@ def _solved(normals: Sequence[_Normal], roots: Sequence[Array]) -> tuple[Array, 
     return np.array(sizes), np.array(covariance)
 
 
-def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
-    """The load under each condition at the probe's stations and PHASES instants from the start of the beat on.
+def missing_loads(inferred: InferredLoads) -> tuple[MissingLoad, ...]:
+    """The load under each condition at the probe's stations and PHASES instants from the start of the beat.
 
-    Of rods that move otherwise, what each of these turns further, rad.
+    For errors of the drive, the additional turn of each rod, rad.
     """
     phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
     values, errors = inferred.fields(np.array(stations), phase)
     at = tuple(phase.tolist())
-    if not inferred.driven:
+    if not inferred.drive_error:
         every = zip(inferred.names, values, errors, strict=True)
         return tuple(MissingLoad(name, stations, at, table(v), table(e), "N/m") for name, v, e in every)
     values, errors = np.radians(values), np.radians(errors)
@@ -281,12 +288,12 @@ def missing_loads(inferred: Inferred) -> tuple[MissingLoad, ...]:
     )
 
 
-def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
-    """Where and when the load acts, over all recordings that show one; None where none does.
+def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
+    """Where and when the load acts, over all recordings with one; None where there is none.
 
-    From draws of what the data leave possible. The centre in the beat is that of what is larger than half of the most.
+    From posterior draws. The centre in the beat is that of the load above half of its maximum.
     """
-    shown = np.flatnonzero(inferred.evidence > TOLD)
+    shown = np.flatnonzero(inferred.evidence > MIN_EVIDENCE)
     if not len(shown):
         return None
     rng = np.random.default_rng(seed)
@@ -296,60 +303,64 @@ def place(inferred: Inferred, seed: int = 0) -> LoadPlace | None:
     for kind, count in zip(inferred.kinds, draws, strict=True):
         if not count:
             continue
-        fields = _drawn(inferred, kind, shown, phase, int(count), rng)
-        if kind.driven:
+        fields = _posterior_draws(inferred, kind, shown, phase, int(count), rng)
+        if kind.drive_error:
             pass
         elif kind.centre is not None and kind.width is not None:
             bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
             along.append(np.tile(bump, (count, 1)))
         else:
             along.append(np.abs(fields).sum(axis=(0, 3)))
-        over = fields - fields.mean(axis=3, keepdims=True) if kind.driven else fields.sum(axis=2, keepdims=True)
+        over = fields - fields.mean(axis=3, keepdims=True) if kind.drive_error else fields.sum(axis=2, keepdims=True)
         during.append(np.abs(over).sum(axis=(0, 2)))
         chords += [kind.chord] * int(count) if kind.chord is not None else []
-    if inferred.driven:
-        return LoadPlace(None, (0.0, 1.0), *_during(phase, np.concatenate(during)))
-    span, reach = _along(np.concatenate(along))
+    if inferred.drive_error:
+        return LoadPlace(None, (0.0, 1.0), *_phase_location(phase, np.concatenate(during)))
+    span, extent = _span_location(np.concatenate(along))
     likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
     chord = None
-    if likeliest is not None and inferred.placed > 0.5:  # the mean of all places lies between root and tip
-        span = _told(likeliest.centre, span)
-        chord = _told(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist())) if chords else None
-    return LoadPlace(span, reach, *_during(phase, np.concatenate(during)), chord)
+    if likeliest is not None and inferred.localised > 0.5:  # the mean over all locations would lie between root and tip
+        span = _with_interval(likeliest.centre, span)
+        chord = (
+            _with_interval(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
+            if chords
+            else None
+        )
+    return LoadPlace(span, extent, *_phase_location(phase, np.concatenate(during)), chord)
 
 
-def _told(value: float | None, draws: Interval) -> Interval:
-    """``value`` with the interval of draws, which it may lie at an end of."""
+def _with_interval(value: float | None, draws: Interval) -> Interval:
+    """``value`` with the interval of the draws, extended to contain it."""
     if value is None or draws.low is None or draws.high is None:
         return draws
     return Interval(value, min(draws.low, value), max(draws.high, value))
 
 
-def _drawn(
-    inferred: Inferred,
-    kind: Kind,
+def _posterior_draws(
+    inferred: InferredLoads,
+    kind: LoadKind,
     shown: npt.NDArray[np.int64],
     phase: Array,
     count: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Draws of the loads [shown, count, span, phase], each recording's in parts of its root mean square.
+    """Draws of the loads [shown, count, span, phase], divided by each recording's root mean square.
 
-    Of rods that move otherwise [shown, count, 2, phase].
+    For errors of the drive [shown, count, 2, phase].
     """
-    places, found = np.eye(2) if kind.driven else inferred.probe.hats(_SPAN), []
+    places, found = np.eye(2) if kind.drive_error else inferred.probe.hats(_SPAN), []
     for r in shown:
         size, turn = np.linalg.eigh(kind.covariance[r])
         off = rng.standard_normal((count, len(size))) * np.sqrt(np.maximum(size, 0.0))
-        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.told].reshape(count, places.shape[1], -1)
+        sizes = (kind.sizes[r] + off @ turn.T)[:, inferred.reported].reshape(count, places.shape[1], -1)
         series = inferred.probe.terms(phase + inferred.crossings[r])
         field = np.einsum("sj,cjk,pk->csp", places, sizes, series, optimize=True)
         found.append(field / np.sqrt(np.mean(field**2, axis=(1, 2), keepdims=True)))
     return np.array(found)
 
 
-def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
-    """Centre of loads of sizes [draws, span] with its interval, and the part of the span with 90 % of them."""
+def _span_location(size: Array) -> tuple[Interval, tuple[float, float]]:
+    """Centre with interval of loads of sizes [draws, span], and the range that holds 90 % of them."""
     share = size / size.sum(axis=1, keepdims=True)
     centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
     total = np.cumsum(share.mean(axis=0))
@@ -357,12 +368,12 @@ def _along(size: Array) -> tuple[Interval, tuple[float, float]]:
     return Interval(*centre.tolist()), (float(first), float(last))
 
 
-def _during(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
+def _phase_location(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
     """The same in the beat, for sizes [draws, phase]."""
     peak = np.where(size > 0.5 * size.max(axis=1, keepdims=True), size, 0.0)
     turns = peak @ np.exp(2j * np.pi * phase) / peak.sum(axis=1)
     middle = turns.mean()
-    if np.abs(middle) < SPREAD:
+    if np.abs(middle) < MIN_PHASE_CONCENTRATION:
         return None, (0.0, 1.0)
     centre = float(np.angle(middle) / (2 * np.pi)) % 1.0
     off = np.quantile(np.angle(turns / middle) / (2 * np.pi), [0.05, 0.95])

@@ -1,159 +1,174 @@
-"""What to record next: the condition under which the explanations that are still alive differ most."""
+"""The next experiment: the condition under which the remaining hypotheses differ most."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, residuals_of, values_at
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem
-from wingfit.diagnosis.evidence.fit import PRIOR, Fit
+from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Advice
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, tolerated
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
 
 Array = npt.NDArray[np.float64]
 
-ALIVE = 0.02  # probability from which an explanation is alive
-RIVALS = 3
-TOLD = 5  # conditions
-DECIDED = 0.9  # probability from which few conditions are compared: there is little to separate
-FEW = 8
+MIN_PROBABILITY = 0.02  # of a hypothesis that is compared
+MAX_RIVALS = 3  # hypotheses that are compared
+MAX_ADVICE = 5  # conditions that are reported
+NEARLY_CERTAIN = 0.9  # probability from which fewer conditions are compared
+MAX_CONDITIONS_IF_CERTAIN = 8  # conditions
 
 
-def rivals(weighed: Weighed) -> list[Refit]:
-    """The explanations that are still alive, most probable first; a single one with the next. None where none is."""
-    order = np.argsort(-weighed.probabilities, kind="stable")
-    alive = [k for k in order if weighed.probabilities[k] >= ALIVE]
-    return [weighed.refits[k] for k in (order[:2] if len(alive) == 1 else alive)[:RIVALS]]
+def rival_refits(weights: HypothesisWeights) -> list[Refit]:
+    """Hypotheses that are still probable, most probable first; a single one with the next; else empty."""
+    order = np.argsort(-weights.probabilities, kind="stable")
+    rivals = [k for k in order if weights.probabilities[k] >= MIN_PROBABILITY]
+    return [weights.refits[k] for k in (order[:2] if len(rivals) == 1 else rivals)[:MAX_RIVALS]]
 
 
 def separations(
-    subject: Subject, stack: Stack, weighed: Weighed, evaluator: Evaluator
+    subject: Subject, data: WhitenedData, weights: HypothesisWeights, evaluator: Evaluator
 ) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
-    """How far explanations would lie apart under conditions that might be recorded, with the part that is done.
+    """Separation of the hypotheses under candidate conditions; yields the fraction done and each result.
 
-    First as they were fitted, then, where that is far, by what a rival cannot make up for, which is never more: until
-    no other condition can be among the best TOLD. Nothing where no two explanations are left or no other condition can
-    be run.
+    Conditions are ordered by the separation with fixed genes, an upper bound; then rivals may adapt their genes, until
+    no other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no
+    conditions.
     """
-    alive, able = rivals(weighed), subject.conditions()
-    if len(alive) < 2:
+    rivals, conditions = rival_refits(weights), subject.candidate_conditions()
+    if len(rivals) < 2:
         return
-    if weighed.probabilities.max() >= DECIDED:
-        able = able[:FEW]
-    scenes = list[tuple[float, _Scene]]()
-    for k, condition in enumerate(able):
-        scene = _scene(subject, alive[0], condition)
-        least = None if scene is None else _least(subject, stack, scene, alive[1:], evaluator, adapts=False)
-        scenes += [] if scene is None or least is None else [(least, scene)]
-        yield 0.5 * (k + 1) / len(able), None
+    if weights.probabilities.max() >= NEARLY_CERTAIN:
+        conditions = conditions[:MAX_CONDITIONS_IF_CERTAIN]
+    predicted = list[tuple[float, _PredictedCondition]]()
+    for k, condition in enumerate(conditions):
+        prediction = _predict_condition(subject, rivals[0], condition)
+        if prediction is not None:
+            most = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=False)
+            predicted += [] if most is None else [(most, prediction)]
+        yield 0.5 * (k + 1) / len(conditions), None
     found = list[float]()
-    for k, (most, scene) in enumerate(sorted(scenes, key=lambda pair: -pair[0])):
-        if sum(one >= most for one in found) >= TOLD:
+    for k, (most, prediction) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
+        if sum(one >= most for one in found) >= MAX_ADVICE:
             return
-        least = _least(subject, stack, scene, alive[1:], evaluator, adapts=True)
+        least = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=True)
         found += [] if least is None else [least]
-        yield 0.5 + 0.5 * (k + 1) / len(scenes), None if least is None else (least, scene.shell.condition)
+        yield 0.5 + 0.5 * (k + 1) / len(predicted), None if least is None else (least, prediction.recording.condition)
 
 
-def advised(stack: Stack, weighed: Weighed, apart: Sequence[tuple[float, Condition]]) -> tuple[Advice, ...]:
+def rank_conditions(
+    data: WhitenedData, weights: HypothesisWeights, apart: Sequence[tuple[float, Condition]]
+) -> tuple[Advice, ...]:
     """Conditions to record next, best first, from :func:`separations`."""
-    best, alive = sorted(apart, key=lambda pair: -pair[0])[:TOLD], rivals(weighed)
-    return tuple(_advice(stack, weighed, alive, size, condition) for size, condition in best)
+    best, rivals = sorted(apart, key=lambda pair: -pair[0])[:MAX_ADVICE], rival_refits(weights)
+    return tuple(_advice(data, weights, rivals, size, condition) for size, condition in best)
 
 
 @dataclass(frozen=True)
-class _Scene:
-    """A condition with what the first explanation, of ``genome`` [G], shows under it."""
+class _PredictedCondition:
+    """The ``recording`` that the first hypothesis, with ``genome`` [G], predicts under a condition."""
 
     genome: Array
-    shell: Recording
+    recording: Recording
 
 
-def _scene(subject: Subject, first: Refit, condition: Condition) -> _Scene | None:
+def _predict_condition(subject: Subject, first: Refit, condition: Condition) -> _PredictedCondition | None:
     genome = first.fit.problem.genomes(np.array(list(first.fit.values.values())))[0]
-    shell = subject.shown(subject.beside(subject.extended(first.names), genome), genome, condition)
-    return None if shell is None else _Scene(genome, shell)
+    model = subject.with_initial_motion(subject.extended(first.names), genome)
+    recording = subject.simulated_recording(model, genome, condition)
+    return None if recording is None else _PredictedCondition(genome, recording)
 
 
-def _least(
-    subject: Subject, stack: Stack, scene: _Scene, others: Sequence[Refit], evaluator: Evaluator, *, adapts: bool
+def _separation(
+    subject: Subject,
+    data: WhitenedData,
+    prediction: _PredictedCondition,
+    others: Sequence[Refit],
+    evaluator: Evaluator,
+    *,
+    adapt: bool,
 ) -> float | None:
-    """Of several rivals; None where one of them cannot be simulated."""
-    every = [unlike(subject, stack, scene.genome, scene.shell, one.fit, evaluator, adapts=adapts) for one in others]
-    known = [one for one in every if one is not None]
+    """Smallest separation of several rivals; None where one of them cannot be simulated."""
+    genome, recording = prediction.genome, prediction.recording
+    values = [separation(subject, data, genome, recording, one.fit, evaluator, adapt=adapt) for one in others]
+    known = [one for one in values if one is not None]
     return min(known) if len(known) == len(others) else None
 
 
-def unlike(
-    subject: Subject, stack: Stack, genome: Array, shell: Recording, rival: Fit, evaluator: Evaluator, *, adapts: bool
+def separation(
+    subject: Subject,
+    data: WhitenedData,
+    genome: Array,
+    recording: Recording,
+    rival: Fit,
+    evaluator: Evaluator,
+    *,
+    adapt: bool,
 ) -> float | None:
-    """Root mean square difference (in noises) of a rival from what the first explanation foretells.
+    """Root mean square difference (in noises) of a rival from the first hypothesis' prediction ``recording``.
 
-    Where it ``adapts``, with its genes moved as far as the recordings that there are allow. What makes two explanations
-    alike is that their genes differ: where these alone set them apart, a new recording is met by other genes (Atkinson
-    and Fedorov 1975: T-optimality; here with what is known of the genes already).
+    With ``adapt`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
+    can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
+    the genes). None where the rival cannot be simulated.
     """
-    problem = Problem(
-        subject.beside(rival.problem.model, genome),
-        (shell,),
-        rival.problem.free,
-        rival.problem.base,
-        rival.problem.axes,
-    )
+    model = subject.with_initial_motion(rival.problem.model, genome)
+    problem = replace(rival.problem, model=model, recordings=(recording,))
 
     def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
         evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
         return residuals_of(evaluation), evaluation.reasons
 
-    columns = np.arange(len(rival.unit)) if adapts else np.empty(0, np.int64)
+    columns = np.arange(len(rival.unit)) if adapt else np.empty(0, np.int64)
     try:
         found = differences(simulate, rival.unit, columns, sides=1)
     except ValueError:
         return None
     seen = np.isfinite(found.outputs[0])
-    white, slopes = found.outputs[0][seen] / stack.noise, found.slopes[0][seen].T / stack.noise
+    white, slopes = found.outputs[0][seen] / data.noise, found.slopes[0][seen].T / data.noise
     whole = float(white @ white)
-    if adapts:
-        whole -= _made_up_for(stack, rival, white, slopes)
+    if adapt:
+        whole -= _explained_by_genes(data, rival, white, slopes)
     return float(np.sqrt(max(whole, 0.0) / len(white)))
 
 
-def _made_up_for(stack: Stack, rival: Fit, difference: Array, slopes: Array) -> float:
-    """Of the square of a ``difference`` [n] (in noises): what genes with ``slopes`` [F, n] take, and cost elsewhere."""
-    memory = float(np.clip(np.mean([view.lag1 for view in stack.views]), 0.0, 0.99))
-    trust = stack.trust(rival.coefficients)
-    counts = trust * (1.0 - memory) / (1.0 + memory)  # of a sample: noise that lasts tells less
-    known = rival.jacobian / stack.scale[:, None]
-    told = trust * known.T @ known + np.eye(len(rival.unit)) / PRIOR**2
+def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
+    """Part of the square of ``difference`` [n] (in noises) that genes with ``slopes`` [F, n] explain, less its cost."""
+    lag1 = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
+    weight = data.likelihood_weight(rival.coefficients)
+    counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
+    known = rival.jacobian / data.scale[:, None]
+    information = weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
     score = slopes @ difference
-    return float(counts * score @ np.linalg.solve(told + counts * slopes @ slopes.T, score))
+    return float(counts * score @ np.linalg.solve(information + counts * slopes @ slopes.T, score))
 
 
-def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float, condition: Condition) -> Advice:
-    share = 1.0 / (len(stack.recordings) + 1.0)
-    unit = stack.noise**2
-    tau = tolerated(stack, weighed.left[0] * unit, 0.0) / unit + float(weighed.left.min())
-    gain = 0.5 * stack.pieces / (1.0 - share) * np.log1p(share * apart**2 / tau)
-    odds = np.log(stack.policy.single / (1.0 - stack.policy.single))
+def _advice(
+    data: WhitenedData, weights: HypothesisWeights, rivals: Sequence[Refit], apart: float, condition: Condition
+) -> Advice:
+    share = 1.0 / (len(data.recordings) + 1.0)
+    noise_variance = data.noise**2
+    tau = tolerated_excess(data, weights.excess[0] * noise_variance, 0.0) / noise_variance + float(weights.excess.min())
+    gain = 0.5 * data.effective_samples / (1.0 - share) * np.log1p(share * apart**2 / tau)
+    odds = np.log(data.policy.single / (1.0 - data.policy.single))
     resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))
     lag, incidence = float(np.degrees(condition.phase_lag)), float(np.degrees(condition.angle_of_attack))
     where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
-    names = tuple(" and ".join(one.names) or "nothing lacking" for one in alive)
-    told = [" with ".join(trial.suspect.title.lower() for trial in one.trials) or "nothing lacking" for one in alive]
+    between = tuple(" and ".join(one.names) or "no missing physics" for one in rivals)
+    suspects = [[trial.suspect.title.lower() for trial in one.trials] for one in rivals]
+    titles = [" with ".join(names) or "no missing physics" for names in suspects]
     return Advice(
-        f"record at {where}: {' or '.join(told)} would differ by {apart:.2g} times the noise",
+        f"record {where}: there the predictions of {' and '.join(titles)} differ by {apart:.2g} sigma",
         condition.flap_frequency,
         lag,
         condition.pressure / 100.0,
@@ -161,5 +176,5 @@ def _advice(stack: Stack, weighed: Weighed, alive: Sequence[Refit], apart: float
         incidence,
         apart,
         resolves,
-        names,
+        between,
     )

@@ -12,62 +12,65 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit
 from wingfit.records import Recording
 
 Array = npt.NDArray[np.float64]
 
-DRAWS = 400  # of markers, with replacement (bootstrap; Efron 1979)
-FEWEST = 4  # markers to draw from
+BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
+MIN_MARKERS = 4  # for a bootstrap over markers
 
 
 @dataclass(frozen=True)
-class Predicted:
-    """Residuals [T, C] of each recording of a stack, with the nominal model and with what was found.
+class ResidualPair:
+    """Residuals [T, C] of each recording of ``data``, with the nominal model and with the added effects.
 
-    ``broken``: what was found could not be simulated under every recording; those are not among the stack's.
+    ``incomplete``: the model with the effects could not be simulated for every recording; those are not in ``data``.
     """
 
-    stack: Stack
+    data: WhitenedData
     before: tuple[Array, ...]
     after: tuple[Array, ...]
-    broken: bool = False
+    incomplete: bool = False
 
 
-def predicted(
+def predict_held_out(
     recordings: Sequence[Recording], axes: tuple[str, ...], evaluator: Evaluator, before: Fit, after: Fit
-) -> tuple[Predicted | None, tuple[str, ...]]:
-    """Predict recordings that neither model was fitted to, and say which cannot be; None where none can by both."""
-    kept, pairs, failed, broken = list[Recording](), list[tuple[Array, Array]](), list[str](), False
+) -> tuple[ResidualPair | None, tuple[str, ...]]:
+    """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
+
+    None where no recording can be simulated with both models.
+    """
+    kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
-        one, found, reasons = Stack.of([recording], axes), [], []
+        one, found, reasons = WhitenedData.of([recording], axes), [], []
         for fit in (before, after):
             problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, axes)
             _, (reason,), (residuals,) = one.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
             found.append(residuals[0])
             reasons.append(reason)
-        broken = broken or reasons[1] is not None
+        incomplete = incomplete or reasons[1] is not None
         if any(reasons):
-            which = "the nominal model" if reasons[0] else "what was found"
-            failed.append(f"{recording.name} was not predicted: {which} fails there: {reasons[0] or reasons[1]}")
+            which = "the nominal model" if reasons[0] else "the model with the added effects"
+            failed.append(f"{recording.name} was not predicted: {which} fails: {reasons[0] or reasons[1]}")
         else:
             kept.append(recording)
             pairs.append((found[0], found[1]))
     if not kept:
         return None, tuple(failed)
     before_all, after_all = zip(*pairs, strict=True)
-    return Predicted(Stack.of(kept, axes), before_all, after_all, broken), tuple(failed)
+    return ResidualPair(WhitenedData.of(kept, axes), before_all, after_all, incomplete), tuple(failed)
 
 
-def recording_misfits(predicted: Predicted, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
-    """Misfit to each recording; ``floor`` (m or N) is what the model's division leaves beside the noise."""
+def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
+    """Misfit to each recording; ``floor`` (m or N) is the discretisation error."""
     rows = []
-    for r, recording in enumerate(predicted.stack.recordings):
-        view, condition = predicted.stack.views[r], recording.condition
-        own = Predicted(predicted.stack, (predicted.before[r],), (predicted.after[r],))
-        before, after, _ = _misfits(own, [view.used], [recording.kind])
-        noise = float(np.sqrt(np.mean(view.noise[view.used] ** 2)))
+    for r, recording in enumerate(predicted.data.recordings):
+        beat_fit, condition = predicted.data.beat_fits[r], recording.condition
+        own = ResidualPair(predicted.data, (predicted.before[r],), (predicted.after[r],))
+        before, after, _ = _misfits(own, [beat_fit.used], [recording.kind])
+        noise = float(np.sqrt(np.mean(beat_fit.noise[beat_fit.used] ** 2)))
         rows.append(
             RecordingMisfit(
                 recording.name,
@@ -84,36 +87,36 @@ def recording_misfits(predicted: Predicted, *, held_out: bool, floor: float) -> 
     return tuple(rows)
 
 
-def proof(predicted: Predicted, floor: float, unit: str, *, put_in: bool) -> Proof:
-    """What the held-out recordings say of both models together; ``floor`` as in :func:`recording_misfits`.
+def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bool) -> Proof:
+    """Misfit of both models over all held-out recordings; ``floor`` as in :func:`recording_misfits`.
 
-    ``put_in``: whether the models differ.
+    ``effects_added``: whether effects were added, so that the models differ.
     """
-    stack = predicted.stack
-    used, kinds = [view.used for view in stack.views], [one.kind for one in stack.recordings]
+    data = predicted.data
+    used, kinds = [beat_fit.used for beat_fit in data.beat_fits], [one.kind for one in data.recordings]
     before, after, better = _misfits(predicted, used, kinds)
-    least = float(np.hypot(stack.noise, floor))
-    told = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
-    change = f"{told[0] * before.value:.3g} {told[1]}"
-    if put_in:
-        change += f" before, {told[0] * after.value:.3g} {told[1]} after"
-    better = better and not predicted.broken
-    several = "s" if len(stack.recordings) > 1 else ""
-    words = f"{len(stack.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
-    if put_in and not better:
-        words += "; that it is better is not sure"
-    return Proof(_over(before, least), _over(after, least), least, better, words)
+    least = float(np.hypot(data.noise, floor))
+    display = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
+    change = f"{display[0] * before.value:.3g} {display[1]}"
+    if effects_added:
+        change += f" before, {display[0] * after.value:.3g} {display[1]} after"
+    better = better and not predicted.incomplete
+    several = "s" if len(data.recordings) > 1 else ""
+    words = f"{len(data.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
+    if effects_added and not better:
+        words += "; the improvement is not significant"
+    return Proof(_relative_to_floor(before, least), _relative_to_floor(after, least), least, better, words)
 
 
-def _over(interval: Interval, floor: float) -> Interval:
+def _relative_to_floor(interval: Interval, floor: float) -> Interval:
     low, high = interval.low, interval.high
     return Interval(interval.value / floor, low and low / floor, high and high / floor)
 
 
 def _misfits(
-    predicted: Predicted, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
+    predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
 ) -> tuple[Interval, Interval, bool]:
-    """Root mean squares before and after with intervals, and whether after is surely less."""
+    """Root mean squares before and after with intervals, and whether the decrease is significant."""
     groups: list[Array] = []
     for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
         width = 3 if kind == "tracks" else 1
@@ -123,9 +126,9 @@ def _misfits(
         rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
         groups.append(rows[:, rows[2] > 0])
     every = np.concatenate(groups, axis=1)
-    if "forces" in kinds or every.shape[1] < FEWEST:  # stretches of time instead of markers
-        every = _stretches(predicted, used)
-    drawn = np.random.default_rng(0).integers(0, every.shape[1], (DRAWS, every.shape[1]))
+    if "forces" in kinds or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
+        every = _time_blocks(predicted, used)
+    drawn = np.random.default_rng(0).integers(0, every.shape[1], (BOOTSTRAP_DRAWS, every.shape[1]))
     sums = every[:, drawn].sum(axis=2)
     rms = np.sqrt(sums[:2] / sums[2])
     whole = np.sqrt(every[:2].sum(axis=1) / every[2].sum())
@@ -134,7 +137,8 @@ def _misfits(
     return found[0], found[1], bool(np.mean(rms[1] < rms[0]) >= 0.5 + CONFIDENCE / 2)
 
 
-def _stretches(predicted: Predicted, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+def _time_blocks(predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+    """Sums of squares before and after and counts [3, N] over blocks of time."""
     rows = []
     for before, after, own in zip(predicted.before, predicted.after, used, strict=True):
         for part in np.array_split(np.arange(len(before)), count):

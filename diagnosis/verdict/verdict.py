@@ -1,4 +1,4 @@
-"""From weighed hypotheses to a verdict, in words and with genes."""
+"""From the probabilities of hypotheses to a verdict, its summary and its genes."""
 
 from __future__ import annotations
 
@@ -10,113 +10,119 @@ import numpy as np
 from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
 from wingfit.diagnosis.subject import Suspect
-from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 
-LISTED = 12  # suspects that were not refitted and are told all the same
+MAX_SCREENED_LISTED = 12  # suspects that were only score-tested and are still listed
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict, probabilities of all verdicts, the effects it names, and the best refit."""
+    """The verdict, the probabilities of all verdicts, named effects, ``alternatives``, and the best refit."""
 
     verdict: Verdict
     probabilities: dict[str, float]
     named: tuple[str, ...]
-    alike: tuple[tuple[str, ...], ...]
+    alternatives: tuple[tuple[str, ...], ...]
     best: Refit
 
 
-def decided(weighed: Weighed) -> Decision:
-    """Which verdict the probabilities of the hypotheses make."""
-    policy = weighed.policy
-    nominal, effects = float(weighed.probabilities[0]), weighed.probabilities[1:]
-    refits = weighed.refits[1:]
+def decide(weights: HypothesisWeights) -> Decision:
+    """The verdict that the probabilities of the hypotheses imply."""
+    policy = weights.policy
+    nominal, effects = float(weights.probabilities[0]), weights.probabilities[1:]
+    refits = weights.refits[1:]
     probability: dict[str, float] = dict.fromkeys(VERDICTS, 0.0)
-    probability["adequate"], probability["unnamed"] = nominal, weighed.unknown
+    probability["adequate"], probability["unnamed"] = nominal, weights.unknown
     total = float(effects.sum())
     possible: list[Refit] = []
-    best = weighed.refits[0]
+    best = weights.refits[0]
     if len(effects):
         top = int(np.argmax(effects))
         possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= policy.possible * max(total, 1e-300)]
-        sure = refits[top] if effects[top] >= policy.single * total else _shared(possible)
-        one: Verdict = "measurement fault" if sure and _measured(sure) else "named"
-        if sure:
-            holds = [set(sure.names) <= set(refit.names) for refit in refits]
-            probability[one] = float(effects[holds].sum())
+        certain = refits[top] if effects[top] >= policy.single * total else _common_subset(possible)
+        one: Verdict = "measurement fault" if certain and _is_measurement_fault(certain) else "named"
+        if certain:
+            contained = [set(certain.names) <= set(refit.names) for refit in refits]
+            probability[one] = float(effects[contained].sum())
         probability["ambiguous"] = total - probability[one]
-    lacking = total + weighed.unknown
+    missing = total + weights.unknown
     verdict: Verdict
-    if nominal >= lacking:
+    if nominal >= missing:
         verdict = "adequate"
-    elif total >= policy.listed * lacking:
-        verdict, best = (one, sure) if sure else ("ambiguous", refits[top])
+    elif total >= policy.listed * missing:
+        verdict, best = (one, certain) if certain else ("ambiguous", refits[top])
     else:
         verdict = "unnamed"
-        if weighed.evidence[1:].max(initial=0.0) > policy.least_evidence:  # the nearest is put in if it earns it
-            best = refits[int(np.argmax(weighed.evidence[1:]))]
-    weighing = verdict not in ("adequate", "unnamed") and len(possible) > 1
-    alike = tuple(refit.names for refit in possible) if weighing else ()
+        if weights.evidence[1:].max(initial=0.0) > policy.least_evidence:  # worth its genes
+            best = refits[int(np.argmax(weights.evidence[1:]))]
+    listed = verdict not in ("adequate", "unnamed") and len(possible) > 1
+    alternatives = tuple(refit.names for refit in possible) if listed else ()
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
         named = best.names if verdict in ("named", "measurement fault") else ()
-    return Decision(verdict, probability, named, alike, best)
+    return Decision(verdict, probability, named, alternatives, best)
 
 
-def _shared(possible: Sequence[Refit]) -> Refit | None:
-    """The one of them that all others only add to: it is what lacks, whether or not more does. None without one."""
+def _common_subset(possible: Sequence[Refit]) -> Refit | None:
+    """The hypothesis contained in all others: it is missing whether or not more is. None where there is none."""
     return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 
-def hypotheses(stack: Stack, weighed: Weighed, trials: Sequence[Sequence[Trial]]) -> tuple[Hypothesis, ...]:
-    """All that was weighed, most probable first, then what was only tested, by score."""
-    order = np.argsort(-weighed.probabilities, kind="stable")
+def hypotheses(
+    data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]]
+) -> tuple[Hypothesis, ...]:
+    """All weighed hypotheses, most probable first, then those that were only score-tested, by score."""
+    order = np.argsort(-weights.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
-    told = [_weighed(stack, weighed, int(k), gains) for k in order]
-    known = {refit.names for refit in weighed.refits}
-    rest = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
-    start = max(weighed.refits[0].excess, 0.0) / stack.noise**2
-    return (*told, *(_tested(trial, start, stack) for trial in rest[:LISTED]))
+    refitted = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
+    known = {refit.names for refit in weights.refits}
+    screened = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
+    start = max(weights.refits[0].excess, 0.0) / data.noise**2
+    return (*refitted, *(_screened_hypothesis(trial, start, data) for trial in screened[:MAX_SCREENED_LISTED]))
 
 
-def _weighed(stack: Stack, weighed: Weighed, k: int, gains: Mapping[str, Trial]) -> Hypothesis:
-    refit, nominal = weighed.refits[k], weighed.refits[0]
+def _refitted_hypothesis(
+    data: WhitenedData, weights: HypothesisWeights, k: int, gains: Mapping[str, Trial]
+) -> Hypothesis:
+    refit, nominal = weights.refits[k], weights.refits[0]
     suspects = [trial.suspect for trial in refit.trials]
     predicted = None
     if refit.predicted is not None and nominal.predicted is not None:
-        predicted = _part(refit.predicted, nominal.predicted)
+        predicted = _explained_fraction(refit.predicted, nominal.predicted)
     return Hypothesis(
         effects=refit.names,
-        title=" and ".join(s.title for s in suspects) or "Nothing is lacking",
+        title=" and ".join(s.title for s in suspects) or "No missing physics",
         family=suspects[0].family if suspects else "",
         source="; ".join(s.source for s in suspects),
         signature="; ".join(s.signature for s in suspects),
-        probability=float(weighed.probabilities[k]),
-        evidence=float(weighed.evidence[k]),
+        probability=float(weights.probabilities[k]),
+        evidence=float(weights.evidence[k]),
         score=sum(gains[s.name].gain for s in suspects if s.name in gains),
         freedom=refit.freedom,
-        explained=_part(refit.excess, nominal.excess),
+        explained=_explained_fraction(refit.excess, nominal.excess),
         predicted=predicted,
-        misfit=float(np.sqrt(max(refit.excess, 0.0) + stack.noise**2)),
+        misfit=float(np.sqrt(max(refit.excess, 0.0) + data.noise**2)),
         refitted=True,
-        genes=effect_genes(stack, refit),
+        genes=effect_genes(data, refit),
     )
 
 
-def _part(left: float, before: float) -> float:
-    """Which part of a mean square beyond the noise is gone; of nothing, nothing."""
-    return float(np.clip(1.0 - max(left, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
+def _explained_fraction(remaining: float, before: float) -> float:
+    """Fraction of the excess ``before`` that is removed; zero where there was none."""
+    return float(np.clip(1.0 - max(remaining, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
-def _tested(trial: Trial, start: float, stack: Stack) -> Hypothesis:
-    suspect, samples = trial.suspect, len(stack.scale)
+def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypothesis:
+    suspect, samples = trial.suspect, len(data.scale)
     by_chance = np.sqrt(2.0 * samples)  # of chi-squared
-    explained = float(np.clip(trial.gain / max(trial.gain + trial.leaves - samples, by_chance), 0.0, 1.0))
-    left = max(start * (1.0 - explained), 0.0)
+    explained = float(
+        np.clip(trial.gain / max(trial.gain + trial.remaining_chi_squared - samples, by_chance), 0.0, 1.0)
+    )
+    remaining = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),
         suspect.title,
@@ -129,55 +135,57 @@ def _tested(trial: Trial, start: float, stack: Stack) -> Hypothesis:
         trial.freedom,
         explained,
         None,
-        float(stack.noise * np.sqrt(1.0 + left)),
+        float(data.noise * np.sqrt(1.0 + remaining)),
         False,
     )
 
 
-def effect_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+def effect_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """Genes of the suspects of a refit."""
     own = {gene.name for trial in refit.trials for gene in trial.suspect.genes}
-    return tuple(gene for gene in all_genes(stack, refit) if gene.name in own)
+    return tuple(gene for gene in all_genes(data, refit) if gene.name in own)
 
 
-def all_genes(stack: Stack, refit: Refit) -> tuple[GeneValue, ...]:
+def all_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """All free genes of a refit."""
-    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.sizes}
-    return gene_values(stack, refit.fit, off)
+    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
+    return gene_values(data, refit.fit, off)
 
 
-def _measured(refit: Refit) -> bool:
+def _is_measurement_fault(refit: Refit) -> bool:
     return bool(refit.trials) and all(trial.suspect.family == "measurement" for trial in refit.trials)
 
 
-def summary(decision: Decision, suspects: Mapping[str, Suspect], told: Mapping[str, str]) -> str:
-    """A few sentences; ``told`` has "before", "after", "noise", "where" and "held_out" in words."""
+def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[str, str]) -> str:
+    """The verdict in a few sentences; ``texts`` has "before", "after", "noise", "where" and "held_out"."""
     names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
-    start = f"After the best refit the nominal model leaves {told['before']}; the noise is {told['noise']}."
+    start = f"The misfit of the refitted nominal model is {texts['before']}; the noise is {texts['noise']}."
     if decision.verdict == "adequate":
-        return f"The model is adequate: nothing is lacking that these recordings could show. {start}"
+        return f"The model is adequate: these recordings show no missing physics. {start}"
     if decision.verdict == "unnamed":
-        return f"Something is lacking that nothing in the library explains: {told['where']}. {start} " + (
-            f"The nearest that there is, {nearest}, leaves {told['after']}."
+        return f"Physics is missing that no effect of the library explains: {texts['where']}. {start} " + (
+            f"The best effect, {nearest}, reduces the misfit to {texts['after']}."
             if nearest
-            else "No effect takes as much of it as it costs, and none was put in."
+            else "No effect explains enough to be worth its genes, and none was added."
         )
     if decision.verdict == "ambiguous":
-        either = " or ".join(_titles(suspects, found, " with ") for found in decision.alike) or names
+        either = " or ".join(_titles(suspects, found, " with ") for found in decision.alternatives) or names
         return (
-            f"Something is lacking, and these recordings cannot tell which: {either}. {start} The best leaves "
-            f"{told['after']}. {told['held_out']}"
+            f"Physics is missing, and these recordings cannot distinguish: {either}. {start} "
+            f"With the most probable the misfit is {texts['after']}. {texts['held_out']}"
         )
-    kind = "The recordings are at fault" if decision.verdict == "measurement fault" else "The model lacks"
+    kind = "The recordings have a fault" if decision.verdict == "measurement fault" else "The model is missing"
     link = ": " if decision.verdict == "measurement fault" else " "
-    wider, others = (
-        [one for one in decision.alike if (set(decision.named) <= set(one)) is holds] for holds in (True, False)
+    named = set(decision.named)
+    larger = [one for one in decision.alternatives if named <= set(one)]
+    others = [one for one in decision.alternatives if not named <= set(one)]
+    additional = dict.fromkeys(name for one in larger for name in one if name not in decision.named)
+    alternatives = [_titles(suspects, one, " with ") for one in others]
+    more = (
+        f" Whether {_titles(suspects, list(additional), ' or ')} is missing as well is undecided." if additional else ""
     )
-    besides = dict.fromkeys(name for one in wider for name in one if name not in decision.named)
-    instead = [_titles(suspects, one, " with ") for one in others]
-    more = f" Whether {_titles(suspects, list(besides), ' or ')} is lacking besides is open." if besides else ""
-    more += f" Less probable, but possible instead: {' or '.join(instead)}." if instead else ""
-    return f"{kind}{link}{names}.{more} {start} With it the misfit is {told['after']}. {told['held_out']}"
+    more += f" Less probable alternatives: {' or '.join(alternatives)}." if alternatives else ""
+    return f"{kind}{link}{names}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
 
 
 def _titles(suspects: Mapping[str, Suspect], names: Sequence[str], between: str = " and ") -> str:

@@ -1,17 +1,16 @@
-"""The verdict: which explanation holds, if any, with probabilities.
+"""Probabilities of the fitted hypotheses.
 
-Recordings hold so many samples that noise decides nothing: a law of the right kind, written a little differently than
-nature does, is refuted by thousands of units of chi-squared. What decides is how much of the misfit an explanation
-takes away. So hypotheses are weighed by the mean square that they leave, above what no model can be expected to
-explain: a likelihood in which the misfit of a law that is right but for its form counts as noise of unknown size,
+Recordings have so many samples that noise decides nothing: thousands of units of chi-squared refute a law of the right
+kind in a slightly different form. The fraction of the residual that a hypothesis explains decides instead. Hypotheses
+are weighed by their excess above a floor tau that no model is required to undercut, the residual of a right law in
+another form being noise of unknown size:
 
     ln p = -nu/2 ln(tau^2 + E) - genes c,
 
-E the mean square beyond the noise, fitted and predicted of recordings left out, in parts of the noise's; tau the floor;
-nu the number of independent pieces that such misfits have (a few for each recording). Beforehand each effect is as
-unlikely as the suspects are many. Two hypotheses always compete beside the effects: *nothing is lacking*, and
-*something that is not in the library*, which is taken to explain all but a part of the misfit
-(`Policy.unknown_residual`) at the price of the genes that a law of its own would need.
+E the excess divided by the noise variance, from the fit and cross-validated, and nu the effective number of samples.
+The prior probability of each effect is one over the number of suspects. Two hypotheses always compete with the effects:
+*no physics is missing*, and *physics outside the library*, which is assumed to explain all but a fraction of the
+residual (`Policy.unknown_residual`) at the cost of the genes of a new law.
 """
 
 from __future__ import annotations
@@ -23,93 +22,102 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Weighed:
-    """Hypotheses with probabilities: of each refit (the first is the nominal model), and of an unknown law."""
+class HypothesisWeights:
+    """Evidence and probability of each refit (the nominal model first), and probability of an ``unknown`` law.
+
+    ``excess``: excess of each divided by the noise variance.
+    """
 
     refits: tuple[Refit, ...]
     evidence: Array
     probabilities: Array
     unknown: float
-    left: Array
+    excess: Array
     policy: Policy = POLICY
 
 
-def weighed(stack: Stack, nominal: Refit, refits: Sequence[Refit], floor: float, suspects: int) -> Weighed:
+def weigh(
+    data: WhitenedData, nominal: Refit, refits: Sequence[Refit], floor: float, suspects: int
+) -> HypothesisWeights:
     """Weigh ``refits`` against the nominal model.
 
-    ``floor`` (m or N) is what the model's division leaves; ``suspects`` how many were considered: each of them is as
-    unlikely beforehand as they are many.
+    ``floor`` (m or N) is the discretisation error; ``suspects`` the number of effects considered, which sets their
+    prior.
     """
-    policy = stack.policy
-    every = (nominal, *refits)
-    unit = stack.noise**2
-    tau = tolerated(stack, nominal.excess, floor) / unit
-    left = np.array([_misfit(stack, one, tau * unit) / unit for one in every])
-    genes = np.array([one.freedom for one in every], float)
-    named = np.array([len(one.trials) for one in every], float)
-    log = _evidence(stack, tau + left, genes, named, suspects)
+    policy = data.policy
+    hypotheses = (nominal, *refits)
+    noise_variance = data.noise**2
+    tau = tolerated_excess(data, nominal.excess, floor) / noise_variance
+    excess = np.array([_misfit(data, one, tau * noise_variance) / noise_variance for one in hypotheses])
+    genes = np.array([one.freedom for one in hypotheses], float)
+    effects = np.array([len(one.trials) for one in hypotheses], float)
+    evidence = _evidence(data, tau + excess, genes, effects, suspects)
     unknown = (
-        -0.5 * stack.pieces * np.log(tau + policy.unknown_residual**2 * left[0])
+        -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
         - policy.gene_cost * policy.unknown_genes
     )
-    top = max(log.max(), unknown)
-    weight, other = np.exp(log - top), np.exp(unknown - top)
-    if refuted(stack, nominal.excess, floor):
+    top = max(evidence.max(), unknown)
+    weight, other = np.exp(evidence - top), np.exp(unknown - top)
+    if nominal_refuted(data, nominal.excess, floor):
         weight[0] = 0.0
     total = weight.sum() + other
-    return Weighed(every, log - log[0], weight / total, float(other / total), left, stack.policy)
-
-
-def refuted(stack: Stack, excess: float, floor: float) -> bool:
-    """Whether the nominal model leaves so much that neither noise nor a division (m or N) can be what makes it.
-
-    However few the pieces of it are: it is not known what is lacking then, but that something is.
-    """
-    made = (stack.policy.negligible * stack.noise) ** 2 + floor**2
-    return excess - made > stack.policy.refuted * stack.uncertainty
-
-
-def _evidence(stack: Stack, left: Array, genes: Array, named: Array, suspects: int) -> Array:
-    """Logarithm of the evidence, for mean squares ``left`` in parts of the noise's, the floor included."""
-    return np.asarray(
-        -0.5 * stack.pieces * np.log(left) - stack.policy.gene_cost * genes - np.log(max(suspects, 2)) * named
+    return HypothesisWeights(
+        hypotheses, evidence - evidence[0], weight / total, float(other / total), excess, data.policy
     )
 
 
-def beyond_doubt(stack: Stack, nominal: Refit, suspects: int) -> bool:
-    """Whether the nominal model leaves so little that no explanation could be worth its price, were it perfect."""
-    if refuted(stack, nominal.excess, 0.0):
+def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
+    """Whether the nominal excess is too large for noise and discretisation error (``floor``, m or N) alone.
+
+    It does not depend on the number of samples: physics is missing then, even if it is not known which.
+    """
+    explainable = (data.policy.negligible * data.noise) ** 2 + floor**2
+    return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
+
+
+def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
+    """Log evidence for mean squares ``excess`` divided by the noise variance, floor included."""
+    return np.asarray(
+        -0.5 * data.effective_samples * np.log(excess)
+        - data.policy.gene_cost * genes
+        - np.log(max(suspects, 2)) * effects
+    )
+
+
+def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
+    """Whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
+    if nominal_refuted(data, nominal.excess, 0.0):
         return False
-    tau = tolerated(stack, nominal.excess, 0.0)
-    left = _misfit(stack, nominal, tau)
-    ends = _evidence(stack, np.array([tau + left, tau]) / stack.noise**2, np.arange(2.0), np.arange(2.0), suspects)
-    return bool(ends[1] < ends[0] - stack.policy.least_evidence)
+    tau = tolerated_excess(data, nominal.excess, 0.0)
+    excess = _misfit(data, nominal, tau)
+    ends = _evidence(data, np.array([tau + excess, tau]) / data.noise**2, np.arange(2.0), np.arange(2.0), suspects)
+    return bool(ends[1] < ends[0] - data.policy.least_evidence)
 
 
-def tolerated(stack: Stack, excess: float, floor: float) -> float:
-    """Mean square (m^2 or N^2) that a right explanation may leave of the nominal model's ``excess``."""
-    policy = stack.policy
+def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
+    """Mean square (m^2 or N^2) that a right hypothesis may leave of the nominal model's ``excess``."""
+    policy = data.policy
     return (
-        (policy.negligible * stack.noise) ** 2
+        (policy.negligible * data.noise) ** 2
         + floor**2
         + policy.form**2 * max(excess, 0.0)
-        + policy.allowance * stack.uncertainty
+        + policy.allowance * data.excess_standard_error
     )
 
 
-def _misfit(stack: Stack, refit: Refit, tau: float) -> float:
-    """Mean square beyond the noise: fitted and predicted, averaged in their logarithms (`Policy.predicted_weight`).
+def _misfit(data: WhitenedData, refit: Refit, tau: float) -> float:
+    """Excess, fitted and cross-validated, averaged in the logarithm (`Policy.predicted_weight`).
 
-    What a linearised model foretells of a recording left out may be wrong by any factor.
+    A cross-validation by a linearised model may be wrong by any factor.
     """
-    policy = stack.policy
+    policy = data.policy
     fitted = max(refit.excess, 0.0)
     predicted = fitted if refit.predicted is None else max(refit.predicted, 0.0)
     return float((tau + fitted) ** (1.0 - policy.predicted_weight) * (tau + predicted) ** policy.predicted_weight - tau)

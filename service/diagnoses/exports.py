@@ -96,7 +96,7 @@ def file(exported: Exported) -> bytes:
         "comment": found["summary"],
         "verdict": found["verdict"],
         "named": ", ".join(found["named"]),
-        "put_in": ", ".join(found["put_in"]),
+        "added_effects": ", ".join(found["added_effects"]),
         "noise": found["floors"]["noise"],
         "floor": found["floors"]["total"],
     }

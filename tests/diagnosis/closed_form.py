@@ -24,15 +24,15 @@ NO_EVALUATOR = cast("Any", None)
 
 @dataclass
 class ClosedForm:
-    """A subject and its stack in one: least squares in genes whose boxes are [0, 1].
+    """A subject and its data in one object: least squares in genes whose boxes are [0, 1].
 
     Attributes:
         residuals: gives [B, D] for genes [B, F].
         size: F.
-        reach: an individual fails where one of its genes is farther than this from the genome that it begins beside.
+        reach: an individual fails where a gene is farther than this from the genome of its initial motion.
         noise: of each residual.
-        batches: genes [B, F] of each batch that was evaluated.
-        near: the genome that each batch began beside.
+        batches: genes [B, F] of each evaluated batch.
+        initial_motions: the genome of the initial motion of each batch.
     """
 
     residuals: Callable[[Array], Array]
@@ -40,7 +40,7 @@ class ClosedForm:
     reach: float = np.inf
     noise: float = 1.0
     batches: list[Array] = field(default_factory=list)
-    near: list[Array] = field(default_factory=list)
+    initial_motions: list[Array] = field(default_factory=list)
 
     @cached_property
     def problem(self) -> Problem:
@@ -48,8 +48,8 @@ class ClosedForm:
         free = tuple(gene.name for gene in genes)
         return Problem(cast("Any", SimpleNamespace(genes=genes)), (), free, Genome.nominal(genes))
 
-    def beside(self, model: Any, genome: Array) -> Any:
-        self.near.append(genome)
+    def with_initial_motion(self, model: Any, genome: Array) -> Any:
+        self.initial_motions.append(genome)
         return model
 
     @cached_property
@@ -57,18 +57,18 @@ class ClosedForm:
         return np.full(self.residuals(np.full((1, self.size), 0.5)).shape[1], self.noise)
 
     def chi_squared(self, coefficients: Array) -> float:
-        return float(self.surprise(coefficients))
+        return float(self.deviance(coefficients))
 
-    def surprise(self, coefficients: Array) -> Array:
+    def deviance(self, coefficients: Array) -> Array:
         return np.asarray(((coefficients / self.scale) ** 2).sum(axis=-1))
 
-    def trust(self, coefficients: Array) -> float:  # noqa: ARG002
+    def likelihood_weight(self, coefficients: Array) -> float:  # noqa: ARG002
         return 1.0
 
     def evaluate(self, problem: Problem, evaluator: Any, values: Array) -> tuple[Array, tuple[str | None, ...], Any]:  # noqa: ARG002
         assert ((values >= 0.0) & (values <= 1.0)).all(), "genes leave their boxes"
         self.batches.append(values)
-        far = np.abs(values - self.near[-1]).max(axis=1) > self.reach
+        far = np.abs(values - self.initial_motions[-1]).max(axis=1) > self.reach
         found = np.where(far[:, None], np.nan, self.residuals(values))
         return found, tuple("it flutters" if one else None for one in far), [found[:, None]]
 
@@ -77,24 +77,24 @@ class ClosedForm:
         """Number of individuals in each batch."""
         return [len(batch) for batch in self.batches]
 
-    def fitted(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
-        """See :func:`wingfit.diagnosis.evidence.fit.fitted`."""
-        return fit.fitted(self.rig, self.rig, self.problem, NO_EVALUATOR, start, jacobian, known=known)
+    def broyden_fit(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
+        """See :func:`wingfit.diagnosis.evidence.fit.broyden_fit`."""
+        return fit.broyden_fit(self.rig, self.rig, self.problem, NO_EVALUATOR, start, jacobian, known=known)
 
-    def thoroughly(self, start: Array, steps: int) -> list[Fit]:
-        """See :func:`wingfit.diagnosis.evidence.fit.thoroughly`."""
-        return list(fit.thoroughly(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
+    def gauss_newton_fit(self, start: Array, steps: int) -> list[Fit]:
+        """See :func:`wingfit.diagnosis.evidence.fit.gauss_newton_fit`."""
+        return list(fit.gauss_newton_fit(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
 
-    def measured(self, fitted: Fit) -> Fit:
-        """See :func:`wingfit.diagnosis.evidence.fit.measured`."""
-        return fit.measured(self.rig, self.rig, NO_EVALUATOR, fitted)
+    def with_measured_jacobian(self, fitted: Fit) -> Fit:
+        """See :func:`wingfit.diagnosis.evidence.fit.with_measured_jacobian`."""
+        return fit.with_measured_jacobian(self.rig, self.rig, NO_EVALUATOR, fitted)
 
     @property
-    def look(self) -> fit._Look:
-        """What a single step is given."""
-        return fit._Look(self.rig, self.rig, self.problem, NO_EVALUATOR)
+    def simulator(self) -> fit._Simulator:
+        """The simulator of a single step."""
+        return fit._Simulator(self.rig, self.rig, self.problem, NO_EVALUATOR)
 
     @property
     def rig(self) -> Any:
-        """Itself, as a subject or a stack: it has what fits use of either."""
+        """Itself: it has what fits use of a subject and of data."""
         return self

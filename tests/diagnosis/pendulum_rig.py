@@ -1,13 +1,13 @@
-"""A third rig: a driven torsional pendulum of one degree of freedom, which knows nothing of wings.
+"""A third rig: a driven torsional pendulum of one degree of freedom, unrelated to wings.
 
-An arm turns about a horizontal axis, held level by a spring; a motor exerts a torque of known course. What is recorded
-are markers along the arm. At the angle theta
+An arm turns about a horizontal axis, held level by a spring; a motor exerts a known torque. Markers along the arm are
+recorded. At the angle theta
 
     (I + m r^2) theta'' + d theta' + k theta + k_3 theta^3 + tau tanh(theta' / v) + m g r cos theta = T(2 pi f t),
 
-where k_3, tau and m are suspects. The periodic motion is found by harmonic balance (Nayfeh and Mook 1979, Nonlinear
-Oscillations, sect. 2.3.4), forces being computed at SAMPLES instants of the beat (Cameron and Griffin, Journal of
-Applied Mechanics 56, 149, 1989).
+where k_3, tau and m are suspects. The periodic motion is computed by harmonic balance (Nayfeh and Mook 1979, Nonlinear
+Oscillations, sect. 2.3.4), with forces at SAMPLES instants of the beat (Cameron and Griffin, Journal of Applied
+Mechanics 56, 149, 1989).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.subject import Family, Place, Suspect
+from wingfit.diagnosis.subject import ChannelLocation, Family, Suspect
 from wingfit.records import Condition, Gene, Recording
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.model import Array, Model, Observation, genome_batch
@@ -28,9 +28,9 @@ MARKERS = {"inner": 0.10, "middle": 0.17, "outer": 0.24}  # m from the axis
 TORQUE = (0.015,)  # N m: cosines of the motor's torque, from the first harmonic on
 SLIDING = 0.3  # rad/s: friction is 3/4 of dry friction at this rate
 HARMONICS, SAMPLES = 11, 128
-STEPS, HALVINGS, BALANCED = 12, 6, 1e-11  # N m
-PARTS = ((1.0,), (0.1, 0.25, 0.5, 0.75, 1.0))  # of what is not linear, one after the other: at once, or with care
-FRAMES, PER_BEAT = 124, 30  # strobed: each frame is of another beat
+STEPS, MAX_HALVINGS, TORQUE_TOLERANCE = 12, 6, 1e-11  # N m
+CONTINUATION = ((1.0,), (0.1, 0.25, 0.5, 0.75, 1.0))  # fractions of the nonlinear torques: at once, or step by step
+FRAMES, FRAMES_PER_BEAT = 124, 30  # strobed: each frame is of another beat
 FREQUENCIES = (1.2, 1.7, 2.0, 2.7, 3.4)  # Hz; the nominal pendulum's own is 2.25 Hz
 
 GENES = (
@@ -41,12 +41,12 @@ GENES = (
 
 
 def _suspect(
-    name: str, title: str, family: Family, genes: tuple[Gene, ...], typical: Mapping[str, float], told: tuple[str, str]
+    name: str, title: str, family: Family, genes: tuple[Gene, ...], typical: Mapping[str, float], texts: tuple[str, str]
 ) -> Suspect:
     station = f"{name}.station"
     has = any(gene.name == station for gene in genes)
     sizes = tuple(gene.name for gene in genes if gene.name != station)
-    source, signature = told
+    source, signature = texts
     return Suspect(name, title, family, genes, sizes, typical, source, signature, {"span": station} if has else {})
 
 
@@ -90,16 +90,16 @@ SUSPECTS = (
         "delay",
         "Time delay",
         "measurement",
-        (Gene("delay.time", "s", 0.0, -0.02, 0.02, "linear", "by which frames are older than told"),),
+        (Gene("delay.time", "s", 0.0, -0.02, 0.02, "linear", "by which frames are older than recorded"),),
         {"delay.time": 3e-3},
-        ("shift of time", "a lag that grows with frequency, alike in all markers"),
+        ("shift of time", "a lag that grows with frequency, equal in all markers"),
     ),
 )
 
 
 @dataclass(frozen=True)
 class Pendulum:
-    """The pendulum as a model, with suspects of the names ``effects`` put in; ``torque``: its motor's cosines, N m."""
+    """The pendulum as a model with the suspects ``effects`` added; ``torque``: cosines of its motor's torque, N m."""
 
     effects: tuple[str, ...] = ()
     torque: tuple[float, ...] = TORQUE
@@ -131,10 +131,10 @@ class Pendulum:
         linear = np.asarray(np.linalg.solve(dynamic, drive), np.float64)
         if own.linear:
             return linear
-        for parts in PARTS:
+        for parts in CONTINUATION:
             motion = linear
             for part in parts:
-                motion = _balanced(own.weaker(part), rate, dynamic, drive, motion)
+                motion = _harmonic_balance(own.weaker(part), rate, dynamic, drive, motion)
             if np.isfinite(motion).all():
                 break
         return motion
@@ -150,7 +150,7 @@ class Pendulum:
 
 @dataclass(frozen=True)
 class _Law:
-    """Torques against the motion: linear ones, and those that are not."""
+    """Linear and nonlinear torques against the motion."""
 
     inertia: float
     damping: float
@@ -176,7 +176,7 @@ class _Law:
         return self.cubic == self.friction == self.weight == 0.0
 
     def weaker(self, part: float) -> _Law:
-        """The same with only ``part`` of what is not linear."""
+        """The same with the nonlinear torques multiplied by ``part``."""
         return replace(self, cubic=part * self.cubic, friction=part * self.friction, weight=part * self.weight)
 
     def torque(self, angle: Array, rate: Array) -> tuple[Array, Array, Array]:
@@ -190,13 +190,13 @@ class _Law:
 
 
 def _waves(phase: Array) -> Array:
-    """[T, 2 HARMONICS + 1]: one, cosines, sines."""
+    """Basis functions [T, 2 HARMONICS + 1]: one, cosines, sines."""
     turn = phase[:, None] * np.arange(HARMONICS + 1)
     return np.concatenate([np.cos(turn), np.sin(turn[:, 1:])], axis=1)
 
 
 def _slope() -> Array:
-    """What makes of a series that of its derivative with the phase."""
+    """Matrix that turns a Fourier series into that of its derivative with the phase."""
     order, zero = np.arange(1, HARMONICS + 1), np.zeros((HARMONICS, HARMONICS))
     inner = np.block([[zero, np.diag(order)], [-np.diag(order), zero]])
     return np.pad(inner, ((1, 0), (1, 0)))
@@ -208,24 +208,24 @@ _RATES = _BEAT @ _SLOPE
 _BACK = _BEAT.T / (_BEAT**2).sum(axis=0)[:, None]
 
 
-def _balanced(law: _Law, rate: float, dynamic: Array, drive: Array, motion: Array) -> Array:
-    """Series of the periodic motion, by Newton's method with shortened steps from ``motion``."""
+def _harmonic_balance(law: _Law, rate: float, dynamic: Array, drive: Array, motion: Array) -> Array:
+    """Fourier series of the periodic motion, by Newton's method with shortened steps from ``motion``."""
 
-    def left(series: Array) -> tuple[Array, Array]:
+    def residual(series: Array) -> tuple[Array, Array]:
         torque, by_angle, by_rate = law.torque(_BEAT @ series, rate * (_RATES @ series))
         slope = dynamic + _BACK @ (by_angle[:, None] * _BEAT + (rate * by_rate)[:, None] * _RATES)
         return dynamic @ series + _BACK @ torque - drive, slope
 
-    now, slope = left(motion)
+    now, slope = residual(motion)
     for _ in range(STEPS):
         size = np.linalg.norm(now)
-        if size <= BALANCED:
+        if size <= TORQUE_TOLERANCE:
             return motion
         if not np.isfinite(size):
             break
         step = np.linalg.solve(slope, now)
-        for part in 0.5 ** np.arange(HALVINGS):
-            then, other = left(motion - part * step)
+        for part in 0.5 ** np.arange(MAX_HALVINGS):
+            then, other = residual(motion - part * step)
             if np.linalg.norm(then) < size:
                 break
         motion, now, slope = motion - part * step, then, other
@@ -245,51 +245,51 @@ class PendulumRig:
         return ((-0.005, 0.0), (-0.005, REACH), (0.005, REACH), (0.005, 0.0), (-0.005, 0.0))
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         return "torsional pendulum of one degree of freedom"
 
     def extended(self, names: Sequence[str]) -> Pendulum:
         return replace(self.model, effects=(*self.model.effects, *names))
 
-    def beside(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
+    def with_initial_motion(self, model: Model, genome: Array) -> Model:  # noqa: ARG002
         return model
 
-    def finer(self) -> tuple[()]:
+    def finer_subjects(self) -> tuple[()]:
         """None: a pendulum is one body."""
         return ()
 
-    def places(self, recording: Recording) -> tuple[Place, ...]:
+    def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
         return tuple(
-            Place(name, axis, MARKERS[name] / REACH, 0.5, 0.0, MARKERS[name])
+            ChannelLocation(name, axis, MARKERS[name] / REACH, 0.5, 0.0, MARKERS[name])
             for name in recording.markers
             for axis in "xyz"
         )
 
-    def origin(self, recording: Recording) -> float:  # noqa: ARG002
+    def beat_start_phase(self, recording: Recording) -> float:  # noqa: ARG002
         """Times count from the start of a beat."""
         return 0.0
 
-    def shown(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
         empty = blank(condition)
         seen = model.observe(genome[None], empty)
         return None if seen.reasons[0] else replace(empty, values=seen.channels[0])
 
-    def probed(self, genome: Array, recording: Recording, probe: Probe) -> None:
+    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> None:
         """None: it has no span."""
 
-    def conditions(self) -> tuple[Condition, ...]:
-        """From the lowest frequency to the highest, between those that are recorded."""
+    def candidate_conditions(self) -> tuple[Condition, ...]:
+        """Conditions between the lowest and highest recorded frequency."""
         return tuple(at(float(f)) for f in np.linspace(FREQUENCIES[0], FREQUENCIES[-1], 12)[1:-1])
 
 
 def at(frequency: float) -> Condition:
-    """The condition that the motor turns at ``frequency`` (Hz)."""
+    """The condition with the motor at ``frequency`` (Hz)."""
     return Condition(frequency, 0.0, 101_325.0, 293.15)
 
 
 def blank(condition: Condition, frames: int = FRAMES) -> Recording:
     """A recording without data."""
-    times = np.arange(frames) * PER_BEAT / ((PER_BEAT + 1) * condition.flap_frequency)
+    times = np.arange(frames) * FRAMES_PER_BEAT / ((FRAMES_PER_BEAT + 1) * condition.flap_frequency)
     values = np.full((frames, 3 * len(MARKERS)), np.nan)
     name = f"pendulum-{condition.flap_frequency:g}hz"
     return Recording(name, "vacuum_chamber", condition, times, tuple(MARKERS), values)
@@ -299,14 +299,14 @@ def recorded(
     truth: Mapping[str, float],
     *,
     noise: float = 2e-4,
-    memory: float = 0.5,
+    lag1: float = 0.5,
     seed: int = 1,
     frequencies: Sequence[float] = FREQUENCIES,
     frames: int = FRAMES,
 ) -> tuple[Recording, ...]:
-    """What a pendulum is recorded as with coloured ``noise`` (m); genes that ``truth`` does not name are nominal.
+    """Recordings of a pendulum with coloured ``noise`` (m); genes that ``truth`` does not name are nominal.
 
-    A suspect of which ``truth`` names a gene is in it, at its typical value as far as not told.
+    A suspect with a gene in ``truth`` is in the model; its other genes are typical.
     """
     named = [s for s in SUSPECTS if any(gene.name in truth for gene in s.genes)]
     model = Pendulum(tuple(s.name for s in named))
@@ -319,6 +319,6 @@ def recorded(
         empty = blank(at(frequency), frames)
         error = rng.standard_normal(empty.values.shape)
         for k in range(1, len(error)):
-            error[k] = memory * error[k - 1] + np.sqrt(1 - memory**2) * error[k]
+            error[k] = lag1 * error[k - 1] + np.sqrt(1 - lag1**2) * error[k]
         found.append(replace(empty, values=model.observe(genome, empty).channels[0] + noise * error))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""The whole way on a rig of one degree of freedom: what is concealed is named, what is not in the library is not."""
+"""Whole diagnoses of a rig with one degree of freedom: concealed effects are named, unlisted physics is not."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ NOMINAL = {"stiffness": 0.25, "damping": 3e-3, "inertia": 1.2e-3}  # not the est
 
 
 def finding(
-    truth: Mapping[str, float], seed: int = 1, spec: DiagnosisSpec | None = None, *, prove: bool = True
+    truth: Mapping[str, float], seed: int = 1, spec: DiagnosisSpec | None = None, *, validate: bool = True
 ) -> Finding:
     fitted = recorded({**NOMINAL, **truth}, noise=5e-4, seed=seed)
-    held_out = recorded({**NOMINAL, **truth}, noise=5e-4, seed=seed + 1, frequencies=HELD_OUT) if prove else ()
+    held_out = recorded({**NOMINAL, **truth}, noise=5e-4, seed=seed + 1, frequencies=HELD_OUT) if validate else ()
     return diagnosed(fitted, held_out, spec)
 
 
@@ -60,15 +60,18 @@ def test_wrong_parameters_and_coloured_noise_are_no_missing_physics(seed: int) -
         ({"delay.time": 4e-3}, "measurement fault"),
     ],
 )
-def test_what_is_concealed_is_named_and_proved(truth: dict[str, float], verdict: str) -> None:
+def test_a_concealed_effect_is_named_and_validated(truth: dict[str, float], verdict: str) -> None:
     name = next(iter(truth)).split(".")[0]
     found = finding(truth)
     assert (found.verdict, found.named) == (verdict, (name,))
     assert found.strength > 1.0
     genes = {gene.name: gene.value for gene in found.genes}
     for gene, value in truth.items():
-        told = genes[gene]
-        low, high = (-np.inf if told.low is None else told.low), (np.inf if told.high is None else told.high)
+        interval = genes[gene]
+        low, high = (
+            (-np.inf if interval.low is None else interval.low),
+            (np.inf if interval.high is None else interval.high),
+        )
         assert low - 0.5 * (high - low) <= value <= high + 0.5 * (high - low)
     assert found.proof is not None
     assert found.proof.improved
@@ -76,8 +79,8 @@ def test_what_is_concealed_is_named_and_proved(truth: dict[str, float], verdict:
 
 
 @pytest.mark.parametrize("fails", [(3.0,), HELD_OUT])
-def test_what_cannot_be_predicted_proves_nothing(monkeypatch: pytest.MonkeyPatch, fails: tuple[float, ...]) -> None:
-    """With the effect put in the model finds no motion under some, or all, held-out conditions."""
+def test_unpredicted_recordings_do_not_validate(monkeypatch: pytest.MonkeyPatch, fails: tuple[float, ...]) -> None:
+    """With the effect added, the model finds no motion under some, or all, held-out conditions."""
     truth = {**NOMINAL, "friction.torque": 2e-3}
     fitted, held_out = recorded(truth, noise=5e-4, seed=1), recorded(truth, noise=5e-4, seed=2, frequencies=HELD_OUT)
     seen = Pendulum._seen
@@ -89,12 +92,14 @@ def test_what_cannot_be_predicted_proves_nothing(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(Pendulum, "_seen", failing)
     found = diagnosed(fitted, held_out)
     assert found.named == ("friction",)
-    assert sum("was not predicted: what was found fails there" in remark for remark in found.remarks) == len(fails)
-    proved = [one for one in found.recordings if one.held_out]
-    assert len(proved) == len(HELD_OUT) - len(fails)
-    assert all(one.after.value > 0.0 for one in proved)
+    assert sum(
+        "was not predicted: the model with the added effects fails" in remark for remark in found.remarks
+    ) == len(fails)
+    validated = [one for one in found.recordings if one.held_out]
+    assert len(validated) == len(HELD_OUT) - len(fails)
+    assert all(one.after.value > 0.0 for one in validated)
     if found.proof is None:
-        assert "nothing proves it" in found.summary
+        assert "not validated" in found.summary
     else:
         assert not found.proof.improved
         assert found.proof.after.value == pytest.approx(1.0, abs=0.1)
@@ -102,14 +107,14 @@ def test_what_cannot_be_predicted_proves_nothing(monkeypatch: pytest.MonkeyPatch
     assert "was not predicted" in html(found)
 
 
-def test_two_at_once_are_both_named() -> None:
+def test_two_effects_together_are_both_named() -> None:
     found = finding({"friction.torque": 2e-3, "gain.part": 0.03})
     assert set(found.named) == {"friction", "gain"}
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_not_in_the_library_stays_unnamed(seed: int) -> None:
-    """A motor whose torque has a second harmonic: no suspect makes one."""
+def test_physics_outside_the_library_is_unnamed(seed: int) -> None:
+    """A motor whose torque has a second harmonic, which no suspect has."""
     values = np.array([[NOMINAL[gene.name] for gene in Pendulum().genes]])
     rng, records = np.random.default_rng(seed), []
     for frequency in FREQUENCIES:
@@ -129,27 +134,27 @@ def test_the_same_recordings_give_the_same_finding() -> None:
     assert replace(one, seconds=0.0) == replace(other, seconds=0.0)
 
 
-def test_a_finding_makes_a_report_and_survives_its_file() -> None:
+def test_a_finding_becomes_a_report_and_round_trips_as_json() -> None:
     found = finding({"friction.torque": 2e-3})
     assert finding_from_json(finding_json(found)) == found
     assert "Dry friction" in html(found)
 
 
-def test_without_held_out_recordings_nothing_is_proved_and_the_summary_says_so() -> None:
-    found = finding({"gain.part": 0.02}, prove=False)
+def test_without_held_out_recordings_the_summary_says_not_validated() -> None:
+    found = finding({"gain.part": 0.02}, validate=False)
     assert found.proof is None
-    assert "nothing proves it" in found.summary
+    assert "not validated" in found.summary
 
 
-def test_a_held_out_copy_of_what_is_fitted_proves_nothing() -> None:
+def test_a_held_out_copy_does_not_validate() -> None:
     fitted = recorded({**NOMINAL, "gain.part": 0.02}, noise=5e-4)
     found = diagnosed(fitted, (replace(fitted[2], name="copy"),))
     assert found.proof is None
-    assert any("copy is held out and has the very values of" in remark for remark in found.remarks)
+    assert any("held-out recording copy is a copy of" in remark for remark in found.remarks)
 
 
-def test_a_marker_that_stands_still_is_left_out_and_told() -> None:
-    """What it would show is no missing physics."""
+def test_a_marker_that_never_moves_is_ignored_with_a_remark() -> None:
+    """Its misfit is no missing physics."""
     fitted = recorded({**NOMINAL, "friction.torque": 2e-3}, noise=5e-4)
     stuck = []
     for one in fitted:
@@ -158,19 +163,19 @@ def test_a_marker_that_stands_still_is_left_out_and_told() -> None:
         stuck.append(replace(one, values=values))
     found = diagnosed(tuple(stuck))
     assert found.named == ("friction",)
-    assert any("the recorded place of middle never changes" in remark for remark in found.remarks)
+    assert any("the recorded position of middle never changes" in remark for remark in found.remarks)
 
 
-def test_an_adequate_model_has_no_place_of_its_misfit() -> None:
+def test_an_adequate_model_has_no_location() -> None:
     assert finding({}).where is None
 
 
-def test_a_suspect_that_there_is_not_is_refused() -> None:
+def test_an_unknown_suspect_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown suspect 'ghost'"):
         finding({}, spec=DiagnosisSpec(suspects=("ghost",)))
 
 
-def test_only_the_suspects_that_are_asked_for_are_tried() -> None:
+def test_only_requested_suspects_are_tested() -> None:
     found = finding({"gain.part": 0.02}, spec=DiagnosisSpec(suspects=("delay", "cubic")))
     assert {name for h in found.hypotheses for name in h.effects} <= {"delay", "cubic"}
     assert found.verdict == "unnamed"

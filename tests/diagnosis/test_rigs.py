@@ -1,4 +1,4 @@
-"""The rigs under diagnosis: what they tell of themselves, and that the third one is right."""
+"""The rigs as subjects of a diagnosis, and the pendulum against known solutions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.diagnosis.pendulum_rig import (
 )
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, check
-from wingfit.diagnosis.rigs import MOST_BODIES, MOST_CONDITIONS, VehicleSubject, WingSubject, subject_of
+from wingfit.diagnosis.rigs import MAX_BODIES, MAX_CONDITIONS, VehicleSubject, WingSubject, subject_of
 from wingfit.diagnosis.subject import Subject
 from wingfit.records import Dataset, LowPass, Wing
 from wingfit.sim.effects.ports.markers import nearest
@@ -37,7 +37,7 @@ from wingfit.sim.virtual_rigs.balance import blank_recording as blank_forces
 from wingfit.sim.virtual_rigs.campaign import SMALL, blank_recording, name_of, robird_wing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
-FEW = CalibrationSpec(division="4")
+FOUR_BODIES = CalibrationSpec(division="4")
 NOMINAL = {gene.name: gene.nominal for gene in GENES}
 TYPICAL = {name: value for suspect in SUSPECTS for name, value in suspect.typical.items()}
 
@@ -56,7 +56,11 @@ def vehicle() -> Dataset:
 
 @pytest.fixture(scope="module")
 def subjects(wing: Dataset, vehicle: Dataset) -> dict[str, Subject]:
-    return {"wing": subject_of(wing, FEW), "vehicle": subject_of(vehicle, CalibrationSpec()), "pendulum": PendulumRig()}
+    return {
+        "wing": subject_of(wing, FOUR_BODIES),
+        "vehicle": subject_of(vehicle, CalibrationSpec()),
+        "pendulum": PendulumRig(),
+    }
 
 
 def nominal(subject: Subject) -> Array:
@@ -67,30 +71,30 @@ RIGS = ("wing", "vehicle", "pendulum")
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_suspects_put_in_and_switched_off_change_nothing(subjects: dict[str, Subject], rig: str) -> None:
-    """The nominal model's own genes first, then those told of the suspects; all at nominal simulate to what it did."""
+def test_suspects_switched_off_change_nothing(subjects: dict[str, Subject], rig: str) -> None:
+    """Own genes come first, then those of the suspects; all at nominal they simulate the nominal model exactly."""
     subject = subjects[rig]
     names = [suspect.name for suspect in subject.suspects]
     extended = subject.extended(names)
     own = len(subject.model.genes)
     assert extended.genes[:own] == tuple(subject.model.genes)
     assert extended.genes[own:] == tuple(gene for suspect in subject.suspects for gene in suspect.genes)
-    condition = subject.conditions()[0]
-    with_all = subject.shown(extended, np.array([gene.nominal for gene in extended.genes]), condition)
-    own_alone = subject.shown(subject.model, nominal(subject)[0], condition)
+    condition = subject.candidate_conditions()[0]
+    with_all = subject.simulated_recording(extended, np.array([gene.nominal for gene in extended.genes]), condition)
+    own_alone = subject.simulated_recording(subject.model, nominal(subject)[0], condition)
     assert with_all is not None
     assert own_alone is not None
     assert with_all.values.tobytes() == own_alone.values.tobytes()
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str) -> None:
+def test_suspects_are_consistent(subjects: dict[str, Subject], rig: str) -> None:
     for suspect in subjects[rig].suspects:
         names = [gene.name for gene in suspect.genes]
-        assert set(suspect.sizes) <= set(names) == set(suspect.typical)
-        assert set(suspect.places.values()) <= set(suspect.shapes)
-        assert all(gene.nominal == 0.0 for gene in suspect.genes if gene.name in suspect.sizes)
-        assert any(suspect.typical[name] != 0.0 for name in suspect.sizes)
+        assert set(suspect.size_genes) <= set(names) == set(suspect.typical)
+        assert set(suspect.location_genes.values()) <= set(suspect.shape_genes)
+        assert all(gene.nominal == 0.0 for gene in suspect.genes if gene.name in suspect.size_genes)
+        assert any(suspect.typical[name] != 0.0 for name in suspect.size_genes)
         for gene in suspect.genes:
             gene.check(suspect.typical[gene.name])
         assert suspect.source
@@ -98,53 +102,53 @@ def test_what_suspects_tell_of_themselves(subjects: dict[str, Subject], rig: str
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_what_is_shown_is_what_would_be_recorded(subjects: dict[str, Subject], rig: str) -> None:
-    """All channels under every condition proposed, aligned: the model that showed it meets it, and it begins a beat."""
+def test_simulated_recordings_are_complete_and_aligned(subjects: dict[str, Subject], rig: str) -> None:
+    """All channels under every candidate condition: the model reproduces its recording, which starts at a beat."""
     subject = subjects[rig]
-    conditions = subject.conditions()
-    assert 5 < len(conditions) <= MOST_CONDITIONS
+    conditions = subject.candidate_conditions()
+    assert 5 < len(conditions) <= MAX_CONDITIONS
     assert len(set(conditions)) == len(conditions)
     for condition in conditions[::13]:
-        shown = subject.shown(subject.model, nominal(subject)[0], condition)
+        shown = subject.simulated_recording(subject.model, nominal(subject)[0], condition)
         assert shown is not None
         assert shown.condition == condition
         assert shown.valid.all()
-        assert len(subject.places(shown)) == shown.values.shape[1] == len(shown.channels)
+        assert len(subject.channel_locations(shown)) == shown.values.shape[1] == len(shown.channels)
         np.testing.assert_allclose(subject.model.observe(nominal(subject), shown).channels[0], shown.values, atol=1e-9)
-        assert subject.origin(shown) == pytest.approx(0.0, abs=1e-6)
+        assert subject.beat_start_phase(shown) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_what_cannot_be_simulated_is_not_shown(subjects: dict[str, Subject]) -> None:
+def test_a_failed_simulation_gives_no_recording(subjects: dict[str, Subject]) -> None:
     subject = subjects["wing"]
     genome = nominal(subject)[0]
     genome[[gene.name for gene in subject.model.genes].index("L_a")] = 1e6
-    assert subject.shown(subject.model, genome, subject.conditions()[0]) is None
+    assert subject.simulated_recording(subject.model, genome, subject.candidate_conditions()[0]) is None
 
 
-def test_a_wing_of_effects_has_them_in_its_nominal_model(wing: Dataset) -> None:
-    subject = subject_of(wing, replace(FEW, effects=("hinge_offset",)))
+def test_requested_effects_are_in_the_nominal_wing(wing: Dataset) -> None:
+    subject = subject_of(wing, replace(FOUR_BODIES, effects=("hinge_offset",)))
     assert isinstance(subject, WingSubject)
     assert "hinge_offset" in subject.model.effects
     assert "hinge_offset" not in {suspect.name for suspect in subject.suspects}
-    assert "hinge_offset" in {suspect.name for suspect in subject_of(wing, FEW).suspects}
-    assert "Hinge offset" in subject.told
+    assert "hinge_offset" in {suspect.name for suspect in subject_of(wing, FOUR_BODIES).suspects}
+    assert "Hinge offset" in subject.description
 
 
-def test_a_term_of_a_vehicle_is_no_suspect_and_one_left_out_is(vehicle: Dataset) -> None:
+def test_a_vehicle_term_is_a_suspect_only_where_omitted(vehicle: Dataset) -> None:
     has = {s.name for s in subject_of(vehicle, CalibrationSpec()).suspects}
     lacks = {s.name for s in subject_of(vehicle, CalibrationSpec(without=("clap_and_peel",))).suspects}
     apart = replace(vehicle, rig=replace(vehicle.vehicle, claps=False))
     assert lacks - has == {"clap_and_peel"}
     assert {s.name for s in subject_of(apart, CalibrationSpec(without=("clap_and_peel",))).suspects} == has
-    assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).told
+    assert "berman_wang" in subject_of(vehicle, CalibrationSpec(preset="berman_wang")).description
 
 
-def test_what_cannot_be_diagnosed_is_refused_before_anything_is_simulated(wing: Dataset) -> None:
-    subject = subject_of(wing, FEW)
+def test_invalid_requests_are_refused_before_any_simulation(wing: Dataset) -> None:
+    subject = subject_of(wing, FOUR_BODIES)
     genome = nominal(subject)
     moving = [replace(r, values=subject.model.observe(genome, r).channels[0]) for r in wing.recordings]
     known = replace(wing, recordings=tuple(moving))
-    check(known, DiagnosisSpec(calibration=FEW))
+    check(known, DiagnosisSpec(calibration=FOUR_BODIES))
     short = replace(moving[0], name="short", times=moving[0].times[:3], values=moving[0].values[:3])
     for dataset, spec, message in (
         (
@@ -157,12 +161,12 @@ def test_what_cannot_be_diagnosed_is_refused_before_anything_is_simulated(wing: 
         (known, DiagnosisSpec(suspects=("nothing",)), "unknown suspect 'nothing'"),
     ):
         with pytest.raises(ValueError, match=message):
-            check(dataset, replace(spec, calibration=FEW))
+            check(dataset, replace(spec, calibration=FOUR_BODIES))
 
 
-def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:
+def test_channel_locations_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:
     subject, recording = subjects["wing"], wing.recordings[0]
-    places = subject.places(recording)
+    places = subject.channel_locations(recording)
     stations = wing.wing.stations
     for place, channel in zip(places, recording.channels, strict=True):
         assert channel == f"{place.name}_{place.axis}"
@@ -178,27 +182,27 @@ def test_places_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Datase
     assert area == pytest.approx(np.trapezoid([s.chord for s in stations], [s.y for s in stations]))
 
 
-def test_a_fault_of_a_marker_is_tried_at_every_marker(wing: Dataset) -> None:
+def test_a_marker_fault_is_tested_at_every_marker(wing: Dataset) -> None:
     rig, suspects = wing.rig, {s.name: s for s in subject_of(wing, CalibrationSpec()).suspects}
     assert isinstance(rig, Wing)
     for name in ("marker_slip", "marker_swap"):
-        station, chord = np.array(suspects[name].spots).T
+        station, chord = np.array(suspects[name].candidate_shapes).T
         assert nearest(rig, {"station": station, "chord": chord})[:, 0].tolist() == list(range(len(rig.markers)))
-    assert suspects["lumped_mass"].spots == ()
+    assert suspects["lumped_mass"].candidate_shapes == ()
 
 
-def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject], wing: Dataset) -> None:
+def test_finer_wings_refine_both_directions_up_to_a_limit(subjects: dict[str, Subject], wing: Dataset) -> None:
     divisions, subject = [], subjects["wing"]
     assert isinstance(subject, WingSubject)
     while True:
         coarse = subject.model.structure.division
         divisions.append(coarse.total)
-        finer = subject.finer()
+        finer = subject.finer_subjects()
         for one in finer:
             fine = one.model.structure.division
             assert len(fine.bodies) > len(coarse.bodies)
             assert max(fine.bodies) >= max(coarse.bodies)
-            assert coarse.total < fine.total <= MOST_BODIES
+            assert coarse.total < fine.total <= MAX_BODIES
         if not finer:
             break
         subject = finer[-1]
@@ -206,63 +210,70 @@ def test_a_finer_wing_is_divided_along_both_and_ends(subjects: dict[str, Subject
     assert len(divisions) > 2
     eleven = subject_of(wing, CalibrationSpec(division="11"))
     assert isinstance(eleven, WingSubject)
-    assert [one.model.structure.division.bodies for one in eleven.finer()] == [(3,) * 6, (4,) * 6]
+    assert [one.model.structure.division.bodies for one in eleven.finer_subjects()] == [(3,) * 6, (4,) * 6]
 
 
-def test_a_finer_division_tells_about_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
-    """Of 4 bodies, against a wing finer than any that a diagnosis compares with."""
+def test_a_finer_discretisation_estimates_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
+    """With 4 bodies, against a wing finer than any that a diagnosis uses."""
     subject = subjects["wing"]
     assert isinstance(subject, WingSubject)
-    finer = subject.finer()[-1]
+    finer = subject.finer_subjects()[-1]
     best = FlexibleWing(subject.model.wing, "10x6")
-    found = [subject.shown(model, nominal(subject)[0], SMALL[5][0]) for model in (subject.model, finer.model, best)]
+    found = [
+        subject.simulated_recording(model, nominal(subject)[0], SMALL[5][0])
+        for model in (subject.model, finer.model, best)
+    ]
     coarse, fine, true = (one.values for one in found if one is not None)
-    told, error = (np.sqrt(np.mean((coarse - other) ** 2)) for other in (fine, true))
-    assert told == pytest.approx(error, rel=0.5)
+    estimated, error = (np.sqrt(np.mean((coarse - other) ** 2)) for other in (fine, true))
+    assert estimated == pytest.approx(error, rel=0.5)
     assert np.sqrt(np.mean((fine - true) ** 2)) < 0.7 * error
 
 
-def test_a_finer_vehicle_only_where_it_tells(vehicle: Dataset) -> None:
+def test_a_vehicle_is_refined_only_where_forces_change(vehicle: Dataset) -> None:
     subject = subject_of(vehicle, CalibrationSpec())
     assert isinstance(subject, VehicleSubject)
-    assert subject.finer() == (), "40 elements are enough"
+    assert subject.finer_subjects() == (), "40 elements are enough"
     coarse = replace(subject, model=replace(subject.model, elements=3, instants=80))
-    (finer,) = coarse.finer()
+    (finer,) = coarse.finer_subjects()
     assert finer.model.elements == 6
 
 
-def test_conditions_lie_within_what_was_run_and_are_new(subjects: dict[str, Subject], wing: Dataset) -> None:
+def test_candidate_conditions_are_new_and_within_the_recorded_range(
+    subjects: dict[str, Subject], wing: Dataset
+) -> None:
     recorded_ones = [r.condition for r in wing.recordings]
-    for condition in subjects["wing"].conditions():
+    for condition in subjects["wing"].candidate_conditions():
         assert condition not in recorded_ones
         for name in ("flap_frequency", "phase_lag", "airspeed", "pressure"):
             ran = [getattr(c, name) for c in recorded_ones]
             assert min(ran) <= getattr(condition, name) <= max(ran), name
         vacuum = [c.pressure for c in recorded_ones if c.airspeed == 0]
-        assert condition.airspeed > 0 or condition.pressure <= max(vacuum), "the chamber's pressures stay its own"
+        assert condition.airspeed > 0 or condition.pressure <= max(vacuum), (
+            "chamber pressures are not combined with the tunnel"
+        )
 
 
-def test_values_that_jitter_are_one_level(wing: Dataset) -> None:
-    """Frequencies measured anew in each recording are not each another setting."""
+def test_jittering_settings_count_as_one(wing: Dataset) -> None:
+    """Measured frequencies that scatter about a setting are one setting."""
     rng = np.random.default_rng(1)
     shaken = tuple(
         replace(r, condition=replace(r.condition, flap_frequency=r.condition.flap_frequency + rng.normal(0, 0.005)))
         for r in wing.recordings
     )
-    found = subject_of(replace(wing, recordings=shaken), FEW).conditions()
+    found = subject_of(replace(wing, recordings=shaken), FOUR_BODIES).candidate_conditions()
     assert len({c.flap_frequency for c in found}) <= 2 * 5, "three and the middles between them, in either rig"
 
 
-def test_nothing_is_proposed_in_free_flight(vehicle: Dataset) -> None:
+def test_no_conditions_are_proposed_in_free_flight(vehicle: Dataset) -> None:
     flown = tuple(replace(r, rig="free_flight") for r in vehicle.recordings)
-    assert subject_of(replace(vehicle, recordings=flown), CalibrationSpec()).conditions() == ()
+    assert subject_of(replace(vehicle, recordings=flown), CalibrationSpec()).candidate_conditions() == ()
 
 
 # -- the third rig ---------------------------------------------------------------------------------------------
 
 
 def angle(values: Mapping[str, float], frequency: float, torque: tuple[float, ...] = TORQUE) -> Array:
-    """Series of the angle: cosines, then sines."""
+    """Fourier series of the angle: cosines, then sines."""
     return Pendulum(torque=torque).angle(NOMINAL | dict(values), at(frequency))
 
 
@@ -274,7 +285,7 @@ def sampled(series: Array, phase: Array) -> Array:
 
 
 @pytest.mark.parametrize("frequency", FREQUENCIES)
-def test_a_linear_pendulum_answers_by_its_transfer_function(frequency: float) -> None:
+def test_a_linear_pendulum_follows_its_transfer_function(frequency: float) -> None:
     rate = 2 * np.pi * frequency
     expected = TORQUE[0] / (NOMINAL["stiffness"] - NOMINAL["inertia"] * rate**2 + 1j * rate * NOMINAL["damping"])
     series = angle({}, frequency)
@@ -282,8 +293,8 @@ def test_a_linear_pendulum_answers_by_its_transfer_function(frequency: float) ->
     assert series[1 + len(series) // 2] == pytest.approx(-expected.imag, rel=1e-12)
 
 
-def test_a_hard_spring_has_the_motion_that_its_torque_was_made_for() -> None:
-    """theta = a cos psi without damping asks for (k - I w^2) a + 3/4 k_3 a^3 and 1/4 k_3 a^3 (Hsu 1960)."""
+def test_a_hardening_spring_has_the_exact_motion() -> None:
+    """theta = a cos psi without damping needs (k - I w^2) a + 3/4 k_3 a^3 and 1/4 k_3 a^3 (Hsu 1960)."""
     a, k3, frequency = 0.3, 0.4, 1.5
     rate = 2 * np.pi * frequency
     first = (NOMINAL["stiffness"] - NOMINAL["inertia"] * rate**2) * a + 0.75 * k3 * a**3
@@ -292,7 +303,7 @@ def test_a_hard_spring_has_the_motion_that_its_torque_was_made_for() -> None:
     np.testing.assert_allclose(np.delete(series, 1), 0.0, atol=1e-9)
 
 
-def test_dry_friction_leaves_the_amplitude_of_den_hartog() -> None:
+def test_dry_friction_has_den_hartogs_amplitude() -> None:
     """x_0 = (P / k) sqrt(V^2 - (F / P)^2 U^2), V = 1 / (1 - b^2), U = sin(pi / b) / (b (1 + cos(pi / b))) (1931)."""
     friction, frequency = 1.5e-3, 1.7
     b = 2 * np.pi * frequency / np.sqrt(NOMINAL["stiffness"] / NOMINAL["inertia"])
@@ -314,7 +325,7 @@ def test_a_point_mass_sags_by_its_weight_over_the_stiffness() -> None:
 
 
 @pytest.mark.parametrize("frequency", [1.2, 2.0, 3.4])
-def test_all_at_once_agrees_with_an_integration_in_time(frequency: float) -> None:
+def test_all_effects_agree_with_time_integration(frequency: float) -> None:
     values = NOMINAL | TYPICAL
     mass, lever = values["point_mass.mass"], REACH * values["point_mass.station"]
     inertia, rate = values["inertia"] + mass * lever**2, 2 * np.pi * frequency
@@ -330,7 +341,7 @@ def test_all_at_once_agrees_with_an_integration_in_time(frequency: float) -> Non
     np.testing.assert_allclose(sampled(angle(values, frequency), 2 * np.pi * phase), solved.y[0], atol=1e-5)
 
 
-def test_faults_of_the_camera_move_markers_and_not_the_arm() -> None:
+def test_camera_faults_move_markers_not_the_arm() -> None:
     empty = blank(at(2.0))
     part, delay = 0.03, 4e-3
     rig = PendulumRig()
@@ -344,7 +355,7 @@ def test_faults_of_the_camera_move_markers_and_not_the_arm() -> None:
     np.testing.assert_allclose(reach, np.tile(list(MARKERS.values()), (len(base), 1)), rtol=1e-12)
 
 
-def test_recordings_of_the_pendulum_hold_its_motion_and_the_noise() -> None:
+def test_recordings_are_motion_plus_noise() -> None:
     truth = {"cubic.k3": 0.3, "stiffness": 0.22}
     noise, clean = (recorded(truth, noise=level) for level in (3e-4, 0.0))
     left = np.concatenate([a.values - b.values for a, b in zip(noise, clean, strict=True)])
@@ -357,7 +368,7 @@ def test_recordings_of_the_pendulum_hold_its_motion_and_the_noise() -> None:
         np.testing.assert_allclose(values, recording.values, atol=1e-13)
 
 
-def test_the_pendulum_is_fast_and_hardly_ever_fails() -> None:
+def test_the_pendulum_is_fast_and_robust() -> None:
     model = PendulumRig().extended([suspect.name for suspect in SUSPECTS])
     rng = np.random.default_rng(3)
     batch = np.array([[TYPICAL.get(g.name, g.nominal) * rng.uniform(0.7, 1.3) for g in model.genes] for _ in range(60)])
@@ -369,10 +380,10 @@ def test_the_pendulum_is_fast_and_hardly_ever_fails() -> None:
     assert spent < 5e-3, "a millisecond on a free core"
 
 
-def test_forces_are_shown_as_they_would_be_fitted(vehicle: Dataset) -> None:
+def test_simulated_forces_are_low_passed_like_fitted_ones(vehicle: Dataset) -> None:
     through, whole = (subject_of(vehicle, CalibrationSpec(low_pass=low_pass)) for low_pass in (None, 0.0))
-    condition, genome = through.conditions()[0], nominal(through)[0]
-    filtered, plain = (one.shown(one.model, genome, condition) for one in (through, whole))
+    condition, genome = through.candidate_conditions()[0], nominal(through)[0]
+    filtered, plain = (one.simulated_recording(one.model, genome, condition) for one in (through, whole))
     assert filtered is not None
     assert plain is not None
     assert plain.low_pass is None

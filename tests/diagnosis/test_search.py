@@ -1,4 +1,4 @@
-"""What enters the race at the end: what is hard to tell from the best explanation, and what that is confused with."""
+"""Start points that compete at the end of a search: indistinguishable effects and look-alikes."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ import pytest
 
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec
-from wingfit.diagnosis.evidence.competing_fits import Entry
+from wingfit.diagnosis.evidence.competing_fits import StartPoint
 from wingfit.diagnosis.evidence.screen import Trial
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _alike, _exchanges, assess
-from wingfit.diagnosis.search_state import Assessment
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, run_search
+from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
 
-def trial(name: str, *, alike: tuple[str, ...] = ()) -> Trial:
-    """A suspect of the pendulum at its typical genes, which looks like those that are ``alike``."""
-    suspect = replace(next(one for one in SUSPECTS if one.name == name), alike=alike)
+def trial(name: str, *, confused_with: tuple[str, ...] = ()) -> Trial:
+    """A trial of the pendulum's suspect ``name`` at its typical genes."""
+    suspect = replace(next(one for one in SUSPECTS if one.name == name), confused_with=confused_with)
     count = len(suspect.genes)
     return Trial(suspect, np.full((1, count), 0.4), np.zeros((1, 1)), 0.0, np.ones(1), count, 0.0)
 
 
 def refit(*trials: Trial, excess: float = 1.0) -> Any:
-    """One that leaves ``excess``, in which every gene is at 0.8 of its box."""
+    """A refit with ``excess``, every gene at 0.8 of its box."""
     free = tuple(gene.name for one in trials for gene in one.suspect.genes)
     fit = SimpleNamespace(problem=SimpleNamespace(free=free), unit=np.full(len(free), 0.8))
     names = tuple(one.suspect.name for one in trials)
@@ -37,53 +37,63 @@ def refit(*trials: Trial, excess: float = 1.0) -> Any:
 
 
 def known(evidence: Sequence[float], *refits: Any) -> Any:
-    """Refits beside a nominal model, with how much more probable than that each is."""
+    """Weights of ``refits`` and a nominal model, with the log evidence of each."""
     return SimpleNamespace(refits=(refit(), *refits), evidence=np.array([0.0, *evidence]), policy=POLICY)
 
 
 def state(*tried: Trial) -> Any:
-    """An assessment in which these were ``tried``, beside noise of 1."""
-    stack = SimpleNamespace(noise=1.0, uncertainty=0.0, policy=POLICY)
-    return SimpleNamespace(stack=stack, trials=[[one] for one in tried])
+    """A search state with trials of ``tried`` and noise of 1."""
+    data = SimpleNamespace(noise=1.0, excess_standard_error=0.0, policy=POLICY)
+    return SimpleNamespace(data=data, trials=[[one] for one in tried])
 
 
-def names(entries: Sequence[Entry]) -> list[tuple[str, ...]]:
-    return [tuple(one.suspect.name for one in entry.trials) for entry in entries]
+def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
+    return [tuple(one.suspect.name for one in entry.trials) for entry in start_points]
 
 
-def test_single_explanations_that_are_hard_to_tell_apart_race() -> None:
+def test_indistinguishable_single_effects_compete() -> None:
     mass, cubic, gain = refit(trial("point_mass")), refit(trial("cubic")), refit(trial("gain"))
     close = known([40.0, 40.0 - 0.9 * POLICY.overtake, 40.0 - 1.1 * POLICY.overtake], mass, cubic, gain)
-    assert names(_alike(close)) == [("point_mass",), ("point_mass",), ("cubic",)]  # what has a place, from two places
-    assert _alike(known([40.0, 0.9 * POLICY.overtake], mass, cubic)) == []
-    assert _alike(known([4.0, -0.1], mass, cubic)) == [], "what explains nothing is no rival"
-    assert _alike(known([])) == []
+    assert names(_indistinguishable(close)) == [
+        ("point_mass",),
+        ("point_mass",),
+        ("cubic",),
+    ]  # a suspect with a location has two start points
+    assert _indistinguishable(known([40.0, 0.9 * POLICY.overtake], mass, cubic)) == []
+    assert _indistinguishable(known([4.0, -0.1], mass, cubic)) == [], "an effect without evidence is no rival"
+    assert _indistinguishable(known([])) == []
 
 
-def test_explanations_of_several_do_not() -> None:
+def test_combinations_do_not_compete() -> None:
     both = refit(trial("cubic"), trial("gain"))
-    assert _alike(known([40.0, 39.0], refit(trial("cubic")), both)) == []
+    assert _indistinguishable(known([40.0, 39.0], refit(trial("cubic")), both)) == []
 
 
-def test_each_part_is_exchanged_for_what_it_is_confused_with() -> None:
-    cubic, gain, delay = trial("cubic", alike=("gain", "point_mass", "unheard_of")), trial("gain"), trial("delay")
-    found = _exchanges(state(cubic, gain, delay), cast("Any", refit(cubic, delay)))
-    assert names(found) == [("delay", "gain")], "a mass was never tried"
-    np.testing.assert_allclose(found[0].unit[0], 0.8)  # the delay stays where it was fitted
-    assert names(_exchanges(state(cubic, gain), cast("Any", refit(cubic, gain)))) == [], "it is in it already"
+def test_each_effect_is_replaced_by_look_alikes() -> None:
+    cubic, gain, delay = (
+        trial("cubic", confused_with=("gain", "point_mass", "unheard_of")),
+        trial("gain"),
+        trial("delay"),
+    )
+    found = _look_alikes(state(cubic, gain, delay), cast("Any", refit(cubic, delay)))
+    assert names(found) == [("delay", "gain")], "the mass has no trial"
+    np.testing.assert_allclose(found[0].unit[0], 0.8)  # the delay keeps its fitted gene
+    assert names(_look_alikes(state(cubic, gain), cast("Any", refit(cubic, gain)))) == [], (
+        "the hypothesis contains it already"
+    )
 
 
-def test_what_leaves_no_more_than_noise_is_not_exchanged() -> None:
-    cubic, gain = trial("cubic", alike=("gain",)), trial("gain")
-    assert names(_exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
-    assert _exchanges(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
+def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
+    cubic, gain = trial("cubic", confused_with=("gain",)), trial("gain")
+    assert names(_look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
+    assert _look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
 
 
-def test_fits_from_the_estimates_begin_there_whatever_a_calibration_ended_with() -> None:
+def test_fits_from_the_estimates_ignore_the_given_start() -> None:
     rig = PendulumRig()
-    known = Assessment(rig, Stack.of(recorded({})))
-    steps = assess(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
+    known = SearchState(rig, WhitenedData.of(recorded({})))
+    steps = run_search(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
     next(steps)
     next(steps)
-    assert known.begun is not None
-    assert known.begun[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})
+    assert known.initial_fit is not None
+    assert known.initial_fit[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})

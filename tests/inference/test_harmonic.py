@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.harmonic import HARMONICS, harmonic_fit, still_markers
 from wingfit.records import Condition, LowPass, Recording
 
@@ -131,22 +131,22 @@ def test_forces_have_no_markers_that_stand_still() -> None:
 
 def test_no_recording_is_refused() -> None:
     with pytest.raises(ValueError, match="no recording to diagnose"):
-        Stack.of([])
+        WhitenedData.of([])
 
 
 def test_excess_is_what_is_there_beyond_the_noise() -> None:
     psi = 2 * np.pi * CONDITION.flap_frequency * recording(np.zeros((124, 3))).times
     misfit = 1e-3 * np.cos(psi)[:, None] * np.ones(3 * MARKERS)
-    stack = Stack.of([recording(5e-4 * noise(124, 0.5, seed)) for seed in (5, 6)])
-    found = stack.stacked([misfit, misfit])
-    assert stack.excess(found) == pytest.approx(0.5e-6 - stack.weight @ stack.variance, rel=0.05)
-    assert stack.noise == pytest.approx(5e-4, rel=0.08)
-    assert stack.share.sum() == pytest.approx(1.0)
+    data = WhitenedData.of([recording(5e-4 * noise(124, 0.5, seed)) for seed in (5, 6)])
+    found = data.coefficients_of([misfit, misfit])
+    assert data.excess(found) == pytest.approx(0.5e-6 - data.weight @ data.variance, rel=0.05)
+    assert data.noise == pytest.approx(5e-4, rel=0.08)
+    assert data.recording_weights.sum() == pytest.approx(1.0)
     quiet = np.array(
         [
-            stack.excess(stack.stacked([5e-4 * noise(124, 0.5, s), 5e-4 * noise(124, 0.5, s + 1)]))
+            data.excess(data.coefficients_of([5e-4 * noise(124, 0.5, s), 5e-4 * noise(124, 0.5, s + 1)]))
             for s in range(10, 30, 2)
         ]
     )
-    assert np.std(quiet) < 4 * stack.uncertainty
-    assert abs(np.mean(quiet)) < 0.2 * stack.noise**2
+    assert np.std(quiet) < 4 * data.excess_standard_error
+    assert abs(np.mean(quiet)) < 0.2 * data.noise**2

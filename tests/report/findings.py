@@ -187,11 +187,11 @@ def wing_finding() -> Finding:
         "drive has a second harmonic of 3.55°. With both put in, the misfit on held-out recordings falls to the floor.",
         probabilities=probabilities("named"),
         named=BOTH,
-        put_in=BOTH,
+        added_effects=BOTH,
         strength=5.12,
         floors=Floors(0.0008, 0.42, 0.00021, "48 bodies (12 x 4)", 0.00006, 0.00083),
         hypotheses=hypotheses,
-        alike=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
+        indistinguishable=(("hinge_offset", "drive_harmonics"), ("stroke_amplitude",)),
         where=Where(
             "Outer 30 % of the span, during the first third of the downstroke, along the flap normal; grows with the "
             "flap frequency squared.",
@@ -251,7 +251,7 @@ def force_finding() -> Finding:
             hypothesis(("wake_capture",), "Wake capture", "aerodynamics", 0.01, 0.55, predicted=0.31),
             hypothesis((), "Nominal model", "", 0.0, 0.0),
         ),
-        alike=(),
+        indistinguishable=(),
         where=Where(
             "In the first 0.37 of the beat, along x.", None, None, Interval(0.19, 0.04, 0.37), "x", (0.3, 0.4, 0.2, 0.1)
         ),
@@ -273,7 +273,8 @@ def with_verdict(finding: Finding, verdict: Verdict) -> Finding:
     """The same with another verdict and what goes with it."""
     changed = replace(finding, verdict=verdict, probabilities=probabilities(verdict), summary=f"It is {verdict}.")
     if verdict == "adequate":
-        return replace(changed, named=(), put_in=(), where=None, missing=(), proof=None, advice=(), strength=1.02)
+        changed = replace(changed, named=(), added_effects=())
+        return replace(changed, where=None, missing=(), proof=None, advice=(), strength=1.02)
     if verdict == "unnamed":
         terms = (
             Term("rho V^2 c", around(0.31, 0.05), "1"),
@@ -281,7 +282,7 @@ def with_verdict(finding: Finding, verdict: Verdict) -> Finding:
         )
         return replace(changed, named=(), law=FreeLaw("A load that grows with the square of speed.", terms, 0.87))
     return (
-        replace(changed, named=("camera_rotation",), put_in=("camera_rotation",))
+        replace(changed, named=("camera_rotation",), added_effects=("camera_rotation",))
         if verdict == "measurement fault"
         else changed
     )
@@ -293,7 +294,7 @@ def bare(finding: Finding) -> Finding:
         finding,
         named=(),
         hypotheses=(),
-        alike=(),
+        indistinguishable=(),
         where=None,
         markers=(),
         phase_map=None,

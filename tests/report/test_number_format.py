@@ -116,7 +116,11 @@ def test_markup_escapes_all_that_is_not_markup() -> None:
 def test_of_an_ambiguous_verdict_the_one_that_was_put_in_is_credited() -> None:
     """And not what is named together: that is "or", and a hypothesis that has both is another one."""
     finding = replace(
-        wing_finding(), verdict="ambiguous", named=BOTH, put_in=BOTH[:1], alike=tuple((name,) for name in BOTH)
+        wing_finding(),
+        verdict="ambiguous",
+        named=BOTH,
+        added_effects=BOTH[:1],
+        indistinguishable=tuple((name,) for name in BOTH),
     )
     best = best_of(finding)
     assert best is not None

@@ -57,7 +57,7 @@ def variants() -> dict[str, Finding]:
         "zero misfit": replace(
             wing,
             strength=0.0,
-            floors=replace(wing.floors, noise=0.0, simulation=0.0, total=0.0, division=None),
+            floors=replace(wing.floors, noise=0.0, simulation=0.0, total=0.0, discretisation=None),
             recordings=(replace(recording(0, held_out=True), before=around(0, 0), after=around(0, 0), floor=0.0),),
         ),
         "unbounded": replace(

@@ -97,11 +97,11 @@ def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:
         summary=f"The hinge is off its place. Started from {len(spec.start)} genes, considered {list(spec.suspects)}.",
         probabilities={"adequate": 0.03, "named": 0.9, "ambiguous": 0.04, "unnamed": 0.02, "measurement fault": 0.01},
         named=("hinge_offset",),
-        put_in=("hinge_offset",),
+        added_effects=("hinge_offset",),
         strength=3.1,
         floors=Floors(0.5e-3, 0.3, None, "", 1e-5, 0.5e-3),
         hypotheses=hypotheses,
-        alike=(("hinge_offset",), ("camera_shift",)),
+        indistinguishable=(("hinge_offset",), ("camera_shift",)),
         where=Where(
             "outer 30 % of the span, along z", Interval(0.85, 0.7, 1.0), None, None, "z", (0.1, 0.9),
             (Exponent("flap frequency", Interval(2.0, 1.8, 2.2), 2.0, 4.0, "Hz"),),

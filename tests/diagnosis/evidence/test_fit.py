@@ -1,4 +1,4 @@
-"""What a fit minimises, how much it trusts it, where it ends, and what it foretells of recordings left out."""
+"""The deviance and its weight, convergence of fits, cross-validation, refits and discretisation."""
 
 from __future__ import annotations
 
@@ -16,15 +16,22 @@ from tests.diagnosis.pendulum_rig import PendulumRig, recorded
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis import DiagnosisSpec
-from wingfit.diagnosis.evidence.fit import CannotBeginError, Fit, _Look, _measured, _step, thoroughly
+from wingfit.diagnosis.evidence.fit import (
+    Fit,
+    InitialSimulationError,
+    _measure_columns,
+    _Simulator,
+    _step,
+    gauss_newton_fit,
+)
 from wingfit.diagnosis.evidence.intervals import covariance
-from wingfit.diagnosis.evidence.nominal import Nominal, promises
-from wingfit.diagnosis.evidence.refit import judged, left_out, refitted, substitutes
-from wingfit.diagnosis.evidence.screen import Nuisance, screened
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.nominal import Nominal, finer_is_promising
+from wingfit.diagnosis.evidence.refit import cross_validated_excess, make_refit, refit_with, substitute_trials
+from wingfit.diagnosis.evidence.screen import Nuisance, score_tests
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _elsewhere, _settled
-from wingfit.diagnosis.search_state import Assessment
+from wingfit.diagnosis.search import _nominal_from_best, _search_coarse_first
+from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
 Array = npt.NDArray[np.float64]
@@ -33,145 +40,147 @@ TRUTH = {"stiffness": 0.25, "damping": 3e-3, "inertia": 1.2e-3}
 RIG, EVALUATOR = PendulumRig(), InProcessEvaluator()
 
 
-def stacked(noise: float = 5e-4, seed: int = 1, **hidden: float) -> Stack:
-    return Stack.of(
+def whitened_pendulum(noise: float = 5e-4, seed: int = 1, **hidden: float) -> WhitenedData:
+    return WhitenedData.of(
         recorded({**TRUTH, **{k.replace("_", ".", 1): v for k, v in hidden.items()}}, noise=noise, seed=seed)
     )
 
 
-def problem(stack: Stack, values: Mapping[str, float] | None = None) -> Problem:
-    return Problem(RIG.model, stack.recordings, RIG.model.searched, base_genome(RIG.model, values or {}), stack.axes)
+def problem(data: WhitenedData, values: Mapping[str, float] | None = None) -> Problem:
+    return Problem(RIG.model, data.recordings, RIG.model.searched, base_genome(RIG.model, values or {}), data.axes)
 
 
-def start(asked: Problem) -> Array:
-    genes = free_genes(asked)
-    return unit_at(genes, np.array([asked.base[gene.name] for gene in genes]))
+def start(own: Problem) -> Array:
+    genes = free_genes(own)
+    return unit_at(genes, np.array([own.base[gene.name] for gene in genes]))
 
 
-def fit(stack: Stack, values: Mapping[str, float] | None = None) -> Fit:
-    asked = problem(stack, values)
-    *_, found = thoroughly(RIG, stack, asked, EVALUATOR, start(asked), 20)
+def fit(data: WhitenedData, values: Mapping[str, float] | None = None) -> Fit:
+    fitted_problem = problem(data, values)
+    *_, found = gauss_newton_fit(RIG, data, fitted_problem, EVALUATOR, start(fitted_problem), 20)
     return found
 
 
 @cache
-def one() -> Stack:
-    return stacked()
+def one() -> WhitenedData:
+    return whitened_pendulum()
 
 
-def test_noise_counts_as_noise_and_a_misfit_beyond_it_by_its_logarithm() -> None:
-    stack = one()
-    D, nu = len(stack.scale), stack.pieces
-    assert nu == POLICY.pieces * len(stack.recordings)
-    direction = stack.scale / np.sqrt(D)  # of chi-squared one
+def test_deviance_is_chi_squared_within_noise_and_logarithmic_beyond() -> None:
+    data = one()
+    D, nu = len(data.scale), data.effective_samples
+    assert nu == POLICY.effective_samples * len(data.recordings)
+    direction = data.scale / np.sqrt(D)  # of chi-squared one
     for chi in (0.5 * D, D, D + 0.1 * nu, D + nu, 50.0 * D):
         beyond = max(chi - D, 0.0)
         coefficients = np.sqrt(chi) * direction
-        assert float(stack.surprise(coefficients)) == pytest.approx(min(chi, D) + nu * np.log1p(beyond / nu))
-        assert stack.trust(coefficients) == pytest.approx(1.0 / (1.0 + beyond / nu))
+        assert float(data.deviance(coefficients)) == pytest.approx(min(chi, D) + nu * np.log1p(beyond / nu))
+        assert data.likelihood_weight(coefficients) == pytest.approx(1.0 / (1.0 + beyond / nu))
 
 
-def test_trust_is_the_slope_of_the_surprise() -> None:
-    stack = one()
-    direction = stack.scale / np.sqrt(len(stack.scale))
-    for chi in (3.0 * len(stack.scale), 40.0 * len(stack.scale)):
-        ends = [float(stack.surprise(np.sqrt(chi + step) * direction)) for step in (-1.0, 1.0)]
-        assert (ends[1] - ends[0]) / 2.0 == pytest.approx(stack.trust(np.sqrt(chi) * direction), rel=1e-6)
+def test_the_likelihood_weight_is_the_slope_of_the_deviance() -> None:
+    data = one()
+    direction = data.scale / np.sqrt(len(data.scale))
+    for chi in (3.0 * len(data.scale), 40.0 * len(data.scale)):
+        ends = [float(data.deviance(np.sqrt(chi + step) * direction)) for step in (-1.0, 1.0)]
+        assert (ends[1] - ends[0]) / 2.0 == pytest.approx(data.likelihood_weight(np.sqrt(chi) * direction), rel=1e-6)
 
 
 @pytest.mark.parametrize("corner", [0.02, 0.98])
-def test_a_fit_finds_the_truth_from_the_corners_of_the_box(corner: float) -> None:
-    stack = one()
+def test_a_fit_recovers_the_truth_from_corners_of_the_box(corner: float) -> None:
+    data = one()
     genes = [gene for gene in RIG.model.genes if gene.name in RIG.model.searched]
-    found = fit(stack, {gene.name: float(gene.from_unit(corner)) for gene in genes})
+    found = fit(data, {gene.name: float(gene.from_unit(corner)) for gene in genes})
     assert found.converged
-    assert stack.chi_squared(found.coefficients) < 1.2 * len(stack.scale)
-    errors = np.sqrt(np.diag(covariance(stack, found)))
+    assert data.chi_squared(found.coefficients) < 1.2 * len(data.scale)
+    errors = np.sqrt(np.diag(covariance(data, found)))
     off = found.unit - unit_at(genes, np.array([TRUTH[gene.name] for gene in genes]))
     assert np.all(np.abs(off) < 4 * errors)
 
 
-def test_a_model_that_lacks_something_keeps_its_genes_within_the_box() -> None:
-    """A spring that hardens, recorded almost without noise: chi-squared is in the thousands for each coefficient."""
-    stack = stacked(noise=1e-5, cubic_k3=0.6)
-    found = fit(stack)
-    assert stack.chi_squared(found.coefficients) > 1000 * len(stack.scale)
+def test_missing_physics_does_not_push_genes_to_their_bounds() -> None:
+    """A hardening spring almost without noise: chi-squared is in the thousands for each coefficient."""
+    data = whitened_pendulum(noise=1e-5, cubic_k3=0.6)
+    found = fit(data)
+    assert data.chi_squared(found.coefficients) > 1000 * len(data.scale)
     assert found.unit.min() > 0.01
     assert found.unit.max() < 0.99
 
 
-def test_intervals_widen_with_what_the_model_misses_and_are_no_narrower_than_the_tolerance_allows() -> None:
-    stack = one()
-    found = fit(stack)
-    floor = POLICY.tolerance**2 * len(stack.scale) / stack.pieces
-    assert stack.most_trust == pytest.approx(1.0 / (1.0 + floor))
-    slopes = found.jacobian / stack.scale[:, None]
+def test_intervals_include_model_error_and_tolerance() -> None:
+    data = one()
+    found = fit(data)
+    floor = POLICY.tolerance**2 * len(data.scale) / data.effective_samples
+    assert data.max_likelihood_weight == pytest.approx(1.0 / (1.0 + floor))
+    slopes = found.jacobian / data.scale[:, None]
     gram = slopes.T @ slopes
     prior = 4.0 * np.eye(len(gram))
-    np.testing.assert_allclose(covariance(stack, found), np.linalg.inv(stack.most_trust * gram + prior), rtol=1e-6)
-    worse = replace(found, coefficients=10.0 * stack.scale)
-    trust = stack.trust(worse.coefficients)
-    np.testing.assert_allclose(covariance(stack, worse), np.linalg.inv(trust * gram + prior), rtol=1e-6)
+    np.testing.assert_allclose(
+        covariance(data, found), np.linalg.inv(data.max_likelihood_weight * gram + prior), rtol=1e-6
+    )
+    worse = replace(found, coefficients=10.0 * data.scale)
+    likelihood_weight = data.likelihood_weight(worse.coefficients)
+    np.testing.assert_allclose(covariance(data, worse), np.linalg.inv(likelihood_weight * gram + prior), rtol=1e-6)
 
 
-def test_slopes_to_one_side_and_to_both_and_at_the_end_of_the_box() -> None:
-    stack = one()
-    asked = problem(stack)
-    look, every = _Look(RIG, stack, asked, EVALUATOR), np.ones(len(asked.free), bool)
-    middle = fit(stack)
-    one_sided, central = (_measured(look, middle, every, sides).jacobian for sides in (1, 2))
+def test_one_sided_and_central_differences_agree_at_a_bound() -> None:
+    data = one()
+    fitted_problem = problem(data)
+    simulator, every = _Simulator(RIG, data, fitted_problem, EVALUATOR), np.ones(len(fitted_problem.free), bool)
+    middle = fit(data)
+    one_sided, central = (_measure_columns(simulator, middle, every, sides).jacobian for sides in (1, 2))
     assert np.linalg.norm(one_sided - central) < 0.05 * np.linalg.norm(central)
     unit = middle.unit.copy()
     unit[0] = 1.0
-    at_end = replace(middle, unit=unit, coefficients=look.at(unit[None], unit)[0][0])
-    one_sided, central = (_measured(look, at_end, every, sides).jacobian for sides in (1, 2))
+    at_end = replace(middle, unit=unit, coefficients=simulator.at(unit[None], unit)[0][0])
+    one_sided, central = (_measure_columns(simulator, at_end, every, sides).jacobian for sides in (1, 2))
     assert np.isfinite(one_sided).all()
     assert np.linalg.norm(one_sided[:, 0] - central[:, 0]) < 0.05 * np.linalg.norm(central[:, 0])
 
 
-def test_what_the_nominal_genes_can_do_is_taken_out_and_no_more_than_their_prior_lets_them() -> None:
-    stack = one()
-    found = fit(stack)
-    nuisance, F = Nuisance(stack, found), len(found.unit)
+def test_nuisance_genes_are_projected_out_within_their_prior() -> None:
+    data = one()
+    found = fit(data)
+    nuisance, F = Nuisance(data, found), len(found.unit)
     moved = found.jacobian @ np.ones(F)
-    whole = float(np.sum((moved / stack.scale) ** 2))
-    assert float(np.sum(nuisance.rest(moved) ** 2)) <= 1.01 * 4.0 * F  # what the move costs by the prior
+    whole = float(np.sum((moved / data.scale) ** 2))
+    assert float(np.sum(nuisance.project_out(moved) ** 2)) <= 1.01 * 4.0 * F  # what the move costs by the prior
     assert whole > 100 * 4.0 * F
-    doubted = Nuisance(stack, replace(found, coefficients=30.0 * stack.scale))
-    assert np.sum(doubted.rest(moved) ** 2) > 2 * np.sum(nuisance.rest(moved) ** 2)
+    doubted = Nuisance(data, replace(found, coefficients=30.0 * data.scale))
+    assert np.sum(doubted.project_out(moved) ** 2) > 2 * np.sum(nuisance.project_out(moved) ** 2)
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_noise_alone_predicts_recordings_left_out_to_the_noise(seed: int) -> None:
-    stack = stacked(seed=seed)
-    found = fit(stack)
-    told = left_out(stack, found)
-    assert told is not None
-    assert told - stack.excess(found.coefficients) < 0.02 * stack.noise**2
+def test_noise_alone_cross_validates_to_the_noise(seed: int) -> None:
+    data = whitened_pendulum(seed=seed)
+    found = fit(data)
+    predicted_excess = cross_validated_excess(data, found)
+    assert predicted_excess is not None
+    assert predicted_excess - data.excess(found.coefficients) < 0.02 * data.noise**2
 
 
-def test_what_is_lacking_predicts_worse_than_it_fits() -> None:
-    stack = stacked(cubic_k3=0.6)
-    found = fit(stack)
-    told = left_out(stack, found)
-    assert told is not None
-    assert told > 1.02 * stack.excess(found.coefficients)
+def test_missing_physics_cross_validates_worse_than_it_fits() -> None:
+    data = whitened_pendulum(cubic_k3=0.6)
+    found = fit(data)
+    predicted_excess = cross_validated_excess(data, found)
+    assert predicted_excess is not None
+    assert predicted_excess > 1.02 * data.excess(found.coefficients)
 
 
-def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
-    """The explanation's own genes do nothing: it ended in the better minimum, and is not the cause."""
-    stack = one()
-    good = fit(stack)
+def test_a_nominal_fit_leaves_a_local_minimum_by_a_hypothesis() -> None:
+    """The hypothesis' own genes have no effect: it only reached the better minimum, and is not the cause."""
+    data = one()
+    good = fit(data)
     bad = replace(good, unit=np.full(len(good.unit), 0.9))
-    look = _Look(RIG, stack, good.problem, EVALUATOR)
-    bad = replace(bad, coefficients=look.at(bad.unit[None], bad.unit)[0][0])
-    caught = Nominal(RIG, judged(stack, bad), None, "", ())
-    state = Assessment(RIG, stack, caught, refits=[judged(stack, good)])
-    found = _elsewhere(state, EVALUATOR)
+    simulator = _Simulator(RIG, data, good.problem, EVALUATOR)
+    bad = replace(bad, coefficients=simulator.at(bad.unit[None], bad.unit)[0][0])
+    caught = Nominal(RIG, make_refit(data, bad), None, "", ())
+    state = SearchState(RIG, data, caught, refits=[make_refit(data, good)])
+    found = _nominal_from_best(state, EVALUATOR)
     assert found is not None
     assert found.excess < 0.1 * caught.refit.excess
-    state = Assessment(RIG, stack, Nominal(RIG, judged(stack, good), None, "", ()), refits=[judged(stack, good)])
-    assert _elsewhere(state, EVALUATOR) is None
+    state = SearchState(RIG, data, Nominal(RIG, make_refit(data, good), None, "", ()), refits=[make_refit(data, good)])
+    assert _nominal_from_best(state, EVALUATOR) is None
 
 
 @pytest.mark.parametrize(
@@ -184,93 +193,95 @@ def test_a_nominal_fit_that_was_caught_is_let_out_by_an_explanation() -> None:
         (3.0, 0.9, 0.1, False),
     ],
 )
-def test_a_finer_division_is_fitted_where_it_may_be_what_limits(
+def test_a_finer_discretisation_is_fitted_where_promising(
     changes: float, takes: float, left: float, expected: int
 ) -> None:
-    """It takes a part of the misfit; or it changes more than all of that, and the tangent knows nothing of it."""
-    stack, now = SimpleNamespace(noise=1.0, policy=POLICY), SimpleNamespace(excess=left**2)
-    assert promises(cast("Any", stack), changes, takes, cast("Any", now)) == bool(expected)
+    """It explains a fraction of the residual, or changes more than all of it, where the linearisation fails."""
+    data, now = SimpleNamespace(noise=1.0, policy=POLICY), SimpleNamespace(excess=left**2)
+    assert finer_is_promising(cast("Any", data), changes, takes, cast("Any", now)) == bool(expected)
 
 
 @pytest.mark.parametrize(
-    ("coarse", "asked", "taken"),
+    ("coarse", "expected", "taken"),
     [(0.1, ["coarse"], "coarse"), (0.9, ["coarse", "fine"], "fine"), (None, ["coarse", "fine"], "fine")],
 )
-def test_a_finer_division_that_takes_up_what_an_effect_leaves_does_not_hide_it(
-    monkeypatch: pytest.MonkeyPatch, coarse: float | None, asked: list[str], taken: str
+def test_a_finer_discretisation_does_not_hide_an_effect(
+    monkeypatch: pytest.MonkeyPatch, coarse: float | None, expected: list[str], taken: str
 ) -> None:
-    """Suspects are tried at the coarse one first, and it stays where one of them does better than the finer one."""
+    """Suspects are tested with the coarse one first, which stays if one of them fits better than the finer one."""
 
     def found(subject: str, excess: float) -> Any:
         return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess))
 
     def tried(state: Any, *_: Any, **__: Any) -> Iterator[Any]:
-        begun.append(state.subject)
+        searched.append(state.subject)
         if coarse is not None:
             state.refits.append(SimpleNamespace(excess=coarse))
         yield 1.0, "tried"
 
-    begun: list[str] = []
+    searched: list[str] = []
     fits = {False: found("coarse", 1.0), True: found("fine", 0.7)}
-    monkeypatch.setattr("wingfit.diagnosis.search.settled", lambda *_, refine: fits[refine])
-    monkeypatch.setattr("wingfit.diagnosis.search._suspected", tried)
-    monkeypatch.setattr("wingfit.diagnosis.search.beyond_doubt", lambda *_: False)
-    state = Assessment(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
-    parts = [part for part, _ in _settled(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
-    assert begun == asked
+    monkeypatch.setattr("wingfit.diagnosis.search.choose_discretisation", lambda *_, refine: fits[refine])
+    monkeypatch.setattr("wingfit.diagnosis.search._try_suspects", tried)
+    monkeypatch.setattr("wingfit.diagnosis.search.nominal_suffices", lambda *_: False)
+    state = SearchState(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
+    parts = [part for part, _ in _search_coarse_first(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
+    assert searched == expected
     assert cast("Any", state.nominal).subject == taken
     assert cast("Any", state.subject) == taken
     assert parts == sorted(parts)
 
 
-def test_a_bent_step_follows_a_valley_that_a_straight_one_leaves() -> None:
-    """Rosenbrock's valley: its floor is a parabola, and a straight step is only as long as its walls allow."""
+def test_geodesic_acceleration_follows_a_curved_valley() -> None:
+    """Rosenbrock's valley: its floor is a parabola, and its walls limit a straight step."""
 
     def at(units: Array, near: Array) -> tuple[Array, tuple[None, ...], list[Array]]:  # noqa: ARG001
         u, v = units.T
         return np.stack([3e4 * (v - 3.0 * (u - 0.1) ** 2), 30.0 * (0.6 - u)], axis=1), (None,) * len(units), []
 
-    def surprise(coefficients: Array) -> Array:
+    def deviance(coefficients: Array) -> Array:
         return np.asarray((coefficients**2).sum(axis=-1))
 
-    stack = SimpleNamespace(scale=np.ones(2), trust=lambda coefficients: 1.0, surprise=surprise)  # noqa: ARG005
-    look = cast(_Look, SimpleNamespace(stack=stack, at=at))
+    data = SimpleNamespace(scale=np.ones(2), likelihood_weight=lambda coefficients: 1.0, deviance=deviance)  # noqa: ARG005
+    simulator = cast(_Simulator, SimpleNamespace(data=data, at=at))
     unit = np.array([0.1, 0.0])
     here = at(unit[None], unit)[0][0]
     slopes = np.array([[0.0, 3e4], [-30.0, 0.0]])
-    cost = float(surprise(here) + 4.0 * ((unit - 0.5) ** 2).sum())
+    cost = float(deviance(here) + 4.0 * ((unit - 0.5) ** 2).sum())
     fit = Fit(cast(Any, None), unit, here, slopes, (), cost, unit)
-    (straight, _), (bent, _) = (_step(look, fit, bent=one) for one in (False, True))
+    (straight, _), (accelerated, _) = (_step(simulator, fit, accelerated=one) for one in (False, True))
     assert straight is not None
-    assert bent is not None
-    assert cost - bent.cost > 2.0 * (cost - straight.cost)
+    assert accelerated is not None
+    assert cost - accelerated.cost > 2.0 * (cost - straight.cost)
 
 
-def test_a_part_of_an_explanation_is_exchanged_only_for_what_can_do_the_same() -> None:
-    stack = stacked(friction_torque=2e-3, delay_time=4e-3)
-    nominal = fit(stack)
-    found = [trials for _, trials in screened(RIG, stack, nominal, EVALUATOR, RIG.suspects)]
+def test_substitutes_reproduce_the_contribution_of_an_effect() -> None:
+    data = whitened_pendulum(friction_torque=2e-3, delay_time=4e-3)
+    nominal = fit(data)
+    found = [trials for _, trials in score_tests(RIG, data, nominal, EVALUATOR, RIG.suspects)]
     best = {trials[0].suspect.name: trials[0] for trials in found}
-    both = refitted(RIG, stack, nominal, EVALUATOR, [best["friction"], best["delay"]])
+    both = refit_with(RIG, data, nominal, EVALUATOR, [best["friction"], best["delay"]])
     assert both is not None
     twin = replace(best["delay"], suspect=replace(best["delay"].suspect, name="twin"))
     offered = [*found, [twin]]
-    assert substitutes(stack, EVALUATOR, both, best["delay"], offered, 2) == [twin]
-    assert substitutes(stack, EVALUATOR, both, best["friction"], offered, 2) == []
+    assert substitute_trials(data, EVALUATOR, both, best["delay"], offered, 2) == [twin]
+    assert substitute_trials(data, EVALUATOR, both, best["friction"], offered, 2) == []
 
 
-def test_a_way_round_that_cannot_be_simulated_ends_no_refit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a refit that went astray the size is fitted first: where that cannot begin, the refit stays as it is."""
-    stack = stacked(point_mass_mass=5e-3, point_mass_station=0.5)
-    nominal = fit(stack)
-    ((_, trials),) = screened(RIG, stack, nominal, EVALUATOR, [one for one in RIG.suspects if one.name == "point_mass"])
-    asked = []
+def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A diverged refit is repeated with its size first; where that fails to start, the refit stays."""
+    data = whitened_pendulum(point_mass_mass=5e-3, point_mass_station=0.5)
+    nominal = fit(data)
+    ((_, trials),) = score_tests(
+        RIG, data, nominal, EVALUATOR, [one for one in RIG.suspects if one.name == "point_mass"]
+    )
+    calls = []
 
     def fails(*arguments: Any) -> Fit:
-        asked.append(arguments)
-        raise CannotBeginError("it flutters")
+        calls.append(arguments)
+        raise InitialSimulationError("it flutters")
 
-    stack = replace(stack, policy=replace(POLICY, astray=0.0))
-    monkeypatch.setattr("wingfit.diagnosis.evidence.refit._some", fails)
-    assert refitted(RIG, stack, nominal, EVALUATOR, trials[:1]) is not None
-    assert asked
+    data = replace(data, policy=replace(POLICY, diverged=0.0))
+    monkeypatch.setattr("wingfit.diagnosis.evidence.refit._fit_subset", fails)
+    assert refit_with(RIG, data, nominal, EVALUATOR, trials[:1]) is not None
+    assert calls

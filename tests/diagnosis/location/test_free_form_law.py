@@ -1,4 +1,4 @@
-"""A law for the missing load that predicts other recordings is found and told in words; none where there is none."""
+"""A law for the missing load that predicts left-out recordings is found and described; else there is none."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tests.diagnosis.loaded import case, filmed, model, nominal
+from tests.diagnosis.loaded import case, model, nominal, recorded_tracks
 from wingfit.diagnosis.location.free_form_law import free_law
 from wingfit.diagnosis.location.law_features import candidates
 from wingfit.diagnosis.location.missing_load import Case
@@ -32,31 +32,31 @@ MASS = 0.3  # of the added mass of a flat plate
 
 
 @cache
-def heavier() -> tuple[tuple[Case, ...], tuple[StationMotion, ...]]:
-    """A wing that moves air along, and a model of it that does not know."""
+def added_mass_cases() -> tuple[tuple[Case, ...], tuple[StationMotion, ...]]:
+    """Cases of a wing with added mass and a nominal model without it."""
     plant = replace(model("4"), effects=("added_mass",))
     genome = nominal(plant)
     genome[[gene.name for gene in plant.genes].index("added_mass.k")] = MASS
     found = [
-        case(model("4"), filmed(plant, genome, condition, np.random.default_rng(k)), PROBE)
+        case(model("4"), recorded_tracks(plant, genome, condition, np.random.default_rng(k)), PROBE)
         for k, condition in enumerate(CONDITIONS)
     ]
     return tuple(one for one, _ in found), tuple(answers.motion for _, answers in found)
 
 
-def lacking(loads: Sequence[Array], seed: int = 0) -> list[Case]:
-    """Cases that lack loads [J, N] at the motions' phases, and noise."""
+def cases_with(loads: Sequence[Array], seed: int = 0) -> list[Case]:
+    """Cases whose residual is the response to ``loads`` [J, N] at the motions' phases, plus noise."""
     rng, cases = np.random.default_rng(seed), []
-    for one, motion, load in zip(*heavier(), loads, strict=True):
+    for one, motion, load in zip(*added_mass_cases(), loads, strict=True):
         series = np.linalg.pinv(PROBE.terms(motion.phase + one.crossing))
         sizes = (load @ series.T).ravel()
-        cases.append(replace(one, lacking=one.responses @ sizes + rng.standard_normal(len(one.lacking))))
+        cases.append(replace(one, residual=one.responses @ sizes + rng.standard_normal(len(one.residual))))
     return cases
 
 
-def test_added_mass_is_told_from_tracks_with_its_coefficient() -> None:
+def test_added_mass_is_identified_with_its_coefficient() -> None:
     """-pi / 4 k rho c^2 a_n (Sedov 1965), all genes of the nominal model free."""
-    cases, motions = heavier()
+    cases, motions = added_mass_cases()
     law = free_law(cases, PROBE, motions)
     assert law is not None
     assert law.terms[0].feature == "rho c^2 a_n"
@@ -66,17 +66,12 @@ def test_added_mass_is_told_from_tracks_with_its_coefficient() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "coefficient"),
-    [
-        ("rho c |V_n| V_n (outer 40 % of the span)", -2.0),
-        ("sign V_n", -1.0),
-        ("w^3", -2e5),
-    ],
+    ("name", "coefficient"), [("rho c |V_n| V_n (outer 40 % of the span)", -2.0), ("sign V_n", -1.0), ("w^3", -2e5)]
 )
-def test_laws_of_the_dictionary_are_found_again(name: str, coefficient: float) -> None:
-    motions = heavier()[1]
+def test_simulated_laws_are_recovered(name: str, coefficient: float) -> None:
+    motions = added_mass_cases()[1]
     (candidate,) = (one for one in candidates() if one.name == name)
-    law = free_law(lacking([coefficient * candidate.field(motion) for motion in motions]), PROBE, motions)
+    law = free_law(cases_with([coefficient * candidate.field(motion) for motion in motions]), PROBE, motions)
     assert law is not None
     assert law.terms[0].feature == name
     low, high = law.terms[0].coefficient.low, law.terms[0].coefficient.high
@@ -88,12 +83,12 @@ def test_laws_of_the_dictionary_are_found_again(name: str, coefficient: float) -
     assert candidate.words in law.words
 
 
-def test_loads_of_no_law_predict_nothing() -> None:
-    """Another load in every recording."""
-    motions, rng = heavier()[1], np.random.default_rng(8)
+def test_random_loads_have_no_law() -> None:
+    """A different load in every recording."""
+    motions, rng = added_mass_cases()[1], np.random.default_rng(8)
     hats = PROBE.hats(np.array(PROBE.stations))
     loads = [hats @ rng.standard_normal((5, 17)) @ PROBE.terms(motion.phase).T for motion in motions]
-    law = free_law(lacking(loads), PROBE, motions)
+    law = free_law(cases_with(loads), PROBE, motions)
     assert law is not None
     assert law.terms == ()
     assert law.explained < 0.1
@@ -101,13 +96,13 @@ def test_loads_of_no_law_predict_nothing() -> None:
 
 
 def test_two_recordings_are_too_few() -> None:
-    cases, motions = heavier()
+    cases, motions = added_mass_cases()
     assert free_law(cases[:2], PROBE, motions[:2]) is None
 
 
 def test_features_have_the_dimension_of_a_load() -> None:
-    """Lengths doubled at the same frequency and density: those of the air grow with the fourth power less one."""
-    motion = heavier()[1][0]
+    """With lengths doubled at the same frequency and density, loads of the air per span scale by 2^3."""
+    motion = added_mass_cases()[1][0]
     lengths = ("velocity", "forward", "acceleration", "deflection", "chord")
     larger = replace(motion, airspeed=2 * motion.airspeed, **{key: 2 * getattr(motion, key) for key in lengths})
     for one in candidates():

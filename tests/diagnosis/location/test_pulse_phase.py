@@ -1,4 +1,4 @@
-"""A short force is found when it acts, whatever the genes have taken of it; noise has no instant."""
+"""The instant of a short force, although genes have absorbed part of it; noise has none."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
-from wingfit.diagnosis.location.pulse_phase import pulse
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.records import Condition, LowPass, Recording
 from wingfit.sim.filtering import default_cutoff, low_passed
 
 Array = npt.NDArray[np.float64]
 
 NOISE, ORIGIN = 0.01, 0.7  # N; rad of the drive at which a beat begins
-SUBJECT = cast("Any", SimpleNamespace(origin=lambda _: ORIGIN))
+SUBJECT = cast("Any", SimpleNamespace(beat_start_phase=lambda _: ORIGIN))
 
 
-def stack(when: float | None, rng: np.random.Generator, *, filtered: bool = False) -> Stack:
-    """Four recordings of a push and half a pull a little later; sizes and directions differ."""
+def force_data(when: float | None, rng: np.random.Generator, *, filtered: bool = False) -> WhitenedData:
+    """Four recordings of a pulse and an opposite half pulse shortly after; sizes and directions differ."""
     recordings = []
     for k, frequency in enumerate((10.3, 11.7, 12.5, 13.3)):
         times = np.arange(900) / 800.0
@@ -34,23 +34,23 @@ def stack(when: float | None, rng: np.random.Generator, *, filtered: bool = Fals
         condition = Condition(frequency, 0.0, 101_325.0, 293.15, 1.0, 0.5)
         one = Recording(f"r{k}", "wind_tunnel", condition, times, (), values, forces=("x", "z"))
         recordings.append(low_passed(one, LowPass(default_cutoff(frequency))) if filtered else one)
-    return Stack.of(recordings, ("x", "z"))
+    return WhitenedData.of(recordings, ("x", "z"))
 
 
-def told(of: Stack) -> Any:
-    """The pulse in what is left when first and second harmonics are free, as genes are."""
-    order = np.concatenate([np.tile(view.order, 2) for view in of.views])
-    white = -np.concatenate([view.coefficients.ravel() for view in of.views]) / of.scale
+def pulse_of(of: WhitenedData) -> Any:
+    """The pulse in the residual where first and second harmonics are free, like genes."""
+    order = np.concatenate([np.tile(beat_fit.order, 2) for beat_fit in of.beat_fits])
+    white = -np.concatenate([beat_fit.coefficients.ravel() for beat_fit in of.beat_fits]) / of.scale
     genes = np.eye(len(white))[:, (order == 1) | (order == 2)]
     left = white - genes @ (genes.T @ white)
     unit = np.full(genes.shape[1], 0.5)
     fit = SimpleNamespace(coefficients=left * of.scale, jacobian=1e3 * genes * of.scale[:, None], unit=unit)
-    return pulse(SUBJECT, of, cast("Any", fit))
+    return locate_pulse(SUBJECT, of, cast("Any", fit))
 
 
 @pytest.mark.parametrize("when", [0.05, 0.3, 0.98])
-def test_a_push_is_told_when_it_acts_though_genes_have_taken_its_slow_part(when: float) -> None:
-    found = told(stack(when, np.random.default_rng(1)))
+def test_a_pulse_is_located_although_genes_absorbed_its_slow_part(when: float) -> None:
+    found = pulse_of(force_data(when, np.random.default_rng(1)))
     apart = (found.value - when + 0.5) % 1.0 - 0.5
     assert abs(apart) < 10.0 / 360.0
     assert found.low < found.value < found.high
@@ -58,8 +58,8 @@ def test_a_push_is_told_when_it_acts_though_genes_have_taken_its_slow_part(when:
 
 
 @pytest.mark.parametrize("when", [0.05, 0.3, 0.98])
-def test_a_push_that_a_low_pass_has_spread_is_told(when: float) -> None:
-    found = told(stack(when, np.random.default_rng(1), filtered=True))
+def test_a_low_passed_pulse_is_located(when: float) -> None:
+    found = pulse_of(force_data(when, np.random.default_rng(1), filtered=True))
     apart = (found.value - when + 0.5) % 1.0 - 0.5
     assert abs(apart) < 15.0 / 360.0
     assert found.low < found.value - apart < found.high
@@ -68,4 +68,4 @@ def test_a_push_that_a_low_pass_has_spread_is_told(when: float) -> None:
 @pytest.mark.parametrize("filtered", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_has_no_instant(seed: int, filtered: bool) -> None:
-    assert told(stack(None, np.random.default_rng(seed), filtered=filtered)) is None
+    assert pulse_of(force_data(None, np.random.default_rng(seed), filtered=filtered)) is None

@@ -1,4 +1,4 @@
-"""What held-out recordings say, and how surely."""
+"""Misfits to held-out recordings and their intervals."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 from wingfit.diagnosis.finding import Interval, RecordingMisfit
 from wingfit.diagnosis.verdict.build_finding import _worsened
-from wingfit.diagnosis.verdict.proof import Predicted, _misfits
+from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits
 
 
-def test_forces_are_drawn_in_stretches_of_time_however_many_there_are() -> None:
-    """Both axes of both recordings are off alike, at one time more than at another: drawing axes would tell nothing."""
+def test_forces_are_bootstrapped_in_blocks_of_time() -> None:
+    """Both axes have equal errors that vary in time: a bootstrap over axes would give no interval."""
     off = np.repeat(np.linspace(1.0, 3.0, 48)[:, None], 2, axis=1)
-    pair = Predicted(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
+    pair = ResidualPair(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
     before, after, better = _misfits(pair, [np.ones(2, bool)] * 2, ["forces", "forces"])
     assert before.value == 2.0 * after.value
     assert better
@@ -25,22 +25,22 @@ def test_forces_are_drawn_in_stretches_of_time_however_many_there_are() -> None:
     assert before.high > 1.03 * before.value
 
 
-def test_tracks_are_drawn_marker_by_marker() -> None:
+def test_tracks_are_bootstrapped_by_marker() -> None:
     rng = np.random.default_rng(1)
     off = np.repeat(rng.uniform(1.0, 3.0, 20), 3) * np.ones((30, 60))
-    before, _, _ = _misfits(Predicted(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
+    before, _, _ = _misfits(ResidualPair(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
     assert before.low is not None
     assert before.high is not None
     assert before.low < before.value < before.high
 
 
-def test_a_recording_that_is_fitted_worse_is_told() -> None:
+def test_a_recording_that_fits_worse_gets_a_remark() -> None:
     def row(name: str, before: float, after: float) -> RecordingMisfit:
         return RecordingMisfit(
             name, False, 3.0, 0.0, 10.0, 0.0, Interval(before, None, None), Interval(after, None, None), 1e-3
         )
 
     rows = [row("good", 5e-3, 1e-3), row("bad", 2e-3, 3e-3)]
-    put_in, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
-    assert _worsened(rows, put_in, "m") == ("with what was found the misfit grows in bad from 2 to 3 mm",)
+    added, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
+    assert _worsened(rows, added, "m") == ("with the added effects the misfit increases in bad from 2 to 3 mm",)
     assert _worsened(rows, nothing, "m") == ()

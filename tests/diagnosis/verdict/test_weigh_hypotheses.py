@@ -1,4 +1,4 @@
-"""How explanations are weighed: by what they leave, above floors, against nothing and against the unknown."""
+"""Weighing of hypotheses by their excess above floors, against the nominal model and an unknown law."""
 
 from __future__ import annotations
 
@@ -10,115 +10,124 @@ import numpy as np
 import pytest
 
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.whitened_recordings import Stack
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval
-from wingfit.diagnosis.location.differences import _variables, acting
+from wingfit.diagnosis.location.differences import _variables, cause_location
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _unended
-from wingfit.diagnosis.verdict.verdict import _part, decided, summary
-from wingfit.diagnosis.verdict.weigh_hypotheses import Weighed, beyond_doubt, refuted, tolerated, weighed
+from wingfit.diagnosis.search import _unconverged
+from wingfit.diagnosis.verdict.verdict import _explained_fraction, decide, summary
+from wingfit.diagnosis.verdict.weigh_hypotheses import (
+    HypothesisWeights,
+    nominal_refuted,
+    nominal_suffices,
+    tolerated_excess,
+    weigh,
+)
 from wingfit.records import Condition
 
 
 def refit(
-    left: float,
-    names: tuple[str, ...] = (),
-    genes: int = 1,
-    family: str = "structure",
-    predicted: float | None = None,
+    left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure", predicted: float | None = None
 ) -> Refit:
-    """A refit that leaves ``left`` noises (root mean square); of recordings left out as much unless ``predicted``."""
+    """A refit with a residual of ``left`` noises (RMS), cross-validated to the same unless ``predicted``."""
     trials = tuple(
         SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
     )
     return Refit(cast("Any", trials), cast("Any", None), left**2, (left if predicted is None else predicted) ** 2)
 
 
-def stack(recordings: int = 6, uncertainty: float = 0.0) -> Stack:
-    return cast("Stack", SimpleNamespace(noise=1.0, pieces=6.0 * recordings, uncertainty=uncertainty, policy=POLICY))
+def data(recordings: int = 6, excess_standard_error: float = 0.0) -> WhitenedData:
+    return cast(
+        "WhitenedData",
+        SimpleNamespace(
+            noise=1.0, effective_samples=6.0 * recordings, excess_standard_error=excess_standard_error, policy=POLICY
+        ),
+    )
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
-    found = decided(weighed(stack(), refit(nominal), others, floor, 40))
+    found = decide(weigh(data(), refit(nominal), others, floor, 40))
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     return found.verdict, found.named
 
 
-def test_a_misfit_below_the_noise_is_adequate() -> None:
+def test_an_excess_below_the_noise_is_adequate() -> None:
     assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
 
 
-def test_what_takes_nearly_all_is_named() -> None:
+def test_an_effect_that_explains_nearly_all_is_named() -> None:
     assert verdict(2.0, refit(0.3, ("a",)), refit(1.5, ("b",))) == ("named", ("a",))
 
 
-def test_a_fault_of_the_measurement_is_called_one() -> None:
+def test_a_measurement_fault_has_its_own_verdict() -> None:
     found = verdict(2.0, refit(0.3, ("a",), family="measurement"), refit(1.5, ("b",)))
     assert found == ("measurement fault", ("a",))
 
 
-def test_what_explains_as_well_is_not_told_apart() -> None:
+def test_equally_good_effects_are_ambiguous() -> None:
     assert verdict(2.0, refit(0.30, ("a",)), refit(0.31, ("b",)))[0] == "ambiguous"
 
 
-def test_what_all_possible_explanations_share_is_named_and_the_rest_left_open() -> None:
-    """Whether a second effect is there is not known, but the first is; where that alone is not possible, nothing is."""
+def test_the_effect_common_to_all_possible_hypotheses_is_named() -> None:
+    """A second effect is uncertain but the first is not; where the first alone is not possible, none is named."""
     both = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
-    found = decided(weighed(stack(), refit(2.0), both, 0.0, 40))
+    found = decide(weigh(data(), refit(2.0), both, 0.0, 40))
     assert (found.verdict, found.named) == ("named", ("a",))
-    assert set(found.alike) == {("a",), ("a", "b")}
+    assert set(found.alternatives) == {("a",), ("a", "b")}
     assert found.probabilities["named"] > 0.9
     apart = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
-    assert decided(weighed(stack(), refit(2.0), apart, 0.0, 40)).verdict == "ambiguous"
+    assert decide(weigh(data(), refit(2.0), apart, 0.0, 40)).verdict == "ambiguous"
 
 
-def test_explanations_are_alike_where_one_of_them_is_right_and_only_there() -> None:
-    open_ = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
-    assert set(open_.alike) == {("a",), ("b",)}
-    assert decided(weighed(stack(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alike == ()
+def test_alternatives_are_listed_only_for_a_verdict_on_effects() -> None:
+    open_ = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",))], 0.0, 40))
+    assert set(open_.alternatives) == {("a",), ("b",)}
+    assert decide(weigh(data(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alternatives == ()
 
 
-def test_the_summary_says_which_are_alike_and_what_may_lack_besides() -> None:
+def test_the_summary_lists_alternatives_and_additional_effects() -> None:
     suspects = cast("Any", {name: SimpleNamespace(title=f"The {name}") for name in "abc"})
-    told = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
+    texts = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
     alike = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
     nested = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
-    either, more = (summary(decided(weighed(stack(), refit(2.0), r, 0.0, 40)), suspects, told) for r in (alike, nested))
-    assert "cannot tell which: the a with the c or the a with the b." in either
-    assert "The model lacks the a. Whether the b is lacking besides is open." in more
-    rival = decided(weighed(stack(), refit(2.0), [refit(0.30, ("a",)), refit(0.30, ("b",), 2)], 0.0, 40))
-    assert "The model lacks the a. Less probable, but possible instead: the b." in summary(rival, suspects, told)
+    either, more = (summary(decide(weigh(data(), refit(2.0), r, 0.0, 40)), suspects, texts) for r in (alike, nested))
+    assert "cannot distinguish: the a with the c or the a with the b." in either
+    assert "The model is missing the a. Whether the b is missing as well is undecided." in more
+    rival = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.30, ("b",), 2)], 0.0, 40))
+    assert "The model is missing the a. Less probable alternatives: the b." in summary(rival, suspects, texts)
 
 
-def test_where_a_cause_acts_is_told_with_its_interval() -> None:
+def test_the_location_of_a_cause_has_an_interval() -> None:
     span, phase = Interval(0.85, 0.37, 0.9), Interval(1.25, 1.2, 1.3)
-    assert acting(span, Interval(0.5, None, None), phase) == (
+    assert cause_location(span, Interval(0.5, None, None), phase) == (
         "; its cause acts at 85 % of the span (37 to 90 %), 50 % of the chord, 0.25 of the beat (0.20 to 0.30)"
     )
-    assert acting(None, None, None) == ""
+    assert cause_location(None, None, None) == ""
 
 
 @pytest.mark.parametrize(
     ("nominal", "effect", "unknown", "expected"),
     [(0.48, 0.47, 0.05, "named"), (0.48, 0.05, 0.47, "unnamed"), (0.52, 0.43, 0.05, "adequate")],
 )
-def test_that_something_lacks_comes_before_what(nominal: float, effect: float, unknown: float, expected: str) -> None:
+def test_missing_physics_is_decided_before_its_name(
+    nominal: float, effect: float, unknown: float, expected: str
+) -> None:
     refits, shares = (refit(1.0), refit(0.5, ("a",))), np.array([nominal, effect])
-    assert decided(Weighed(refits, np.log(shares), shares, unknown, np.array([1.0, 0.25]))).verdict == expected
+    assert decide(HypothesisWeights(refits, np.log(shares), shares, unknown, np.array([1.0, 0.25]))).verdict == expected
 
 
-def test_a_misfit_that_noise_cannot_make_is_looked_into_however_few_the_pieces() -> None:
-    one = stack(1, 0.01)
-    assert refuted(one, refit(0.45).excess, 0.0)
-    assert not beyond_doubt(one, refit(0.45), 40)
-    assert beyond_doubt(stack(1, 0.1), refit(0.45), 40)
+def test_an_excess_beyond_noise_is_searched_even_with_few_samples() -> None:
+    one = data(1, 0.01)
+    assert nominal_refuted(one, refit(0.45).excess, 0.0)
+    assert not nominal_suffices(one, refit(0.45), 40)
+    assert nominal_suffices(data(1, 0.1), refit(0.45), 40)
 
 
-def test_an_explanation_is_looked_for_well_before_a_perfect_one_would_be_worth_its_price() -> None:
-    """Where none is looked for any more, one that left nothing would be less probable than the nominal model."""
-    doubtless = [left for left in np.linspace(0.0, 2.0, 401) if beyond_doubt(stack(), refit(left), 40)]
-    evidence = weighed(stack(), refit(max(doubtless)), [refit(0.0, ("a",))], 0.0, 40).evidence
-    assert len(doubtless) > 10
+def test_the_search_starts_before_a_perfect_effect_would_be_worth_its_genes() -> None:
+    """Where the search is skipped, even an effect without residual would be less probable than the nominal model."""
+    sufficient = [left for left in np.linspace(0.0, 2.0, 401) if nominal_suffices(data(), refit(left), 40)]
+    evidence = weigh(data(), refit(max(sufficient)), [refit(0.0, ("a",))], 0.0, 40).evidence
+    assert len(sufficient) > 10
     assert evidence[1] < -1.0
 
 
@@ -126,11 +135,11 @@ def test_an_explanation_is_looked_for_well_before_a_perfect_one_would_be_worth_i
     ("left", "before", "part"),
     [(1.0, 4.0, 0.75), (-0.1, 4.0, 1.0), (9.0, 4.0, -1.0), (1.0, 0.0, 0.0), (0.1, -0.1, 0.0)],
 )
-def test_what_is_explained_is_a_part_of_the_misfit_and_of_none_nothing(left: float, before: float, part: float) -> None:
-    assert _part(left, before) == part
+def test_the_explained_fraction_of_an_excess(left: float, before: float, part: float) -> None:
+    assert _explained_fraction(left, before) == part
 
 
-def test_a_vacuum_has_no_power_of_its_density() -> None:
+def test_a_vacuum_has_no_exponent_of_density() -> None:
     def named(*pressures: float) -> list[str]:
         return [name for name, *_ in _variables([Condition(3.0, 0.0, p, 293.15) for p in pressures])]
 
@@ -138,113 +147,113 @@ def test_a_vacuum_has_no_power_of_its_density() -> None:
     assert named(1e3, 1e5) == ["flap frequency", "air density"]
 
 
-def test_what_leaves_most_is_no_name() -> None:
+def test_an_effect_that_explains_little_is_not_named() -> None:
     assert verdict(3.0, refit(2.2, ("a",)), refit(2.5, ("b",))) == ("unnamed", ())
 
 
-@pytest.mark.parametrize(("left", "put_in"), [(1.5, ("a",)), (2.9, ())])
-def test_the_nearest_is_put_in_only_where_it_takes_as_much_as_it_costs(left: float, put_in: tuple[str, ...]) -> None:
-    found = decided(weighed(stack(), refit(3.0), [refit(left, ("a",), 2), refit(2.95, ("b",), 2)], 0.0, 40))
-    assert (found.verdict, found.best.names) == ("unnamed", put_in)
+@pytest.mark.parametrize(("left", "added"), [(1.5, ("a",)), (2.9, ())])
+def test_the_best_effect_is_added_only_if_worth_its_genes(left: float, added: tuple[str, ...]) -> None:
+    found = decide(weigh(data(), refit(3.0), [refit(left, ("a",), 2), refit(2.95, ("b",), 2)], 0.0, 40))
+    assert (found.verdict, found.best.names) == ("unnamed", added)
 
 
 @pytest.mark.parametrize(("left", "ended", "expected"), [(0.5, False, "b"), (0.5, True, None), (2.9, False, None)])
-def test_a_rival_that_has_not_ended_is_fitted_on_if_it_may_overtake(
-    left: float, ended: bool, expected: str | None
-) -> None:
+def test_an_unconverged_rival_is_continued_if_it_may_overtake(left: float, ended: bool, expected: str | None) -> None:
     def fitted(one: Refit, converged: bool) -> Refit:
-        return replace(one, fit=cast("Any", SimpleNamespace(converged=converged, fresh=True)))
+        return replace(one, fit=cast("Any", SimpleNamespace(converged=converged, jacobian_measured=True)))
 
     others = [fitted(refit(0.3, ("a",)), converged=True), fitted(refit(left, ("b",), 2), converged=ended)]
-    found = _unended(weighed(stack(), refit(3.0), others, 0.0, 40))
+    found = _unconverged(weigh(data(), refit(3.0), others, 0.0, 40))
     assert (found and found.names) == (expected and (expected,))
 
 
-def test_a_second_effect_must_earn_its_place() -> None:
+def test_a_second_effect_must_be_worth_its_genes() -> None:
     assert verdict(3.0, refit(0.4, ("a",)), refit(0.35, ("a", "b"), 1)) == ("named", ("a",))
     found = verdict(3.0, refit(1.4, ("a",)), refit(0.2, ("a", "b"), 1))
     assert found[0] == "named"
     assert set(found[1]) == {"a", "b"}
 
 
-@pytest.mark.parametrize(("uncertainty", "expected"), [(0.4, "named"), (1.2, "adequate")])
-def test_few_recordings_do_not_make_a_misfit_none_that_is_far_beyond_what_noise_makes(
-    uncertainty: float, expected: str
+@pytest.mark.parametrize(("excess_standard_error", "expected"), [(0.4, "named"), (1.2, "adequate")])
+def test_an_excess_far_beyond_noise_counts_even_with_few_recordings(
+    excess_standard_error: float, expected: str
 ) -> None:
-    """Two recordings are too few pieces for a law of four genes to beat nothing; but nothing it is not."""
-    found = decided(weighed(stack(2, uncertainty), refit(2.1), [refit(0.1, ("a",), 4)], 0.0, 40))
+    """Two recordings give too few samples for a law of four genes; yet the nominal model is refuted."""
+    found = decide(weigh(data(2, excess_standard_error), refit(2.1), [refit(0.1, ("a",), 4)], 0.0, 40))
     assert found.verdict == expected
 
 
-def test_an_effect_that_something_unknown_rivals_is_not_named() -> None:
+def test_an_effect_no_more_probable_than_an_unknown_law_is_not_named() -> None:
     shares = []
     for left in np.linspace(0.5, 0.9, 41):
-        every = weighed(stack(), refit(2.0), [refit(left, ("a",))], 0.0, 40)
+        every = weigh(data(), refit(2.0), [refit(left, ("a",))], 0.0, 40)
         share = every.probabilities[1] / (every.probabilities[1] + every.unknown)
-        assert decided(every).verdict == ("named" if share >= POLICY.listed else "unnamed")
+        assert decide(every).verdict == ("named" if share >= POLICY.listed else "unnamed")
         shares.append(share)
     assert min(shares) < 0.5 < POLICY.listed < max(shares)
     assert any(0.5 < share < POLICY.listed for share in shares)
 
 
-def test_of_two_that_fit_alike_the_one_that_predicts_recordings_left_out_is_more_probable() -> None:
-    """But a prediction counts less than a fit: it is that of a linearised model."""
+def test_of_two_equal_fits_the_better_cross_validated_is_more_probable() -> None:
+    """A cross-validation counts less than a fit, because it is linearised."""
     alike, better = refit(0.6, ("a",)), refit(0.6, ("b",), predicted=0.3)
     fitted = refit(0.3, ("c",), predicted=0.6)
-    _, *shares = weighed(stack(), refit(2.0), [alike, better, fitted], 0.0, 40).probabilities
+    _, *shares = weigh(data(), refit(2.0), [alike, better, fitted], 0.0, 40).probabilities
     assert 2.0 * shares[0] < shares[1] < shares[2] / 2.0
 
 
-def test_a_prediction_that_does_not_exist_counts_as_the_fit_and_noise_below_nothing_as_nothing() -> None:
-    """A single recording predicts none; and of no misfit noise makes a mean square that may be negative."""
+def test_a_missing_cross_validation_and_a_negative_excess() -> None:
+    """A single recording has no cross-validation; noise may make an excess negative, which counts as zero."""
     others = [refit(0.0, ("a",)), refit(0.5, ("b",))]
     single = [others[0], replace(others[1], predicted=None)]
     below = [replace(others[0], excess=-0.2, predicted=-0.3), others[1]]
-    expected, *found = (weighed(stack(), refit(2.0), r, 0.0, 40).probabilities for r in (others, single, below))
+    expected, *found = (weigh(data(), refit(2.0), r, 0.0, 40).probabilities for r in (others, single, below))
     np.testing.assert_allclose(found, [expected] * 2)
-    assert tolerated(stack(), -0.2, 0.0) == tolerated(stack(), 0.0, 0.0)
+    assert tolerated_excess(data(), -0.2, 0.0) == tolerated_excess(data(), 0.0, 0.0)
 
 
-def test_a_single_suspect_is_no_likelier_beforehand_than_one_of_two() -> None:
-    one, two, many = (weighed(stack(), refit(2.0), [refit(0.9, ("a",))], 0.0, n).probabilities[1] for n in (1, 2, 40))
+def test_a_single_suspect_has_the_prior_of_one_of_two() -> None:
+    one, two, many = (weigh(data(), refit(2.0), [refit(0.9, ("a",))], 0.0, n).probabilities[1] for n in (1, 2, 40))
     assert one == two > many
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
-@pytest.mark.parametrize(("nominal", "uncertainty"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
-def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, uncertainty: float) -> None:
-    def judged(unit: float) -> tuple[list[float], bool, bool]:
+@pytest.mark.parametrize(("nominal", "excess_standard_error"), [(0.45, 0.01), (0.45, 0.1), (2.0, 0.1)])
+def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, excess_standard_error: float) -> None:
+    def outcome(unit: float) -> tuple[list[float], bool, bool]:
         scaled = cast(
-            "Stack", SimpleNamespace(noise=unit, pieces=36.0, uncertainty=uncertainty * unit**2, policy=POLICY)
+            "WhitenedData",
+            SimpleNamespace(
+                noise=unit, effective_samples=36.0, excess_standard_error=excess_standard_error * unit**2, policy=POLICY
+            ),
         )
         before, *others = (
             refit(unit * left, (name,), predicted=2.0 * unit * left)
             for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))
         )
-        found = weighed(scaled, before, others, 0.2 * unit, 40)
-        shares = [*found.probabilities, found.unknown, *found.left]
-        return shares, refuted(scaled, before.excess, 0.2 * unit), beyond_doubt(scaled, before, 40)
+        found = weigh(scaled, before, others, 0.2 * unit, 40)
+        shares = [*found.probabilities, found.unknown, *found.excess]
+        return shares, nominal_refuted(scaled, before.excess, 0.2 * unit), nominal_suffices(scaled, before, 40)
 
-    shares, *flags = judged(unit)
-    expected, *others = judged(1.0)
+    shares, *flags = outcome(unit)
+    expected, *others = outcome(1.0)
     np.testing.assert_allclose(shares, expected)
     assert flags == others
 
 
-def test_more_genes_must_earn_theirs() -> None:
+def test_more_genes_must_be_worth_their_cost() -> None:
     assert verdict(2.0, refit(0.32, ("a",), 1), refit(0.30, ("b",), 8)) == ("named", ("a",))
 
 
-def test_a_floor_of_the_division_forgives_as_much() -> None:
+def test_an_excess_below_the_discretisation_error_is_adequate() -> None:
     assert verdict(0.9, refit(0.5, ("a",), 2), floor=1.0)[0] == "adequate"
     assert verdict(0.9, refit(0.2, ("a",), 2))[0] == "named"
 
 
-def test_probabilities_move_smoothly() -> None:
-    """As an effect takes more and more, it goes from unlikely to sure without a jump."""
+def test_probabilities_change_smoothly() -> None:
+    """As an effect explains more, its probability rises from near zero to near one without a jump."""
     found = [
-        weighed(stack(), refit(2.0), [refit(left, ("a",))], 0.0, 40).probabilities[1]
-        for left in np.linspace(1.6, 0.1, 80)
+        weigh(data(), refit(2.0), [refit(left, ("a",))], 0.0, 40).probabilities[1] for left in np.linspace(1.6, 0.1, 80)
     ]
     assert found[0] < 0.05
     assert found[-1] > 0.95

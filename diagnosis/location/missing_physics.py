@@ -1,0 +1,160 @@
+"""The missing load, or error of the drive, of the nominal model: where it acts, and a free-form law for a load."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from wingfit.diagnosis.evidence.refit import Refit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.finding import FreeLaw, Interval, MissingLoad, table
+from wingfit.diagnosis.location.free_form_law import free_law
+from wingfit.diagnosis.location.missing_load import (
+    PHASES,
+    Case,
+    InferredLoads,
+    LoadPlace,
+    infer,
+    locate_load,
+    missing_loads,
+    whitened,
+)
+from wingfit.diagnosis.subject import Subject
+from wingfit.sim.effects.probe import Probe
+from wingfit.sim.wing.probing import Probed, StationMotion
+
+Array = npt.NDArray[np.float64]
+
+PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
+MAX_INERTIA_RATIO = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
+MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
+
+
+@dataclass(frozen=True)
+class MissingPhysics:
+    """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
+
+    ``drive_error``: the drive rods are in error, and no load acts. ``pulse``: instant of a recorded force.
+    """
+
+    loads: tuple[MissingLoad, ...] = ()
+    place: LoadPlace | None = None
+    law: FreeLaw | None = None
+    drive_error: bool = False
+    pulse: Interval | None = None
+
+    @property
+    def span(self) -> Interval | None:
+        """Location along the span."""
+        return None if self.place is None else self.place.span
+
+    @property
+    def chord(self) -> Interval | None:
+        """Location along the chord."""
+        return None if self.place is None else self.place.chord
+
+    @property
+    def phase(self) -> Interval | None:
+        """Instant in the beat."""
+        return self.pulse if self.place is None else self.place.phase
+
+
+@dataclass(frozen=True)
+class LoadEstimate:
+    """The load ``inferred`` from ``cases`` (recordings with one model's responses), and the model's ``motions``."""
+
+    cases: tuple[Case, ...]
+    motions: tuple[StationMotion, ...]
+    inferred: InferredLoads
+
+
+def largest_residuals(data: WhitenedData, nominal: Refit) -> list[int]:
+    """Indices of the recordings that are probed."""
+    return [int(r) for r in np.argsort(-data.excess_by_recording(nominal.fit.coefficients))[:MAX_RECORDINGS]]
+
+
+def load_estimates(
+    models: Sequence[tuple[Subject, Refit]], data: WhitenedData, which: Sequence[int]
+) -> Iterator[tuple[str, LoadEstimate | None]]:
+    """The load that each of the fitted ``models`` is missing; yields the name of each recording before it is probed."""
+    for subject, nominal in models:
+        fit = nominal.fit
+        genome, found = fit.problem.genomes(np.array(list(fit.values.values())))[0], []
+        for r in which:
+            yield data.recordings[r].name, None
+            found.append((r, subject.probe_responses(genome, data.recordings[r], PROBE)))
+        known = [(r, one) for r, one in found if one is not None]
+        if known:
+            cases = tuple(_case(data, nominal, r, one) for r, one in known)
+            motions = tuple(one.motion for _, one in known)
+            yield data.recordings[which[-1]].name, LoadEstimate(cases, motions, infer(cases, PROBE, motions[0].chord))
+
+
+def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysics:
+    """The estimate of the model with the smallest residual among those probed most; ``law``: fit a free-form law."""
+    if not found:
+        return MissingPhysics()
+    whole = max(len(guess.cases) for guess in found)
+    best = min(
+        (guess for guess in found if len(guess.cases) == whole), key=lambda guess: guess.inferred.noise_inflation
+    )
+    loads, drive_error = missing_loads(best.inferred), best.inferred.drive_error
+    if not drive_error and not _plausible(loads, best.motions):
+        return MissingPhysics()
+    free_form = free_law(best.cases, PROBE, best.motions) if law and not drive_error else None
+    return MissingPhysics(loads, locate_load(best.inferred), free_form, drive_error)
+
+
+def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:
+    """Whether the loads are at most MAX_INERTIA_RATIO times the wing's inertia; larger ones are no loads."""
+    size = np.sqrt(np.mean([np.mean(np.square(load.values)) for load in loads]))
+    own = np.sqrt(np.mean([np.mean((motion.mass[:, None] * motion.acceleration) ** 2) for motion in motions]))
+    return bool(size <= MAX_INERTIA_RATIO * own)
+
+
+def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
+    beat_fit, part, fit = data.beat_fits[r], data.recording_slices[r], nominal.fit
+    responses = beat_fit.of(np.moveaxis(np.nan_to_num(probed.responses), -1, 0))[:, beat_fit.used]
+    scale = data.scale[part]
+    return Case(
+        data.recordings[r].name,
+        -fit.coefficients[part] / scale,
+        responses.reshape(len(responses), -1).T / scale[:, None],
+        fit.jacobian[part] / scale[:, None],
+        probed.crossing,
+    )
+
+
+def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tuple[MissingLoad, ...]:
+    """For recordings of forces, the missing force along the axis with the largest residual."""
+    found = []
+    for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
+        power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
+        column = int(np.argmax(power))
+        phase = recording.condition.flap_frequency * recording.times - subject.beat_start_phase(recording) / (2 * np.pi)
+        noise = max(float(beat_fit.noise[column]), data.tolerance)
+        lag1 = float(np.clip(beat_fit.lag1, 0.0, 0.99))
+        found.append(missing_force(recording.name, residuals[:, column], phase, noise, lag1))
+    return tuple(found)
+
+
+def missing_force(
+    name: str, residuals: Array, phase: Array, noise: float, lag1: float, harmonics: int = 8
+) -> MissingLoad:
+    """For a recording of forces, the missing force: the mean beat of one axis' residual, N.
+
+    ``residuals`` [T] simulated minus recorded (N, NaN where missing) at ``phase`` [T] (beats from the start of the
+    beat); ``noise`` its standard deviation (N) with lag-1 autocorrelation ``lag1``.
+    """
+    seen = np.isfinite(residuals)
+    series = Probe((0.0, 1.0), harmonics).terms
+    rows = np.concatenate([-residuals[seen, None], series(phase[seen])], axis=1)
+    white = whitened(rows, np.flatnonzero(seen), lag1) / noise
+    spread = np.linalg.pinv(white[:, 1:].T @ white[:, 1:])
+    at = np.arange(PHASES) / PHASES
+    values = series(at) @ spread @ white[:, 1:].T @ white[:, 0]
+    errors = np.sqrt(np.einsum("np,pq,nq->n", series(at), spread, series(at)))
+    return MissingLoad(name, (0.0,), tuple(at.tolist()), table(values[None]), table(errors[None]), "N")
