@@ -16,7 +16,8 @@ from wingfit.cli.base.files import check_file
 from wingfit.cli.base.options import AsJson, JobId, Url
 from wingfit.cli.base.output import duration, emit, moment, note, percent, progress, say, size, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
-from wingfit.client.transport import ENDINGS, Format
+from wingfit.client.export_answers import Format
+from wingfit.client.transport import ENDINGS
 
 INTERRUPTED = 130  # exit code after Ctrl-C
 STANDARD_OUTPUT = Path("-")

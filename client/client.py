@@ -24,12 +24,12 @@ from wingfit.client import answers as a
 from wingfit.client import force_answers as f
 from wingfit.client.diagnosis_client import DiagnosisCalls
 from wingfit.client.effect_answers import Effect
+from wingfit.client.export_answers import Format
 from wingfit.client.key_client import KeyCalls
 from wingfit.client.load_answers import Loads
 from wingfit.client.transport import (
     DEFAULT_URL,
     CountedFile,
-    Format,
     OnBytes,
     ServerAwayError,
     WingfitError,

@@ -9,8 +9,9 @@ from typing import Any, cast
 
 from wingfit.client import answers as a
 from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.export_answers import Format
 from wingfit.client.follow_job import Watching
-from wingfit.client.transport import Format, OnBytes, given, part
+from wingfit.client.transport import OnBytes, given, part
 
 OnDiagnosis = Callable[[Diagnosis], None]
 

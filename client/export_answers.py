@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from typing_extensions import TypedDict
 
 from wingfit.client.answers import Dataset, GenomeInfo, HistoryItem, Result, Run
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.client.force_answers import ForceResult
+
+Format = Literal["json", "csv", "netcdf"]
 
 
 class Export(TypedDict):

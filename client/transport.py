@@ -12,12 +12,13 @@ import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self
 from urllib.parse import quote
 
 import httpx
 
 from wingfit.client import answers as a
+from wingfit.client.export_answers import Format
 from wingfit.client.private_files import open_new
 
 DEFAULT_URL = "http://127.0.0.1:8321"
@@ -28,7 +29,6 @@ ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 SENT_TWICE_IS_HARMLESS = {"GET", "DELETE"}
 
 OnBytes = Callable[[int, int], None]
-Format = Literal["json", "csv", "netcdf"]
 ENDINGS: dict[Format, str] = {"json": ".json", "csv": ".csv", "netcdf": ".nc"}
 
 

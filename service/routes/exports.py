@@ -12,8 +12,7 @@ from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.client.export_answers import DiagnosisExport, RunExport
-from wingfit.client.transport import Format
+from wingfit.client.export_answers import DiagnosisExport, Format, RunExport
 from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, ServiceDep
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text

@@ -281,8 +281,9 @@ def spec_from(values: dict[str, Any]) -> CalibrationSpec:
 
 
 def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
-    """The specification of a run or diagnosis as JSON."""
+    """The specification of a run or diagnosis as JSON, without the thresholds of a diagnosis: no request sets them."""
     plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
+    plain.pop("policy", None)
     return plain
 
 
