@@ -30,7 +30,7 @@ SEGMENT_BEATS = 4  # per piece of a spectrum: the harmonics of the beat fall on 
 SHARE = 0.9
 """Share of the excess squared misfit for which :func:`located` makes its interval answer.
 
-What is left outside may then be a tenth: with more, the ringing of the low-pass, which smears every event over the
+The excess outside may then be a tenth: with more, the ringing of the low-pass, which smears every event over the
 beat, counts as misfit too; with less, the interval shrinks to the core of the event.
 """
 SIGNIFICANCE = 0.01

@@ -116,7 +116,7 @@ def test_aerodynamic_effects_are_fitted_in_air_and_all_others_in_vacuum(small: t
         "structure",
     )
     structure, air = prepare(replace(SPEC, effects=("residual_air",)), dataset).stages
-    assert "residual_air.density" in structure.free, "what is left in a vacuum shows there alone"
+    assert "residual_air.density" in structure.free, "the air that remains in a vacuum shows there alone"
     assert "residual_air.density" not in air.free
     assert effect_of("E_f") is effect_of("bump") is effect_of("bump.colour") is effect_of("nothing.x") is None
 
@@ -167,7 +167,7 @@ def test_a_search_starts_with_the_effect_switched_off(small: tuple[Dataset, Geno
 
 
 def test_gauss_newton_finds_a_typical_shift_of_the_cameras(small: tuple[Dataset, Genome]) -> None:
-    """From zero, beside a gene of the wing that starts at its estimate; what is left of the error is noise."""
+    """From zero, beside a gene of the wing that starts at its estimate; the remaining error is noise."""
     dataset, truth = small
     typical = EFFECTS["camera_shift"].typical(dataset.wing)
     seen = shifted(dataset, np.array(list(typical.values())))

@@ -49,7 +49,7 @@ def test_a_periodic_signal_is_told_exactly_and_has_no_noise(beats: int) -> None:
 @pytest.mark.parametrize("memory", [0.0, 0.6, 0.9])
 @pytest.mark.parametrize("beats", [2, 3, 4])
 def test_the_noise_of_every_coefficient_is_known(memory: float, beats: int) -> None:
-    """Mean squares over the variances told: within a quarter up to the third harmonic, where models say most."""
+    """Mean squares over the estimated variances are within a quarter of 1 up to the third harmonic."""
     ratios, level = [], []
     for seed in range(8):
         view = harmonic_fit(recording(5e-4 * noise(31 * beats, memory, seed)))

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tests.sim.effects.bench import VACUUM, Bench, beat_of, ledger, scene_of, told
+from tests.sim.effects.bench import VACUUM, Bench, beat_of, described, ledger, scene_of
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.test_step_matrix import bent as bent_wing
 from tests.sim.kernels.test_step_matrix import rates
@@ -67,7 +67,7 @@ def bent(bench: Bench, angle: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.f
 def test_a_law_of_still_air_keeps_its_promise(name: str) -> None:
     """Alone, at any motion, it takes energy from a wing in still air."""
     rng = np.random.default_rng(4)
-    moved = Moved(name, told(name, robird_wing(), {}))
+    moved = Moved(name, described(name, robird_wing(), {}))
     moved.lanes.coefficients[:] = 0.0
     assert EFFECTS[name].power == "dissipative", "no law of the air only keeps energy"
     for _ in range(20):
@@ -82,7 +82,7 @@ def test_a_law_of_points_keeps_its_promise(name: str) -> None:
     """On a bent wing in full motion the power of its wrenches is what it loses and what it stores per time."""
     wing, act = robird_wing(), EFFECTS[name].wing
     assert act is not None
-    values = {key: np.full(LANES, value) for key, value in told(name, wing, {}).items()}
+    values = {key: np.full(LANES, value) for key, value in described(name, wing, {}).items()}
     case = bent_wing("3,2", lambda scene, _: act(scene, values))
     (_, _, lanes, work, state), nothing, stored = case, np.zeros_like(case.state.V), []
     for part in (-1e-6, 1e-6, 0.0):

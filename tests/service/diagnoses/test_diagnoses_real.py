@@ -70,7 +70,7 @@ def test_a_diagnosis_is_cancelled_in_the_middle_of_a_step(tmp_path: Path) -> Non
 
 
 class SlowEvaluator(InProcessEvaluator):
-    """Holds its first batch until told to go on, and counts."""
+    """Holds its first batch until it is released, and counts."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -171,7 +171,7 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     seen.wait("document.getElementById('run-about').textContent.includes('with camera shift')")
     seen.page.wait_for_selector("#copy-curl")
     seen.page.click("#copy-curl")
-    seen.wait("!document.getElementById('toast').hidden")
+    seen.wait("document.getElementById('toast').textContent === 'Copied'")
     words = shlex.split(seen.page.evaluate("navigator.clipboard.readText()"))
     assert words[:4] == ["curl", "-X", "POST", f"{seen.base}/v1/runs"]
     again = server.client.post("/v1/runs", json=json.loads(words[-1]))

@@ -226,7 +226,7 @@ def test_what_is_copied_as_python_runs(seen: Seen, server: ServerProcess, runs: 
     seen.open(runs[0])
     seen.page.wait_for_selector("#copy-python")
     seen.page.click("#copy-python")
-    seen.wait("!document.getElementById('toast').hidden")
+    seen.wait("document.getElementById('toast').textContent === 'Copied'")
     program = seen.page.evaluate("navigator.clipboard.readText()")
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
     assert (ended.stdout.strip(), ended.stderr) == ("SUCCEEDED", "")

@@ -32,8 +32,8 @@ _LAW = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64), ctypes.c_int64)
 _NOMINAL: Mapping[str, float] = MappingProxyType({})
 
 
-def told(name: str, wing: Wing, values: Mapping[str, float]) -> dict[str, float]:
-    """All parameters of an effect by their short names: typical, but where one size is told the others are zero."""
+def described(name: str, wing: Wing, values: Mapping[str, float]) -> dict[str, float]:
+    """All parameters of an effect by their short names: typical, or zero for sizes beside one that is given."""
     effect = EFFECTS[name]
     typical = {key.partition(".")[2]: value for key, value in effect.typical(wing).items()}
     sizes = {p.name: 0.0 for p in effect.size}
@@ -41,13 +41,13 @@ def told(name: str, wing: Wing, values: Mapping[str, float]) -> dict[str, float]
 
 
 def scene_of(name: str, structure: Structure, condition: Condition = AIR, /, **values: float) -> WingScene:
-    """The scene of the nominal wing with one effect, its parameters as :func:`told`."""
+    """The scene of the nominal wing with one effect, its parameters as :func:`described`."""
     genes = wing_genes(structure.wing.estimates)
     nominal = lanes(structure, genes, np.array([Genome.nominal(genes).values]))
     found = WingScene.of(structure, condition, nominal)
     act = EFFECTS[name].wing
     assert act is not None
-    act(found, {key: np.full(LANES, value) for key, value in told(name, structure.wing, values).items()})
+    act(found, {key: np.full(LANES, value) for key, value in described(name, structure.wing, values).items()})
     return found
 
 
@@ -135,7 +135,7 @@ class Bench:
     def derivatives(self, turn: Array, rate: Array, states: Array, axes: list[int]) -> None:
         """Check decay, drive and pull of all states against differences."""
         self.call(turn, rate, states)
-        told = [self.states(self.work.z_tangent[kind]).copy() for kind in range(3)]
+        described = [self.states(self.work.z_tangent[kind]).copy() for kind in range(3)]
         h = 1e-7
         for k, axis in enumerate(axes):
             aside, other = np.array(states, float), np.array(rate, float)
@@ -144,14 +144,14 @@ class Bench:
                 aside[k] = states[k] + sign
                 self.call(turn, rate, aside)
                 seen.append((self.states(self.work.z_rate)[k], self.moment[axis]))
-            np.testing.assert_allclose(told[0][k], (seen[1][0] - seen[0][0]) / (2 * h), rtol=1e-5, atol=1e-7)
-            np.testing.assert_allclose(told[2][k], (seen[1][1] - seen[0][1]) / (2 * h), rtol=1e-5, atol=1e-7)
+            np.testing.assert_allclose(described[0][k], (seen[1][0] - seen[0][0]) / (2 * h), rtol=1e-5, atol=1e-7)
+            np.testing.assert_allclose(described[2][k], (seen[1][1] - seen[0][1]) / (2 * h), rtol=1e-5, atol=1e-7)
             seen_rate = []
             for sign in (h, -h):
                 other[axis] = rate[axis] + sign
                 self.call(turn, other, states)
                 seen_rate.append(self.states(self.work.z_rate)[k])
-            np.testing.assert_allclose(told[1][k], (seen_rate[0] - seen_rate[1]) / (2 * h), rtol=1e-5, atol=1e-7)
+            np.testing.assert_allclose(described[1][k], (seen_rate[0] - seen_rate[1]) / (2 * h), rtol=1e-5, atol=1e-7)
 
 
 def beat_of(
@@ -162,7 +162,7 @@ def beat_of(
     genes: Mapping[str, float] = _NOMINAL,
     **values: float,
 ) -> Beat:
-    """A periodic beat of the robird with an effect, its parameters as :func:`told`; without effects for no name.
+    """A periodic beat of the robird with an effect, its parameters as :func:`described`; without effects for no name.
 
     ``genes``: of the wing, where not nominal.
     """
@@ -170,7 +170,7 @@ def beat_of(
     own = {}
     if name:
         model = model.with_effects(name)
-        own = {f"{name}.{key}": value for key, value in told(name, model.wing, values).items()}
+        own = {f"{name}.{key}": value for key, value in described(name, model.wing, values).items()}
     genome = Genome.nominal(model.genes).replace(own | dict(genes))
     found = model.beat(genome.values, blank_recording(model.wing, condition), with_motion=True)
     assert found.reason is None

@@ -109,10 +109,10 @@ class Moved:
     def decay(self, motion: Motion, z: Array) -> tuple[Array, Array]:
         """What the law says minus its rates' own derivatives are [Z, W], and what differences say."""
         self.rate(motion, z)
-        told = np.array(self.work.z_tangent[0])
+        described = np.array(self.work.z_tangent[0])
         found = np.zeros_like(z)
         for i in range(len(z)):
             small = np.zeros_like(z)
             small[i] = 1e-6
             found[i] = -(self.rate(motion, z + small)[i] - self.rate(motion, z - small)[i]) / 2e-6
-        return told, found
+        return described, found

@@ -71,7 +71,7 @@ def test_finds_the_fixed_point_with_one_beat_more_than_modes(decays: tuple[float
 
 
 def test_distance_is_to_the_fixed_point_and_not_to_the_next_beat() -> None:
-    """A mode that keeps 0.95 a beat moves by a twentieth of what is left: that must not pass for being there."""
+    """A mode that keeps 0.95 a beat moves by a twentieth of the remaining distance, which is not convergence."""
     beat = LinearBeat((0.95, 0.2), 2)
     state = beat.state(beat.start)
     secants = Secants(state, RATE, 8, NO_SIZES)

@@ -64,7 +64,7 @@ def _wing(scene: WingScene, values: Values) -> None:
 def of_rods(scene: WingScene) -> Array:
     """What rods add [C, W] to the bending stiffness of their connectors, N m/rad.
 
-    All of it but the foam's, whose modulus is told by stretching along the span. In its plane the wing is too stiff for
+    All of it but the foam's, whose modulus is determined by stretching along the span. In its plane the wing is too stiff for
     rods to slip.
     """
     connectors, stiffness = scene.structure.connectors, scene.lanes.stiffness

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.oracles.plates import loaded
-from tests.sim.effects.bench import AIR, Array, beat_of, ledger, scene_of, told
+from tests.sim.effects.bench import AIR, Array, beat_of, described, ledger, scene_of
 from tests.sim.effects.driving import robird
 from tests.sim.kernels.marching import CHORD, DENSITY, LENGTH, THICKNESS, march, plank, vacuum_here
 from wingfit.sim.effects.ports.wing import WingScene
@@ -47,7 +47,7 @@ def with_play(b: float, stiffness: Array, damping: float = 0.0, beside: str = ""
         if name and values.get("b") != 0.0:
             act = EFFECTS[name].wing
             assert act is not None
-            act(scene, {key: np.full(LANES, value) for key, value in told(name, plank(), values).items()})
+            act(scene, {key: np.full(LANES, value) for key, value in described(name, plank(), values).items()})
     return scene.frozen()
 
 

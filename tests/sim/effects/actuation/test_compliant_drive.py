@@ -100,10 +100,10 @@ def test_rods_follow_the_profile_at_the_time_of_their_lead() -> None:
     steps, bodies = len(found.tracks), len(robird().bodies)
     lead, speed, _ = states_of(found).T
     psi = 2 * np.pi * np.arange(steps) / steps + OMEGA * lead
-    told = scene_of("compliant_drive", robird()).rods.angles(psi)[:, :, :2, 0]
+    described = scene_of("compliant_drive", robird()).rods.angles(psi)[:, :, :2, 0]
     R, V = found.motion.R[:, bodies:], found.motion.V[:, bodies:]
-    np.testing.assert_allclose(np.arctan2(R[..., 7], R[..., 4]), told[..., 0], atol=1e-6)
-    np.testing.assert_allclose(V[..., 0], told[..., 1] * OMEGA * (1 + speed)[:, None], atol=2e-4)
+    np.testing.assert_allclose(np.arctan2(R[..., 7], R[..., 4]), described[..., 0], atol=1e-6)
+    np.testing.assert_allclose(V[..., 0], described[..., 1] * OMEGA * (1 + speed)[:, None], atol=2e-4)
 
 
 @pytest.mark.parametrize(("d", "t"), [(0.005, 0.04), (0.02, 0.2), (0.02, 0.02)])

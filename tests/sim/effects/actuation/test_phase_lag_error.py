@@ -1,4 +1,4 @@
-"""A rear rod that is later than told."""
+"""A rear rod that lags more than the condition says."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def test_a_late_rear_rod_is_lower_on_the_upstroke() -> None:
 
 
 def test_the_wing_moves_as_if_the_condition_had_that_lag() -> None:
-    told = beat_of("phase_lag_error", AIR, 64, angle=0.03)
+    described = beat_of("phase_lag_error", AIR, 64, angle=0.03)
     true = beat_of("phase_lag_error", replace(AIR, phase_lag=AIR.phase_lag + 0.03), 64, angle=0.0)
-    np.testing.assert_allclose(told.tracks, true.tracks, atol=5e-6)
-    assert np.abs(told.tracks - beat_of("phase_lag_error", AIR, 64, angle=0.0).tracks).max() > 1e-3
+    np.testing.assert_allclose(described.tracks, true.tracks, atol=5e-6)
+    assert np.abs(described.tracks - beat_of("phase_lag_error", AIR, 64, angle=0.0).tracks).max() > 1e-3
 
 
 @pytest.mark.parametrize("end", [-0.15, 0.15])

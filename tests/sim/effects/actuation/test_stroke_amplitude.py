@@ -1,4 +1,4 @@
-"""A stroke that is larger than told."""
+"""A stroke that is larger than described."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A stroke about another angle than told."""
+"""A stroke about another mean angle than described."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A stream that is faster than told is another condition."""
+"""A stream that is faster than recorded equals a condition with that airspeed."""
 
 from __future__ import annotations
 

@@ -61,8 +61,8 @@ def test_the_slope_is_that_of_what_acts_at_once() -> None:
 
 def test_decay_is_the_states_own_derivative() -> None:
     moved = Moved("circulation_lag", {"rate": np.geomspace(0.3, 3.0, 8)}, airspeed=SPEED)
-    told, found = moved.decay(Motion(pitch=0.1), moved.z + 0.3)
-    np.testing.assert_allclose(told, found, rtol=1e-6)
+    described, found = moved.decay(Motion(pitch=0.1), moved.z + 0.3)
+    np.testing.assert_allclose(described, found, rtol=1e-6)
 
 
 def test_nothing_happens_without_flow() -> None:

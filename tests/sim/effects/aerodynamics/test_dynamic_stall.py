@@ -73,15 +73,15 @@ def test_circulation_of_rotation_does_not_stall() -> None:
     model = wing_model().with_effects("dynamic_stall", "rotational_circulation")
     assert isinstance(model, FlexibleWing)
     recording = blank_recording(model.wing, CONDITIONS["air"])
-    told = {gene.name: gene.nominal for gene in model.genes} | {"L_a": 0.0, "L_b": 0.0}
-    told["dynamic_stall.angle"] = 0.15
+    described = {gene.name: gene.nominal for gene in model.genes} | {"L_a": 0.0, "L_b": 0.0}
+    described["dynamic_stall.angle"] = 0.15
     tracks = []
     for share, coefficient in ((0.0, 0.0), (0.0, 6.0), (1.0, 6.0)):
-        told |= {"dynamic_stall.share": share, "rotational_circulation.coefficient": coefficient}
-        tracks.append(model.beat([told[gene.name] for gene in model.genes], recording).tracks)
+        described |= {"dynamic_stall.share": share, "rotational_circulation.coefficient": coefficient}
+        tracks.append(model.beat([described[gene.name] for gene in model.genes], recording).tracks)
     plain, rotating, stalled = tracks
     assert np.abs(rotating - plain).max() > 5e-4
-    assert np.abs(stalled - rotating).max() < 2e-5, "but for what is left of the way to the periodic motion"
+    assert np.abs(stalled - rotating).max() < 2e-5, "except for the remaining distance to the periodic motion"
 
 
 def test_stall_is_late_on_the_way_up_and_more_so_at_higher_frequency() -> None:
@@ -116,8 +116,8 @@ def test_the_flow_relaxes_with_the_chords_travelled() -> None:
 
 def test_decay_is_the_states_own_derivative() -> None:
     moved = Moved("dynamic_stall", {"delay": np.geomspace(0.2, 10.0, 8), "advance": 0.0}, airspeed=AIRSPEED)
-    told, found = moved.decay(Motion(pitch=0.3), moved.z + 0.3)
-    np.testing.assert_allclose(told, found, rtol=1e-6)
+    described, found = moved.decay(Motion(pitch=0.3), moved.z + 0.3)
+    np.testing.assert_allclose(described, found, rtol=1e-6)
 
 
 def test_nothing_happens_without_flow() -> None:

@@ -98,5 +98,5 @@ def test_in_still_air_it_is_that_of_hover() -> None:
 def test_decay_is_the_states_own_derivative() -> None:
     """But for the lift that the inflow takes, whose coupling the step does without."""
     moved = Moved("induced_inflow", {"share": 1e-9}, airspeed=AIRSPEED)
-    told, found = moved.decay(Motion(pitch=0.1), moved.z + np.linspace(-2.0, 2.0, LANES))
-    np.testing.assert_allclose(told, found, rtol=1e-5)
+    described, found = moved.decay(Motion(pitch=0.1), moved.z + np.linspace(-2.0, 2.0, LANES))
+    np.testing.assert_allclose(described, found, rtol=1e-5)

@@ -74,6 +74,6 @@ def test_slopes_are_those_of_the_normal_force() -> None:
         moved.rate(Motion(heave_rate=-WIND * np.tan(STEEP) - change), moved.z)
         flow, loads = moved.work.flow, moved.work.loads
         pushed.append(loads[:, CIRCULATION] * flow[:, STREAM_C] + loads[:, DRAG] * flow[:, STREAM_N])
-    told = moved.work.loads[:, LIFT_SLOPE] + moved.work.loads[:, DRAG_SLOPE]
-    np.testing.assert_allclose(told, (pushed[1] - pushed[0]) / 2e-6, rtol=1e-6)
-    assert np.all(told > 0)
+    described = moved.work.loads[:, LIFT_SLOPE] + moved.work.loads[:, DRAG_SLOPE]
+    np.testing.assert_allclose(described, (pushed[1] - pushed[0]) / 2e-6, rtol=1e-6)
+    assert np.all(described > 0)

@@ -1,4 +1,4 @@
-"""Air that is denser than told is another pressure."""
+"""Air that is denser than recorded equals a condition with a higher pressure."""
 
 from __future__ import annotations
 

@@ -29,8 +29,8 @@ def model_of(preset: str) -> BladeElementWing:
 
 def genome(model: BladeElementWing, **values: float) -> list[float]:
     """At OWN, as far as the model has these, and ``values``; those of effects in the form effect__parameter."""
-    told = OWN | {name.replace("__", "."): value for name, value in values.items()}
-    return [told.get(gene.name, gene.nominal) for gene in model.genes]
+    described = OWN | {name.replace("__", "."): value for name, value in values.items()}
+    return [described.get(gene.name, gene.nominal) for gene in model.genes]
 
 
 def beat(model: BladeElementWing, recording: Recording, **values: float) -> Array:
@@ -39,8 +39,8 @@ def beat(model: BladeElementWing, recording: Recording, **values: float) -> Arra
 
 def varied(model: BladeElementWing, recording: Recording, slopes: dict[str, float], **values: float) -> Array:
     """Forces with the effect."""
-    told = {f"{NAME}__{key}": value for key, value in slopes.items()}
-    return beat(model.with_effects(NAME), recording, **values, **told)
+    described = {f"{NAME}__{key}": value for key, value in slopes.items()}
+    return beat(model.with_effects(NAME), recording, **values, **described)
 
 
 def expected(recording: Recording, kind: str) -> float:
@@ -70,7 +70,7 @@ def test_scales_the_lift_of_a_measured_curve_and_not_its_drag() -> None:
 
 def test_scales_the_fling_of_an_effect() -> None:
     """Whichever of the two is named first."""
-    recording, told = RECORDINGS[7], {f"{NAME}__{key}": value for key, value in SLOPES.items()}
+    recording, described = RECORDINGS[7], {f"{NAME}__{key}": value for key, value in SLOPES.items()}
     model = model_of("berman_wang").with_effects("clap_and_peel")
     lift, fling = expected(recording, "lift"), expected(recording, "fling")
     other = beat(model, recording, C_l=lift * OWN["C_l"], clap_and_peel__coefficient=fling * 2.7)
@@ -78,7 +78,7 @@ def test_scales_the_fling_of_an_effect() -> None:
         varied(model, recording, SLOPES, clap_and_peel__coefficient=2.7), other, rtol=0, atol=1e-13
     )
     turned = model_of("berman_wang").with_effects(NAME, "clap_and_peel")
-    np.testing.assert_allclose(beat(turned, recording, clap_and_peel__coefficient=2.7, **told), other, atol=1e-13)
+    np.testing.assert_allclose(beat(turned, recording, clap_and_peel__coefficient=2.7, **described), other, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", ["circulation_lag", "dynamic_stall", "induced_inflow", "wake_capture"])
@@ -100,14 +100,14 @@ def test_acts_in_free_flight_as_on_the_balance() -> None:
 
 def test_inertia_drag_and_rotation_stay() -> None:
     model, recording = model_of("proposed").with_effects(NAME), RECORDINGS[0]
-    told = {f"{NAME}__{key}": value for key, value in SLOPES.items()}
-    parts, bare = model.term_forces(genome(model, **told), recording), model.term_forces(genome(model), recording)
+    described = {f"{NAME}__{key}": value for key, value in SLOPES.items()}
+    parts, bare = model.term_forces(genome(model, **described), recording), model.term_forces(genome(model), recording)
     assert not np.any(parts.pop("effects"))
     for name, force in parts.items():
         factor = {"translation": expected(recording, "lift"), "clap_and_peel": expected(recording, "fling")}.get(name)
         np.testing.assert_allclose(force, (1.0 if factor is None else factor) * bare[name], atol=1e-14)
         assert np.any(force)
-    np.testing.assert_allclose(np.sum(list(parts.values()), axis=0), beat(model, recording, **told), atol=1e-14)
+    np.testing.assert_allclose(np.sum(list(parts.values()), axis=0), beat(model, recording, **described), atol=1e-14)
 
 
 def test_no_coefficient_falls_below_zero() -> None:

@@ -146,6 +146,6 @@ def test_a_side_wind_is_not_taken_for_motion() -> None:
 def test_decay_is_the_states_own_derivative() -> None:
     """But for the speed of the flow, which the gust changes little."""
     moved = Moved("wake_capture", {"share": 1e-9, "chords": np.geomspace(0.5, 10.0, LANES)}, airspeed=6.0)
-    told, found = moved.decay(Motion(flap_rate=0.5), moved.z + 0.3)
-    np.testing.assert_allclose(told, found, rtol=1e-5)
-    assert told.min() == pytest.approx(6.0 / (10.0 * CHORD), rel=0.01)
+    described, found = moved.decay(Motion(flap_rate=0.5), moved.z + 0.3)
+    np.testing.assert_allclose(described, found, rtol=1e-5)
+    assert described.min() == pytest.approx(6.0 / (10.0 * CHORD), rel=0.01)

@@ -61,7 +61,7 @@ def test_is_local() -> None:
 
 
 def test_chordwise_pieces_stand_side_by_side() -> None:
-    """The mean over their strip of what is left."""
+    """The mean of the remaining stiffness over their strip."""
     structure = build(plank(), Division.parse("5x2"))
     part = kept(structure, loss=0.6, station=0.5, width=0.1)
     for k, joint in enumerate(structure.connectors):
