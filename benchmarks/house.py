@@ -186,8 +186,8 @@ def phrases_in(text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """A document as one text, so that a phrase broken over two lines counts; quotations are blanked."""
-    yield 1, re.sub(r"(?m)^>.*$", "", path.read_text(encoding="utf-8"))
+    """A document as one text, so that a phrase broken over two lines counts; quotations and code spans are blanked."""
+    yield 1, re.sub(r"(?m)^>.*$|`[^`\n]+`", "", path.read_text(encoding="utf-8"))
 
 
 def _prose(path: Path) -> Iterator[tuple[int, str]]:

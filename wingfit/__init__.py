@@ -1,10 +1,11 @@
-"""wingfit calibrates simulations of flapping wings on recordings, and reports which physics the simulations are missing.
+"""wingfit calibrates simulations of flapping wings on recordings, and reports which physics they are missing.
 
 The names below are public and documented; everything else in the package may change without notice.
 
 - :class:`Client` speaks to a wingfit server (``wingfit serve``); :class:`WingfitError` is what it raises.
 - :func:`load_dataset` reads recordings: a folder, a zip of it, or NetCDF. DatasetError lists what is wrong with them.
-- :func:`calibrate` estimates the genes of a model here, without a server; :func:`diagnose` finds which physics the model is missing.
+- :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
+  physics the model is missing.
 
 ``import wingfit`` is light: what a name needs is imported when the name is first used.
 """

@@ -64,8 +64,8 @@ def _wing(scene: WingScene, values: Values) -> None:
 def of_rods(scene: WingScene) -> Array:
     """What rods add [C, W] to the bending stiffness of their connectors, N m/rad.
 
-    All of it but the foam's, whose modulus is determined by stretching along the span. In its plane the wing is too stiff for
-    rods to slip.
+    All but the stiffness of the foam, whose modulus is determined by stretching along the span. In its plane the wing
+    is too stiff for rods to slip.
     """
     connectors, stiffness = scene.structure.connectors, scene.lanes.stiffness
     found = np.zeros_like(stiffness[:, 0])
