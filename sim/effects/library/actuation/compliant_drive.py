@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.motor import AVERAGING, DROOP, FOLLOWING, HOLDING, MOTOR
@@ -24,11 +24,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.motor = motor
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="compliant_drive",
     title="Compliant drive",
-    family="actuation",
-    port="drive",
     size=(
         Parameter(
             "d", "1/W", 0.0, 0.02, 0.005, "relative loss of motor speed per watt, for loads much faster than the beat"

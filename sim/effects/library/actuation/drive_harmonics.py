@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -28,11 +28,9 @@ def _wing(scene: WingScene, values: Values) -> None:
         rods.series[k] += error * np.exp(-1j * k * np.array([[0.0], [lag]]))
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="drive_harmonics",
     title="Higher harmonics of the drive",
-    family="actuation",
-    port="drive",
     size=tuple(
         Parameter(
             f"{wave}{k}",

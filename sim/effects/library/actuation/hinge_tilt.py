@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -15,11 +15,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.lanes.hinge[:3] = tilt.apply(axes).T
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="hinge_tilt",
     title="Hinge tilt",
-    family="actuation",
-    port="drive",
     size=tuple(
         Parameter(
             axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation from the described axis to the true one"

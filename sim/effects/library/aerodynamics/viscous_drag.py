@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import MEAN_CHORD, PUSH_C, STREAM_C
 from wingfit.sim.kernels.lanes.vector import load, magnitude, root, store
@@ -38,11 +38,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [_BLASIUS * values["part"] * np.sqrt(kinematic / chord)])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="viscous_drag",
     title="Viscous drag",
-    family="aerodynamics",
-    port="air",
     size=(
         Parameter(
             "part", "1", 0.0, 20.0, 2.0, "skin friction over that of a smooth flat plate; above 1 for rough skin"

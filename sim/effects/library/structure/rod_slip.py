@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, store, store0, store1
@@ -76,11 +76,9 @@ def of_rods(scene: WingScene) -> Array:
     return found
 
 
-EFFECT = Effect(
+EFFECT = effect_of_joints(
     name="rod_slip",
     title="Rods that slip in their straw",
-    family="structure",
-    port="connector",
     size=(Parameter("friction", "rad", 0.0, 0.5, 0.05, "bend over the whole span at which the rods slip"),),
     shape=(
         Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bend over the whole span, to either side, with loose rods"),
