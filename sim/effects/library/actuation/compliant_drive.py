@@ -24,14 +24,12 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.motor = motor
 
 
+_TEXT = "relative loss of motor speed per watt, for loads much faster than the beat"
+
 EFFECT = effect_of_drive(
     name="compliant_drive",
     title="Compliant drive",
-    size=(
-        Parameter(
-            "d", "1/W", 0.0, 0.02, 0.005, "relative loss of motor speed per watt, for loads much faster than the beat"
-        ),
-    ),
+    size=(Parameter("d", "1/W", 0.0, 0.02, 0.005, _TEXT),),
     shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time constant with which the motor follows its load", scale="log"),),
     memory="the lead of the crank, its speed error and the mean load",
     law="tau' = sigma\nsigma' = -(d (P - P_m) + sigma) / t - (2 pi f / t) tau\nP_m' = 2 pi f (P - P_m)",

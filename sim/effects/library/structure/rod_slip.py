@@ -29,10 +29,8 @@ def _law(frame: Any, moment: int) -> None:
     stored, lost = load0(port.stored), load0(port.lost)
     for c in range(port.places):
         if port.parameters[4, c, 0] == 0.0:  # no rods here, in any individual
-            store1(rate, c, 0.0)
-            store1(decay, c, 0.0)
-            store1(drive, c, 0.0)
-            store1(pull, c, 0.0)
+            for array in (rate, decay, drive, pull):
+                store1(array, c, 0.0)
             continue
         spring, play, per = load(port.parameters, 0, c), load(port.parameters, 1, c), load(port.parameters, 2, c)
         shake = load(port.parameters, 3, c)
