@@ -26,18 +26,9 @@ STILL = 1e-9  # m/s, avoids division by zero without flow
 
 @allocating
 def strip_flow(
-    start: Index,
-    weight: Array,
-    centroid: Array,
-    wind: Array,
-    coefficients: Array,
-    induced: Array,
-    R: Array,
-    p: Array,
-    V: Array,
-    flow: Array,
-    loads: Array,
-) -> None:
+    start: Index, weight: Array, centroid: Array, wind: Array, coefficients: Array, induced: Array, R: Array,
+    p: Array, V: Array, flow: Array, loads: Array,
+) -> None:  # fmt: skip
     """The airflow of every strip, ``flow`` [S, FLOW, W], and ``loads`` [S, LOADS, W] by the affine laws.
 
     ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
@@ -117,25 +108,10 @@ def _vector(array: Array) -> Three:
 
 @allocating
 def strip_forces(
-    start: Index,
-    weight: Array,
-    centroid: Array,
-    geometry: Array,
-    density: Array,
-    lift_share: Array,
-    lift_x: Array,
-    drag_share: Array,
-    drag_x: Array,
-    flow: Array,
-    loads: Array,
-    spread: bool,
-    R: Array,
-    V: Array,
-    wrench: Array,
-    damping: Array,
-    power: Array,
-    force: Array,
-) -> None:
+    start: Index, weight: Array, centroid: Array, geometry: Array, density: Array, lift_share: Array, lift_x: Array,
+    drag_share: Array, drag_x: Array, flow: Array, loads: Array, spread: bool, R: Array, V: Array, wrench: Array,
+    damping: Array, power: Array, force: Array,
+) -> None:  # fmt: skip
     """Add the air's wrench to every body, from the ``loads`` of its strip.
 
     ``lift_x``, ``drag_x`` [N, W]: points of action of the shares along the chord, in the body frame; ``spread``:

@@ -99,21 +99,9 @@ def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Thre
 
 @kernel
 def connect(
-    first: Index,
-    second: Index,
-    a: Array,
-    b: Array,
-    K: Array,
-    D: Array,
-    coupling: Array,
-    more: Array,
-    Q_: Array,
-    d_: Array,
-    V: Array,
-    wrench: Array,
-    dissipated: Array,
-    stored: Array,
-) -> None:
+    first: Index, second: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array, more: Array, Q_: Array,
+    d_: Array, V: Array, wrench: Array, dissipated: Array, stored: Array,
+) -> None:  # fmt: skip
     """Add spring and damper wrenches to both bodies; add up the power lost in dampers and the energy of springs.
 
     K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling

@@ -102,16 +102,9 @@ def _weight(M: Six, gravity: float, R: Array, i: int) -> tuple[Three, Three]:
 
 @kernel
 def add_mass_blocks(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    gravity: float,
-    wind: Array,
-    R: Array,
-    V: Array,
-    length: float,
+    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, length: float,
     blocks: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
     for k in range(weighing):
         i = pairs[k, 0]
@@ -165,17 +158,9 @@ def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
 
 @kernel
 def add_mass_terms(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    wind: Array,
-    R: Array,
-    V: Array,
-    factor: float,
-    lead: Array,
-    X: Array,
+    pairs: Index, masses: Array, weighing: int, wind: Array, R: Array, V: Array, factor: float, lead: Array, X: Array,
     wrench: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -201,17 +186,9 @@ def add_mass_terms(
 
 @kernel
 def add_energies(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    gravity: float,
-    wind: Array,
-    R: Array,
-    p: Array,
-    V: Array,
-    kinetic: Array,
-    potential: Array,
-) -> None:
+    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, p: Array, V: Array,
+    kinetic: Array, potential: Array,
+) -> None:  # fmt: skip
     """Add the kinetic energy of all pairs and the potential energy of those with weight."""
     for k in range(len(pairs)):
         i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing

@@ -68,17 +68,9 @@ def add_point_wrenches(bodies: Index, arms: Array, R: Array, given: Array, wrenc
 
 @kernel
 def add_point_blocks(
-    bodies: Index,
-    arms: Array,
-    R: Array,
-    V: Array,
-    given: Array,
-    stiffness: Array,
-    damping: Array,
-    length: float,
-    drag: Array,
-    blocks: Array,
-) -> None:
+    bodies: Index, arms: Array, R: Array, V: Array, given: Array, stiffness: Array, damping: Array, length: float,
+    drag: Array, blocks: Array,
+) -> None:  # fmt: skip
     """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, and keep -dW/dV in ``drag`` [P, 36, W].
 
     Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -

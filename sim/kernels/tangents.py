@@ -125,16 +125,9 @@ def turned_right(sign: float, A: Six, Q: Nine) -> Six:
 
 @kernel
 def start_blocks(
-    mass: Array,
-    inertia: Array,
-    damping: Array,
-    R: Array,
-    V: Array,
-    gravity: float,
-    length: float,
-    fill: Index,
+    mass: Array, inertia: Array, damping: Array, R: Array, V: Array, gravity: float, length: float, fill: Index,
     blocks: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Set the diagonal to the bodies' own part of S: inertia, gyroscopic terms, gravity, the air's normal damping.
 
     ``damping`` [N, W] acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
@@ -176,24 +169,9 @@ def add_own_terms(
 
 @kernel
 def add_connectors(
-    first: Index,
-    second: Index,
-    lower: Index,
-    upper: Index,
-    a: Array,
-    b: Array,
-    K: Array,
-    D: Array,
-    coupling: Array,
-    more: Array,
-    more_k: Array,
-    more_d: Array,
-    Q_: Array,
-    d_: Array,
-    V: Array,
-    length: float,
-    blocks: Array,
-) -> None:
+    first: Index, second: Index, lower: Index, upper: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array,
+    more: Array, more_k: Array, more_d: Array, Q_: Array, d_: Array, V: Array, length: float, blocks: Array,
+) -> None:  # fmt: skip
     """Add the connectors' part of S to the diagonal and set it beside.
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a

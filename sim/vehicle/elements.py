@@ -83,16 +83,9 @@ def velocities(
 
 @inlined
 def _element_forces(
-    motion: Array,
-    side: Side,
-    r: Array,
-    chord: Array,
-    mass: Array,
-    rho: float,
-    loading: Array,
-    constants: Constants,
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
     out: Array,
-) -> None:
+) -> None:  # fmt: skip
     """The rows of ROWS for one individual: ``motion`` [14, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
     dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
@@ -198,16 +191,9 @@ def _curve_forces(
 
 @kernel
 def wing_forces(
-    motion: Array,
-    side: Side,
-    r: Array,
-    chord: Array,
-    mass: Array,
-    density: Array,
-    loading: Array,
-    constants: Constants,
-    out: Array,
-) -> None:
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, loading: Array,
+    constants: Constants, out: Array,
+) -> None:  # fmt: skip
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
 
     Args:

@@ -118,16 +118,9 @@ def _attack(along: float, normal: float) -> float:
 
 @kernel
 def station_circulation(
-    along: Array,
-    normal: Array,
-    turning: Array,
-    coefficient: Array,
-    twist: Array,
-    chord: Array,
-    loading: Array,
-    speed: Array,
-    circulation: Array,
-) -> None:
+    along: Array, normal: Array, turning: Array, coefficient: Array, twist: Array, chord: Array, loading: Array,
+    speed: Array, circulation: Array,
+) -> None:  # fmt: skip
     """Speed (m/s) and quasi-steady circulation (m^2/s), positive as in Eq. 8, both [B, n, 8] (Eqs. 2-4, 7).
 
     Args:
@@ -160,19 +153,9 @@ def station_circulation(
 
 @allocating
 def station_forces(
-    motion: Array,
-    side: Side,
-    cosine: Array,
-    sine: Array,
-    along: Array,
-    normal: Array,
-    speed: Array,
-    circulation: Array,
-    places: Stations,
-    density: Array,
-    drag: Array,
-    out: Array,
-) -> None:
+    motion: Array, side: Side, cosine: Array, sine: Array, along: Array, normal: Array, speed: Array,
+    circulation: Array, places: Stations, density: Array, drag: Array, out: Array,
+) -> None:  # fmt: skip
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
     ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; others as in the
