@@ -196,16 +196,9 @@ def wing_forces(
 ) -> None:  # fmt: skip
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
 
-    Args:
-        motion: [B, 14, n / 8, 8], rows as named above.
-        side: the stream relative to this side.
-        r: [E] distances from the flapping axis in equal steps, m.
-        chord: [E], m.
-        mass: [B, E] of the wing per length, kg/m.
-        density: [B] of the air, kg/m^3.
-        loading: [B, E], factor on the circulation.
-        constants: of all elements.
-        out: added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
+    ``motion`` [B, 14, n / 8, 8]: rows as named above; ``r`` [E]: distances from the flapping axis in equal steps, m;
+    ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air, kg/m^3; ``loading``
+    [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then CURVE_ROWS where there is room for them.
     """
     for b in range(len(motion)):
         _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
