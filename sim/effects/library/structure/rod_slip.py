@@ -74,21 +74,15 @@ def of_rods(scene: WingScene) -> Array:
     return found
 
 
+_STICK = "stiffness of sticking rods over all bending stiffness of the rods"
+
 EFFECT = effect_of_joints(
     name="rod_slip",
     title="Rods that slip in their straw",
     size=(Parameter("friction", "rad", 0.0, 0.5, 0.05, "bend over the whole span at which the rods slip"),),
     shape=(
         Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bend over the whole span, to either side, with loose rods"),
-        Parameter(
-            "stick",
-            "1",
-            0.02,
-            1.0,
-            0.3,
-            "stiffness of sticking rods over all bending stiffness of the rods",
-            scale="log",
-        ),
+        Parameter("stick", "1", 0.02, 1.0, 0.3, _STICK, scale="log"),
     ),
     power="dissipative",
     memory="bending carried by friction, of each connector with rods",
