@@ -80,6 +80,7 @@ def test_the_wheel_holds_one_package() -> None:
     assert re.search(r'\[tool\.setuptools\.packages\.find\]\ninclude = \["wingfit\*"\]', text)
     links = {path.name for path in (ROOT / "wingfit").iterdir() if path.is_symlink()}
     assert links == {
+        "inference",
         "calibration",
         "cli",
         "client",

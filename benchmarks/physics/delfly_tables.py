@@ -11,7 +11,7 @@ from wingfit.calibration.forces.global_model import fit_global
 from wingfit.calibration.forces.result import GlobalModel, LocalEstimate
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.lift_drag import lift_drag
-from wingfit.sim.vehicle.motion import angles
+from wingfit.sim.vehicle.motion import angles_of, flap_series
 from wingfit.sim.virtual_rigs.balance import TRIALS, delfly, true_beat
 
 
@@ -53,6 +53,8 @@ def lift_by_root_pitch() -> dict[str, list[float]]:
 
 def fling_ends(model: BladeElementWing) -> list[float]:
     """Earliest and latest t* at which fling circulation ends, over the conditions."""
-    peels = [angles(model.vehicle.motion, {}, t.condition.flap_frequency, 4000, claps=True).peel[0] for t in TRIALS]
+    motion, n = model.vehicle.motion, 4000
+    flap, rates = flap_series(motion.flap, {}, 1, n), [trial.condition.flap_frequency for trial in TRIALS]
+    peels = [angles_of(flap, motion, {}, rate, n, claps=True, peel_width=0.0).peel[0] for rate in rates]
     ends = [float(np.flatnonzero(peel)[-1]) / len(peel) for peel in peels]
     return [min(ends), max(ends)]

@@ -26,8 +26,7 @@ def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sa
         on = np.flatnonzero(~effect.off(values))
         if effect.observe is None or not len(on):
             continue
-        part = Sampling(
-            sampling.rig, sampling.recording, sampling.beat[on], sampling.times[on].copy(), sampling.added[on].copy()
-        )
+        times, added = sampling.times[on].copy(), sampling.added[on].copy()
+        part = Sampling(sampling.rig, sampling.recording, sampling.beat[on], times, added)
         effect.observe(part, {name: value[on] for name, value in values.items()})
         sampling.beat[on], sampling.times[on], sampling.added[on] = part.beat, part.times, part.added

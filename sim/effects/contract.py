@@ -169,6 +169,9 @@ class Effect:
         return Gene(name, parameter.unit, nominal, lower, upper, parameter.scale, parameter.description)
 
 
+effect_of_joints = partial(Effect, family="structure", port="connector")
+effect_of_drive = partial(Effect, family="actuation", port="drive")
+effect_of_air = partial(Effect, family="aerodynamics", port="air")
 fault_of_tracks = partial(Effect, family="measurement", port="observation", observed=("tracks",))
 fault_of_forces = partial(Effect, family="measurement", port="observation", observed=("forces",))
 fault_of_recordings = partial(Effect, family="measurement", port="observation", observed=("tracks", "forces"))
@@ -176,13 +179,11 @@ fault_of_recordings = partial(Effect, family="measurement", port="observation", 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
     """Shape parameters of an effect at one place of the wing, by the typical place."""
+    along = "place along the span, fraction of it from root to tip"
+    across = "place along the chord, fraction of it from the leading edge"
     return (
-        Parameter(
-            "station", "1", 0.0, 1.0, station, "place along the span, fraction of it from root to tip", place=True
-        ),
-        Parameter(
-            "chord", "1", 0.0, 1.0, chord, "place along the chord, fraction of it from the leading edge", place=True
-        ),
+        Parameter("station", "1", 0.0, 1.0, station, along, place=True),
+        Parameter("chord", "1", 0.0, 1.0, chord, across, place=True),
     )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Effect, Parameter, Values, effect_of_air, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE, START
 from wingfit.sim.kernels.jit import inlined
@@ -104,15 +104,12 @@ class Probe:
         return {"0": "constant", **terms}
 
     def _motion(self) -> Effect:
-        return Effect(
+        what = "additional angle of the"
+        return effect_of_drive(
             name="driving_probe",
             title="Known motion of the drive",
-            family="actuation",
-            port="drive",
             size=tuple(
-                Parameter(
-                    f"{rod}_{name}", "deg", -_FURTHEST, _FURTHEST, 0.1, f"additional angle of the {rod} rod, {term}"
-                )
+                Parameter(f"{rod}_{name}", "deg", -_FURTHEST, _FURTHEST, 0.1, f"{what} {rod} rod, {term}")
                 for rod in ("front", "rear")
                 for name, term in self._series.items()
             ),
@@ -125,22 +122,14 @@ class Probe:
 
     def _load(self) -> Effect:
         loads = [("", "N/m", "force"), ("turn", "N", "moment nose up")][: 2 if self.turning else 1]
-        return Effect(
+        places = [f"per metre of span at {y:g} of it" for y in self.stations]
+        return effect_of_air(
             name="probe",
             title="Known load",
-            family="aerodynamics",
-            port="air",
             size=tuple(
-                Parameter(
-                    f"{load}{j}_{name}",
-                    unit,
-                    -LARGEST,
-                    LARGEST,
-                    1.0,
-                    f"{what} per metre of span at {y:g} of it, {term}",
-                )
+                Parameter(f"{load}{j}_{name}", unit, -LARGEST, LARGEST, 1.0, f"{what} {where}, {term}")
                 for load, unit, what in loads
-                for j, y in enumerate(self.stations)
+                for j, where in enumerate(places)
                 for name, term in self._series.items()
             ),
             law="f = sum_j hat_j(y) (j_0 + sum_k j_ck cos k psi + j_sk sin k psi), with 0_0 at the root",

@@ -8,66 +8,29 @@ from importlib import import_module
 from wingfit.records import Vehicle, Wing
 from wingfit.sim.effects.contract import Effect
 
-# Files of the library, each of which declares EFFECT.
-_PLACES: tuple[str, ...] = (
-    # structure: changes of the springs before effects in proportion to their stiffness
-    "structure.damage",
-    "structure.cubic_stiffness",
-    "structure.rod_slip",
-    "structure.hysteresis",
-    "structure.viscoelastic",
-    "structure.tether",
-    # inertia
-    "inertia.lumped_mass",
-    "inertia.mass_offset",
-    # actuation
-    "actuation.stroke_amplitude",
-    "actuation.stroke_bias",
-    "actuation.drive_harmonics",
-    "actuation.phase_lag_error",
-    "actuation.hinge_tilt",
-    "actuation.hinge_offset",
-    "actuation.compliant_drive",
-    "actuation.backlash",
-    # aerodynamics, each acting on the result of those before: stream, coefficients of the angle of attack, circulation,
-    # wake
-    "aerodynamics.residual_air",
-    "aerodynamics.airspeed_error",
-    "aerodynamics.added_mass",
-    "aerodynamics.leading_edge_vortex",
-    "aerodynamics.viscous_drag",
-    "aerodynamics.plate_drag",
-    "aerodynamics.dynamic_stall",
-    "aerodynamics.rotational_circulation",
-    "aerodynamics.circulation_lag",
-    "aerodynamics.clap_and_peel",
-    "aerodynamics.varying_coefficients",
-    "aerodynamics.tip_loss",
-    "aerodynamics.induced_inflow",
-    "aerodynamics.wake_capture",
-    # measurement of tracks, along the path of the signal: wing, image, tracker, frame
-    "cameras.marker_slip",
-    "cameras.rolling_shutter",
-    "cameras.camera_desync",
-    "cameras.lens_distortion",
-    "cameras.marker_swap",
-    "cameras.tracker_lag",
-    "cameras.camera_rotation",
-    "cameras.camera_shift",
-    # measurement of forces: axes, mount, amplifier
-    "balance.balance_tilt",
-    "balance.balance_resonance",
-    "balance.filter_delay",
-    "balance.balance_offset",
-    "balance.balance_drift",
-    # measurement of both
-    "recording.scale_error",
-    "recording.clock_offset",
-    "recording.strobe_rate",
+# Files of the library, each of which declares EFFECT, by folder.
+_FILES = (
+    # changes of the springs before effects in proportion to their stiffness
+    ("structure", "damage cubic_stiffness rod_slip hysteresis viscoelastic tether"),
+    ("inertia", "lumped_mass mass_offset"),
+    ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),
+    ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),
+    # each acts on the result of those before: stream, coefficients of the angle of attack, circulation, wake
+    ("aerodynamics", "residual_air airspeed_error added_mass leading_edge_vortex viscous_drag plate_drag"),
+    ("aerodynamics", "dynamic_stall rotational_circulation circulation_lag clap_and_peel varying_coefficients"),
+    ("aerodynamics", "tip_loss induced_inflow wake_capture"),
+    # along the path of the signal: wing, image, tracker, frame
+    ("cameras", "marker_slip rolling_shutter camera_desync lens_distortion"),
+    ("cameras", "marker_swap tracker_lag camera_rotation camera_shift"),
+    # axes, mount, amplifier
+    ("balance", "balance_tilt balance_resonance filter_delay balance_offset balance_drift"),
+    ("recording", "scale_error clock_offset strobe_rate"),
 )
 
 EFFECTS: dict[str, Effect] = {
-    place.rpartition(".")[2]: import_module(f"wingfit.sim.effects.library.{place}").EFFECT for place in _PLACES
+    name: import_module(f"wingfit.sim.effects.library.{folder}.{name}").EFFECT
+    for folder, names in _FILES
+    for name in names.split()
 }
 
 

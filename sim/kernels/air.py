@@ -15,8 +15,9 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels import LANES, arrays
-from wingfit.sim.kernels.jit import allocating, kernel
+from wingfit.sim.kernels.jit import allocating, inlined, kernel
 from wingfit.sim.kernels.lanes.lanewise import angle
+from wingfit.sim.kernels.lanes.matrices import Three, add_wrench, load_matrix, times, transposed
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, root, store, store0, store1
 
 REVERSAL = math.sin(math.radians(15.0))
@@ -25,18 +26,9 @@ STILL = 1e-9  # m/s, avoids division by zero without flow
 
 @allocating
 def strip_flow(
-    start: Index,
-    weight: Array,
-    centroid: Array,
-    wind: Array,
-    coefficients: Array,
-    induced: Array,
-    R: Array,
-    p: Array,
-    V: Array,
-    flow: Array,
-    loads: Array,
-) -> None:
+    start: Index, weight: Array, centroid: Array, wind: Array, coefficients: Array, induced: Array, R: Array,
+    p: Array, V: Array, flow: Array, loads: Array,
+) -> None:  # fmt: skip
     """The airflow of every strip, ``flow`` [S, FLOW, W], and ``loads`` [S, LOADS, W] by the affine laws.
 
     ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
@@ -108,27 +100,18 @@ def _position_and_pitch_rate(
         store(flow, s, arrays.PITCH_RATE, load(flow, s, arrays.PITCH_RATE) + g * load(V, n, 1))
 
 
+@inlined
+def _vector(array: Array) -> Three:
+    """The first three elements of an array."""
+    return load1(array, 0), load1(array, 1), load1(array, 2)
+
+
 @allocating
 def strip_forces(
-    start: Index,
-    weight: Array,
-    centroid: Array,
-    geometry: Array,
-    density: Array,
-    lift_share: Array,
-    lift_x: Array,
-    drag_share: Array,
-    drag_x: Array,
-    flow: Array,
-    loads: Array,
-    spread: bool,
-    R: Array,
-    V: Array,
-    wrench: Array,
-    damping: Array,
-    power: Array,
-    force: Array,
-) -> None:
+    start: Index, weight: Array, centroid: Array, geometry: Array, density: Array, lift_share: Array, lift_x: Array,
+    drag_share: Array, drag_x: Array, flow: Array, loads: Array, spread: bool, R: Array, V: Array, wrench: Array,
+    damping: Array, power: Array, force: Array,
+) -> None:  # fmt: skip
     """Add the air's wrench to every body, from the ``loads`` of its strip.
 
     ``lift_x``, ``drag_x`` [N, W]: points of action of the shares along the chord, in the body frame; ``spread``:
@@ -157,29 +140,19 @@ def strip_forces(
         for n in range(start[s], start[s + 1]):
             y = centroid[n, 1]
             a, b = load1(lift_share, n), load1(drag_share, n)
-            lx = a * (load(R, n, 0) * load1(lift, 0) + load(R, n, 3) * load1(lift, 1) + load(R, n, 6) * load1(lift, 2))
-            ly = a * (load(R, n, 1) * load1(lift, 0) + load(R, n, 4) * load1(lift, 1) + load(R, n, 7) * load1(lift, 2))
-            lz = a * (load(R, n, 2) * load1(lift, 0) + load(R, n, 5) * load1(lift, 1) + load(R, n, 8) * load1(lift, 2))
-            dx = b * (load(R, n, 0) * load1(drag, 0) + load(R, n, 3) * load1(drag, 1) + load(R, n, 6) * load1(drag, 2))
-            dy = b * (load(R, n, 1) * load1(drag, 0) + load(R, n, 4) * load1(drag, 1) + load(R, n, 7) * load1(drag, 2))
-            dz = b * (load(R, n, 2) * load1(drag, 0) + load(R, n, 5) * load1(drag, 1) + load(R, n, 8) * load1(drag, 2))
+            back = transposed(load_matrix(R, n))
+            up, away = times(back, _vector(lift)), times(back, _vector(drag))
+            lx, ly, lz, dx, dy, dz = a * up[0], a * up[1], a * up[2], b * away[0], b * away[1], b * away[2]
             tx, ty = y * (lz + dz), -load1(lift_x, n) * lz - load1(drag_x, n) * dz
             tz = load1(lift_x, n) * ly + load1(drag_x, n) * dy - y * (lx + dx)
             fx, fy, fz = lx + dx, ly + dy, lz + dz
             if spread:
                 g, x = weight[n], centroid[n, 0]
-                px = load(R, n, 0) * load1(push, 0) + load(R, n, 3) * load1(push, 1) + load(R, n, 6) * load1(push, 2)
-                py = load(R, n, 1) * load1(push, 0) + load(R, n, 4) * load1(push, 1) + load(R, n, 7) * load1(push, 2)
-                pz = load(R, n, 2) * load1(push, 0) + load(R, n, 5) * load1(push, 1) + load(R, n, 8) * load1(push, 2)
+                px, py, pz = times(back, _vector(push))
                 tx, ty = tx + (g * y) * pz + g * load1(push, 4), ty - (g * x) * pz + g * load1(push, 3)
                 tz = tz + g * (x * py - y * px)
                 fx, fy, fz = fx + g * px, fy + g * py, fz + g * pz
-            store(wrench, n, 0, load(wrench, n, 0) + tx)
-            store(wrench, n, 1, load(wrench, n, 1) + ty)
-            store(wrench, n, 2, load(wrench, n, 2) + tz)
-            store(wrench, n, 3, load(wrench, n, 3) + fx)
-            store(wrench, n, 4, load(wrench, n, 4) + fy)
-            store(wrench, n, 5, load(wrench, n, 5) + fz)
+            add_wrench(wrench, n, (tx, ty, tz), (fx, fy, fz))
             store1(damping, n, a * load1(lift, 3) + b * load1(drag, 3))
             turning = tx * load(V, n, 0) + ty * load(V, n, 1) + tz * load(V, n, 2)
             moving = fx * load(V, n, 3) + fy * load(V, n, 4) + fz * load(V, n, 5)

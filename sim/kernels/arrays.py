@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -138,65 +139,14 @@ class State(NamedTuple):
     z: Array
 
 
-class Work(NamedTuple):
-    """Working arrays of one group of lanes; see :func:`new_work` for the shapes."""
-
-    R: Array
-    p: Array
-    V: Array
-    z: Array
-    xi: Array
-    r_xi: Array
-    known: Array
-    U_xi: Array
-    U_V: Array
-    U_z: Array
-    wrench: Array
-    lead: Array
-    Q: Array
-    d: Array
-    Q0: Array
-    d0: Array
-    against: Array
-    blocks: Array
-    flow: Array
-    loads: Array
-    induced: Array
-    normal_damping: Array
-    drag0: Array
-    V0: Array
-    R0: Array
-    lost: Array
-    stored: Array
-    air_power: Array
-    air_force: Array
-    z_rate: Array
-    z_tangent: Array
-    z_tangent0: Array
-    z_known: Array
-    twist: Array
-    more: Array
-    more0: Array
-    more_k: Array
-    more_d: Array
-    more_k0: Array
-    more_d0: Array
-    push: Array
-    rods: Array
-    clock: Array
-    place: Array
-    turn: Array
-    point_twist: Array
-    point_wrench: Array
-    point_k: Array
-    point_d: Array
-    drag: Array
-    strip_frames: Index
-    connector_frames: Index
-    point_frames: Index
-    parameters: Array
-    density: Array
-    wind: Array
+# Working arrays of one group of lanes; see :func:`new_work` for the shapes.
+Work = namedtuple(
+    "Work",
+    "R p V z xi r_xi known U_xi U_V U_z wrench lead Q d Q0 d0 against blocks flow loads induced normal_damping drag0 "
+    "V0 R0 lost stored air_power air_force z_rate z_tangent z_tangent0 z_known twist more more0 more_k more_d more_k0 "
+    "more_d0 push rods clock place turn point_twist point_wrench point_k point_d drag strip_frames connector_frames "
+    "point_frames parameters density wind",
+)
 
 
 class Trace(NamedTuple):

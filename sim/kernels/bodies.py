@@ -11,7 +11,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
-from wingfit.sim.kernels.lanes.matrices import Three, cross
+from wingfit.sim.kernels.lanes.matrices import Three, cross, store_vector
 from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 
@@ -73,9 +73,7 @@ def inertial(mass: Array, inertia: Array, R: Array, V: Array, gravity: float, wr
         a, b, c = load(V, n, 0), load(V, n, 1), load(V, n, 2)
         x, y, z = load(V, n, 3), load(V, n, 4), load(V, n, 5)
         hx, hy, hz = i00 * a + i01 * b + i02 * c, i01 * a + i11 * b + i12 * c, i02 * a + i12 * b + i22 * c
-        store(wrench, n, 0, hy * c - hz * b)
-        store(wrench, n, 1, hz * a - hx * c)
-        store(wrench, n, 2, hx * b - hy * a)
+        store_vector(wrench, n, 0, cross((hx, hy, hz), (a, b, c)))
         store(wrench, n, 3, -m * (b * z - c * y + gravity * load(R, n, 6)))
         store(wrench, n, 4, -m * (c * x - a * z + gravity * load(R, n, 7)))
         store(wrench, n, 5, -m * (a * y - b * x + gravity * load(R, n, 8)))

@@ -14,14 +14,20 @@ from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Three,
+    add_wrench,
+    added,
     axial,
     co_stiffness,
     co_stiffness_matrix,
     cross,
+    less,
     load_matrix,
     load_vector,
+    negative,
     product,
     scaled,
+    store_matrix,
+    store_vector,
     times,
     trace_minus,
     transposed,
@@ -34,29 +40,12 @@ def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: 
     """Q [C, 9, W] and d [C, 3, W] of every connector."""
     for c in range(len(first)):
         i, j = first[c], second[c]
-        ax, ay, az = a[c, 0], a[c, 1], a[c, 2]
-        bx, by, bz = b[c, 0], b[c, 1], b[c, 2]
-        i0, i1, i2 = load(R, i, 0), load(R, i, 1), load(R, i, 2)
-        i3, i4, i5 = load(R, i, 3), load(R, i, 4), load(R, i, 5)
-        i6, i7, i8 = load(R, i, 6), load(R, i, 7), load(R, i, 8)
-        j0, j1, j2 = load(R, j, 0), load(R, j, 1), load(R, j, 2)
-        j3, j4, j5 = load(R, j, 3), load(R, j, 4), load(R, j, 5)
-        j6, j7, j8 = load(R, j, 6), load(R, j, 7), load(R, j, 8)
-        x = load(p, j, 0) - load(p, i, 0) + j0 * bx + j1 * by + j2 * bz
-        y = load(p, j, 1) - load(p, i, 1) + j3 * bx + j4 * by + j5 * bz
-        z = load(p, j, 2) - load(p, i, 2) + j6 * bx + j7 * by + j8 * bz
-        store(d, c, 0, i0 * x + i3 * y + i6 * z - ax)
-        store(d, c, 1, i1 * x + i4 * y + i7 * z - ay)
-        store(d, c, 2, i2 * x + i5 * y + i8 * z - az)
-        store(Q, c, 0, i0 * j0 + i3 * j3 + i6 * j6)
-        store(Q, c, 1, i0 * j1 + i3 * j4 + i6 * j7)
-        store(Q, c, 2, i0 * j2 + i3 * j5 + i6 * j8)
-        store(Q, c, 3, i1 * j0 + i4 * j3 + i7 * j6)
-        store(Q, c, 4, i1 * j1 + i4 * j4 + i7 * j7)
-        store(Q, c, 5, i1 * j2 + i4 * j5 + i7 * j8)
-        store(Q, c, 6, i2 * j0 + i5 * j3 + i8 * j6)
-        store(Q, c, 7, i2 * j1 + i5 * j4 + i8 * j7)
-        store(Q, c, 8, i2 * j2 + i5 * j5 + i8 * j8)
+        back, B, bx, by, bz = transposed(load_matrix(R, i)), load_matrix(R, j), b[c, 0], b[c, 1], b[c, 2]
+        x = load(p, j, 0) - load(p, i, 0) + B[0] * bx + B[1] * by + B[2] * bz
+        y = load(p, j, 1) - load(p, i, 1) + B[3] * bx + B[4] * by + B[5] * bz
+        z = load(p, j, 2) - load(p, i, 2) + B[6] * bx + B[7] * by + B[8] * bz
+        store_vector(d, c, 0, less(times(back, (x, y, z)), (a[c, 0], a[c, 1], a[c, 2])))
+        store_matrix(Q, c, product(back, B))
 
 
 @inlined
@@ -86,7 +75,7 @@ def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
     """Moment, force and energy of the coupling stiffness, with N = Q G_c: V_c = n . d for n~ = N - N^T."""
     n = axial(N)
     t = times(transposed(trace_minus(N)), d)
-    return (-t[0], -t[1], -t[2]), (-n[0], -n[1], -n[2]), n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
+    return negative(t), negative(n), n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
 
 
 @inlined
@@ -98,15 +87,8 @@ def relative_twist(
     ``omega``, ``velocity`` are the first body's; ``turning`` is the second's angular velocity in A's axes, ``v`` its
     velocity in its own; e and ``arm`` lead from the two centres to o_B, in A's axes.
     """
-    there, here, moving = cross(turning, arm), cross(omega, e), times(Q, v)
-    return (
-        (turning[0] - omega[0], turning[1] - omega[1], turning[2] - omega[2]),
-        (
-            moving[0] + there[0] - velocity[0] - here[0],
-            moving[1] + there[1] - velocity[1] - here[1],
-            moving[2] + there[2] - velocity[2] - here[2],
-        ),
-    )
+    moving = added(times(Q, v), cross(turning, arm))
+    return less(turning, omega), less(less(moving, velocity), cross(omega, e))
 
 
 @inlined
@@ -115,34 +97,11 @@ def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Thre
     return ((do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]), (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]))
 
 
-@inlined
-def add_wrench(wrench: Array, n: int, t: Three, f: Three) -> None:
-    """Add a wrench to that of body n."""
-    store(wrench, n, 0, load(wrench, n, 0) + t[0])
-    store(wrench, n, 1, load(wrench, n, 1) + t[1])
-    store(wrench, n, 2, load(wrench, n, 2) + t[2])
-    store(wrench, n, 3, load(wrench, n, 3) + f[0])
-    store(wrench, n, 4, load(wrench, n, 4) + f[1])
-    store(wrench, n, 5, load(wrench, n, 5) + f[2])
-
-
 @kernel
 def connect(
-    first: Index,
-    second: Index,
-    a: Array,
-    b: Array,
-    K: Array,
-    D: Array,
-    coupling: Array,
-    more: Array,
-    Q_: Array,
-    d_: Array,
-    V: Array,
-    wrench: Array,
-    dissipated: Array,
-    stored: Array,
-) -> None:
+    first: Index, second: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array, more: Array, Q_: Array,
+    d_: Array, V: Array, wrench: Array, dissipated: Array, stored: Array,
+) -> None:  # fmt: skip
     """Add spring and damper wrenches to both bodies; add up the power lost in dampers and the energy of springs.
 
     K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling
@@ -155,9 +114,7 @@ def connect(
         t, f, energy = spring_wrench(Q, d, load_vector(K, c, 0), load_vector(K, c, 3))
         if len(coupling):
             joint = coupling_wrench(product(Q, co_stiffness_matrix(load_matrix(coupling, c))), d)
-            t = (t[0] + joint[0][0], t[1] + joint[0][1], t[2] + joint[0][2])
-            f = (f[0] + joint[1][0], f[1] + joint[1][1], f[2] + joint[1][2])
-            energy = energy + joint[2]
+            t, f, energy = added(t, joint[0]), added(f, joint[1]), energy + joint[2]
         e = (a[c, 0] + d[0], a[c, 1] + d[1], a[c, 2] + d[2])
         arm = times(Q, (b[c, 0], b[c, 1], b[c, 2]))
         turning = times(Q, load_vector(V, j, 0))
@@ -170,15 +127,12 @@ def connect(
         t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
         f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
         if len(more):
-            t = (t[0] + load(more, c, 0), t[1] + load(more, c, 1), t[2] + load(more, c, 2))
-            f = (f[0] + load(more, c, 3), f[1] + load(more, c, 4), f[2] + load(more, c, 5))
+            t, f = added(t, load_vector(more, c, 0)), added(f, load_vector(more, c, 3))
         store0(dissipated, load0(dissipated) + loss)
         store0(stored, load0(stored) + energy)
-        m = cross(e, f)
-        add_wrench(wrench, i, (-t[0] - m[0], -t[1] - m[1], -t[2] - m[2]), (-f[0], -f[1], -f[2]))
-        m = cross(arm, f)
+        add_wrench(wrench, i, less(negative(t), cross(e, f)), negative(f))
         back = transposed(Q)
-        add_wrench(wrench, j, times(back, (t[0] + m[0], t[1] + m[1], t[2] + m[2])), times(back, f))
+        add_wrench(wrench, j, times(back, added(t, cross(arm, f))), times(back, f))
 
 
 @kernel
@@ -191,9 +145,8 @@ def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, 
         rate, slide = relative_twist(
             q, e, arm, load_vector(V, i, 0), load_vector(V, i, 3), times(q, load_vector(V, j, 0)), load_vector(V, j, 3)
         )
-        for k in range(3):
-            store(out, c, k, rate[k])
-            store(out, c, 3 + k, slide[k])
+        store_vector(out, c, 0, rate)
+        store_vector(out, c, 3, slide)
 
 
 @kernel
@@ -209,12 +162,9 @@ def add_turned(
         phi, delta = relative_twist(
             q, e, arm, load_vector(X, i, 0), load_vector(X, i, 3), times(q, load_vector(X, j, 0)), load_vector(X, j, 3)
         )
-        there, moving = cross(turning, arm), times(q, load_vector(V, j, 3))
-        g = (moving[0] + there[0], moving[1] + there[1], moving[2] + there[2])
-        t, f, h = cross(turning, phi), cross(g, phi), cross(omega, delta)
-        for k in range(3):
-            store(out, c, k, load(out, c, k) - t[k])
-            store(out, c, 3 + k, load(out, c, 3 + k) - f[k] - h[k])
+        g = added(times(q, load_vector(V, j, 3)), cross(turning, arm))
+        store_vector(out, c, 0, less(load_vector(out, c, 0), cross(turning, phi)))
+        store_vector(out, c, 3, less(less(load_vector(out, c, 3), cross(g, phi)), cross(omega, delta)))
 
 
 @kernel
@@ -224,11 +174,9 @@ def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Arr
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
         e, arm = (a[c, 0] + x[0], a[c, 1] + x[1], a[c, 2] + x[2]), times(q, (b[c, 0], b[c, 1], b[c, 2]))
-        t, f = load_vector(push, c, 0), load_vector(push, c, 3)
-        m = cross(e, f)
-        add_wrench(wrench, i, (t[0] + m[0], t[1] + m[1], t[2] + m[2]), f)
-        m, back = cross(arm, f), scaled(-1.0, transposed(q))
-        add_wrench(wrench, j, times(back, (t[0] + m[0], t[1] + m[1], t[2] + m[2])), times(back, f))
+        t, f, back = load_vector(push, c, 0), load_vector(push, c, 3), scaled(-1.0, transposed(q))
+        add_wrench(wrench, i, added(t, cross(e, f)), f)
+        add_wrench(wrench, j, times(back, added(t, cross(arm, f))), times(back, f))
 
 
 @kernel
@@ -241,33 +189,22 @@ def tangent(
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
-        ax, ay, az = a[c, 0], a[c, 1], a[c, 2]
-        bx, by, bz = b[c, 0], b[c, 1], b[c, 2]
-        q0, q1, q2 = load(Q, c, 0), load(Q, c, 1), load(Q, c, 2)
-        q3, q4, q5 = load(Q, c, 3), load(Q, c, 4), load(Q, c, 5)
-        q6, q7, q8 = load(Q, c, 6), load(Q, c, 7), load(Q, c, 8)
-        ex, ey, ez = ax + load(d, c, 0), ay + load(d, c, 1), az + load(d, c, 2)
-        ox, oy, oz = load(X, i, 0), load(X, i, 1), load(X, i, 2)
-        wx, wy, wz = load(X, j, 0), load(X, j, 1), load(X, j, 2)
+        q, bx, by, bz = load_matrix(Q, c), b[c, 0], b[c, 1], b[c, 2]
+        ex, ey, ez = a[c, 0] + load(d, c, 0), a[c, 1] + load(d, c, 1), a[c, 2] + load(d, c, 2)
+        omega, (wx, wy, wz) = load_vector(X, i, 0), load_vector(X, j, 0)
         vx = load(X, j, 3) + wy * bz - wz * by
         vy = load(X, j, 4) + wz * bx - wx * bz
         vz = load(X, j, 5) + wx * by - wy * bx
-        tx = load(C, c, 0) * (q0 * wx + q1 * wy + q2 * wz - ox)
-        ty = load(C, c, 1) * (q3 * wx + q4 * wy + q5 * wz - oy)
-        tz = load(C, c, 2) * (q6 * wx + q7 * wy + q8 * wz - oz)
-        fx = load(C, c, 3) * (q0 * vx + q1 * vy + q2 * vz - load(X, i, 3) - (oy * ez - oz * ey))
-        fy = load(C, c, 4) * (q3 * vx + q4 * vy + q5 * vz - load(X, i, 4) - (oz * ex - ox * ez))
-        fz = load(C, c, 5) * (q6 * vx + q7 * vy + q8 * vz - load(X, i, 5) - (ox * ey - oy * ex))
+        rate = less(times(q, (wx, wy, wz)), omega)
+        slide = less(less(times(q, (vx, vy, vz)), load_vector(X, i, 3)), cross(omega, (ex, ey, ez)))
+        t, f = damper_wrench(rate, slide, load_vector(C, c, 0), load_vector(C, c, 3))
+        (tx, ty, tz), (fx, fy, fz), back = t, f, transposed(q)
         store(out, i, 0, load(out, i, 0) + tx + ey * fz - ez * fy)
         store(out, i, 1, load(out, i, 1) + ty + ez * fx - ex * fz)
         store(out, i, 2, load(out, i, 2) + tz + ex * fy - ey * fx)
-        store(out, i, 3, load(out, i, 3) + fx)
-        store(out, i, 4, load(out, i, 4) + fy)
-        store(out, i, 5, load(out, i, 5) + fz)
-        sx, sy, sz = q0 * fx + q3 * fy + q6 * fz, q1 * fx + q4 * fy + q7 * fz, q2 * fx + q5 * fy + q8 * fz
-        store(out, j, 0, load(out, j, 0) - (q0 * tx + q3 * ty + q6 * tz + by * sz - bz * sy))
-        store(out, j, 1, load(out, j, 1) - (q1 * tx + q4 * ty + q7 * tz + bz * sx - bx * sz))
-        store(out, j, 2, load(out, j, 2) - (q2 * tx + q5 * ty + q8 * tz + bx * sy - by * sx))
-        store(out, j, 3, load(out, j, 3) - sx)
-        store(out, j, 4, load(out, j, 4) - sy)
-        store(out, j, 5, load(out, j, 5) - sz)
+        store_vector(out, i, 3, added(load_vector(out, i, 3), f))
+        (sx, sy, sz), u = times(back, f), times(back, t)
+        store(out, j, 0, load(out, j, 0) - (u[0] + by * sz - bz * sy))
+        store(out, j, 1, load(out, j, 1) - (u[1] + bz * sx - bx * sz))
+        store(out, j, 2, load(out, j, 2) - (u[2] + bx * sy - by * sx))
+        store_vector(out, j, 3, less(load_vector(out, j, 3), (sx, sy, sz)))

@@ -33,7 +33,7 @@ from wingfit.sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from wingfit.sim.kernels.connectors import connect, relative_pose, tangent, twists
 from wingfit.sim.kernels.jit import allocating, kernel
 from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
-from wingfit.sim.kernels.lanes.matrices import cross, times
+from wingfit.sim.kernels.lanes.matrices import cross, less, store_matrix, store_vector, times
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, load3, store, store1
 from wingfit.sim.kernels.laws import AFTER, BEFORE, call
 from wingfit.sim.kernels.linear import factor, solve, subtract_column
@@ -93,13 +93,11 @@ def set_rods(rods: Array, hinge: Array, state: State) -> None:
             a[1] * u[0] + s * u[2], c + a[1] * u[1], a[1] * u[2] - s * u[0],
             a[2] * u[0] - s * u[1], a[2] * u[1] + s * u[0], c + a[2] * u[2],
         )  # fmt: skip
-        moved, sweep = times(R, off), cross(u, off)
-        for i in range(9):
-            store(state.R, n + k, i, R[i])
-        for i in range(3):
-            store(state.p, n + k, i, load1(hinge, 6 + i) - moved[i])
-            store(state.V, n + k, i, u[i] * rate)
-            store(state.V, n + k, 3 + i, -(sweep[i] * rate))
+        x, y, z = cross(u, off)
+        store_matrix(state.R, n + k, R)
+        store_vector(state.p, n + k, 0, less((load1(hinge, 6), load1(hinge, 7), load1(hinge, 8)), times(R, off)))
+        store_vector(state.V, n + k, 0, (u[0] * rate, u[1] * rate, u[2] * rate))
+        store_vector(state.V, n + k, 3, (-(x * rate), -(y * rate), -(z * rate)))
 
 
 @kernel
@@ -309,14 +307,7 @@ def finish_step(work: Work, state: State, alive: Mask) -> None:
 
 @allocating
 def advance(
-    wiring: Wiring,
-    setting: Setting,
-    lanes: Lanes,
-    drive: Array,
-    work: Work,
-    state: State,
-    trace: Trace,
-    alive: Mask,
+    wiring: Wiring, setting: Setting, lanes: Lanes, drive: Array, work: Work, state: State, trace: Trace, alive: Mask
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 

@@ -11,8 +11,9 @@ the loads and set the rates of their states. Laws of connectors and of points ar
 from __future__ import annotations
 
 import threading
+from collections import namedtuple
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from llvmlite import ir
 from numba import carray, types
@@ -29,79 +30,41 @@ BEFORE, AFTER = 0, 1
 SIGNATURE = types.void(types.CPointer(types.int64), types.int64)
 
 
-class StripPort(NamedTuple):
-    """Inputs and outputs of a law of the air. S strips; parameters [P, S, W] and states [K, S, W] are its own.
+StripPort = namedtuple("StripPort", "places parameters state rate decay flow loads induced geometry density wind clock")
+"""Inputs and outputs of a law of the air. S strips; parameters [P, S, W] and states [K, S, W] are its own.
 
-    Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s),
-    ``clock`` [CLOCK, W] (rad): a load f that depends on the phase itself is f(NOW) + SHARE f'(START). Add to or
-    change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Set,
-    AFTER: ``rate`` [K, S, W] of the states, and ``decay`` [K, S, W], minus its derivative by the state itself (1/s).
-    """
-
-    places: int
-    parameters: Array
-    state: Array
-    rate: Array
-    decay: Array
-    flow: Array
-    loads: Array
-    induced: Array
-    geometry: Array
-    density: Array
-    wind: Array
-    clock: Array
+Read: ``flow`` [S, FLOW, W], ``geometry`` [S, GEOMETRY], ``density`` [W] (kg/m^3), ``wind`` [3, W] (m/s),
+``clock`` [CLOCK, W] (rad): a load f that depends on the phase itself is f(NOW) + SHARE f'(START). Add to or
+change: ``loads`` [S, LOADS, W], ``induced`` [S, 3, W], a velocity of the air in the world (m/s, only BEFORE). Set,
+AFTER: ``rate`` [K, S, W] of the states, and ``decay`` [K, S, W], minus its derivative by the state itself (1/s).
+"""
 
 
-class ConnectorPort(NamedTuple):
-    """Inputs and outputs of a law of connectors. C connectors; parameters [P, C, W] and states [K, C, W] are its own.
+ConnectorPort = namedtuple(
+    "ConnectorPort",
+    "places parameters state rate decay drive pull Q d twist wrench stiffness damping lost stored",
+)
+"""Inputs and outputs of a law of connectors. C connectors; parameters [P, C, W] and states [K, C, W] are its own.
 
-    Read: ``Q`` [C, 9, W] and ``d`` [C, 3, W], the pose of the second frame in the first; ``twist`` [C, 6, W] of the
-    second relative to the first (rad/s, m/s), about the axes of the first. Add to: ``wrench`` [C, 6, W] on the second
-    body in the axes of the first; ``stiffness`` and ``damping`` [C, 6, W], minus its derivatives by displacement and
-    twist; ``lost`` and ``stored`` [W], power lost (W) and energy stored (J). Set for each state its ``rate``, ``decay``
-    as for a strip, ``drive``, the derivative of the rate by the twist along the state's axis, and ``pull``, minus the
-    derivative of the wrench along that axis by the state.
-    """
-
-    places: int
-    parameters: Array
-    state: Array
-    rate: Array
-    decay: Array
-    drive: Array
-    pull: Array
-    Q: Array
-    d: Array
-    twist: Array
-    wrench: Array
-    stiffness: Array
-    damping: Array
-    lost: Array
-    stored: Array
+Read: ``Q`` [C, 9, W] and ``d`` [C, 3, W], the pose of the second frame in the first; ``twist`` [C, 6, W] of the
+second relative to the first (rad/s, m/s), about the axes of the first. Add to: ``wrench`` [C, 6, W] on the second
+body in the axes of the first; ``stiffness`` and ``damping`` [C, 6, W], minus its derivatives by displacement and
+twist; ``lost`` and ``stored`` [W], power lost (W) and energy stored (J). Set for each state its ``rate``, ``decay``
+as for a strip, ``drive``, the derivative of the rate by the twist along the state's axis, and ``pull``, minus the
+derivative of the wrench along that axis by the state.
+"""
 
 
-class PointPort(NamedTuple):
-    """What a law of points of bodies sees. P points; parameters [N, P, W] are its own; all else is in the world.
+PointPort = namedtuple("PointPort", "places parameters place turn twist wrench stiffness damping lost stored clock")
+"""What a law of points of bodies sees. P points; parameters [N, P, W] are its own; all else is in the world.
 
-    A point lies elsewhere in each individual, often on another body: where all parameters are zero, the law must give
-    nothing. Read: ``place`` [P, 3, W] (m), ``turn`` [P, 9, W], the rotation of the body, ``twist`` [P, 6, W], its
-    angular velocity and the velocity of the point (rad/s, m/s), ``clock`` as for a strip. Add to: ``wrench``
-    [P, 6, W], moment about the point and force on it (N m, N); ``stiffness`` and ``damping`` [P, 36, W], minus its
-    derivatives by the motion (rotation, displacement) and by the twist, 6 x 6 row by row; ``lost`` and ``stored`` [W],
-    power that the wing loses (W; what it is given counts as negative) and energy stored (J).
-    """
-
-    places: int
-    parameters: Array
-    place: Array
-    turn: Array
-    twist: Array
-    wrench: Array
-    stiffness: Array
-    damping: Array
-    lost: Array
-    stored: Array
-    clock: Array
+A point lies elsewhere in each individual, often on another body: where all parameters are zero, the law must give
+nothing. Read: ``place`` [P, 3, W] (m), ``turn`` [P, 9, W], the rotation of the body, ``twist`` [P, 6, W], its
+angular velocity and the velocity of the point (rad/s, m/s), ``clock`` as for a strip. Add to: ``wrench``
+[P, 6, W], moment about the point and force on it (N m, N); ``stiffness`` and ``damping`` [P, 36, W], minus its
+derivatives by the motion (rotation, displacement) and by the twist, 6 x 6 row by row; ``lost`` and ``stored`` [W],
+power that the wing loses (W; what it is given counts as negative) and energy stored (J).
+"""
 
 
 @intrinsic
@@ -130,23 +93,32 @@ def call(typingctx: Any, function: Any, frame: Any, moment: Any) -> Any:  # noqa
 
 
 @inlined
+def _table(address: Any, rows: int, columns: int) -> Array:
+    """The array [rows, columns, W] at an address."""
+    return carray(_doubles(address), (rows, columns, LANES))
+
+
+@inlined
+def _rows(address: Any, count: int) -> Array:
+    """The array [count, W] at an address."""
+    return carray(_doubles(address), (count, LANES))
+
+
+@inlined
+def _lanes(address: Any) -> Array:
+    """The array [W] at an address."""
+    return carray(_doubles(address), (LANES,))
+
+
+@inlined
 def strip_port(frame: Any) -> StripPort:
     """Open the frame of a law of the air."""
     S, P, K = frame[0], frame[1], frame[2]
     return StripPort(
-        S,
-        carray(_doubles(frame[3]), (P, S, LANES)),
-        carray(_doubles(frame[4]), (K, S, LANES)),
-        carray(_doubles(frame[5]), (K, S, LANES)),
-        carray(_doubles(frame[6]), (K, S, LANES)),
-        carray(_doubles(frame[7]), (S, FLOW, LANES)),
-        carray(_doubles(frame[8]), (S, LOADS, LANES)),
-        carray(_doubles(frame[9]), (S, 3, LANES)),
-        carray(_doubles(frame[10]), (S, GEOMETRY)),
-        carray(_doubles(frame[11]), (LANES,)),
-        carray(_doubles(frame[12]), (3, LANES)),
-        carray(_doubles(frame[13]), (CLOCK, LANES)),
-    )
+        S, _table(frame[3], P, S), _table(frame[4], K, S), _table(frame[5], K, S), _table(frame[6], K, S),
+        _table(frame[7], S, FLOW), _table(frame[8], S, LOADS), _table(frame[9], S, 3),
+        carray(_doubles(frame[10]), (S, GEOMETRY)), _lanes(frame[11]), _rows(frame[12], 3), _rows(frame[13], CLOCK),
+    )  # fmt: skip
 
 
 @inlined
@@ -154,22 +126,11 @@ def connector_port(frame: Any) -> ConnectorPort:
     """Open the frame of a law of the connectors."""
     C, P, K = frame[0], frame[1], frame[2]
     return ConnectorPort(
-        C,
-        carray(_doubles(frame[3]), (P, C, LANES)),
-        carray(_doubles(frame[4]), (K, C, LANES)),
-        carray(_doubles(frame[5]), (K, C, LANES)),
-        carray(_doubles(frame[6]), (K, C, LANES)),
-        carray(_doubles(frame[7]), (K, C, LANES)),
-        carray(_doubles(frame[8]), (K, C, LANES)),
-        carray(_doubles(frame[9]), (C, 9, LANES)),
-        carray(_doubles(frame[10]), (C, 3, LANES)),
-        carray(_doubles(frame[11]), (C, 6, LANES)),
-        carray(_doubles(frame[12]), (C, 6, LANES)),
-        carray(_doubles(frame[13]), (C, 6, LANES)),
-        carray(_doubles(frame[14]), (C, 6, LANES)),
-        carray(_doubles(frame[15]), (LANES,)),
-        carray(_doubles(frame[16]), (LANES,)),
-    )
+        C, _table(frame[3], P, C), _table(frame[4], K, C), _table(frame[5], K, C), _table(frame[6], K, C),
+        _table(frame[7], K, C), _table(frame[8], K, C), _table(frame[9], C, 9), _table(frame[10], C, 3),
+        _table(frame[11], C, 6), _table(frame[12], C, 6), _table(frame[13], C, 6), _table(frame[14], C, 6),
+        _lanes(frame[15]), _lanes(frame[16]),
+    )  # fmt: skip
 
 
 @inlined
@@ -177,18 +138,10 @@ def point_port(frame: Any) -> PointPort:
     """Open the frame of a law of points of bodies."""
     K, P = frame[0], frame[1]
     return PointPort(
-        K,
-        carray(_doubles(frame[3]), (P, K, LANES)),
-        carray(_doubles(frame[4]), (K, 3, LANES)),
-        carray(_doubles(frame[5]), (K, 9, LANES)),
-        carray(_doubles(frame[6]), (K, 6, LANES)),
-        carray(_doubles(frame[7]), (K, 6, LANES)),
-        carray(_doubles(frame[8]), (K, 36, LANES)),
-        carray(_doubles(frame[9]), (K, 36, LANES)),
-        carray(_doubles(frame[10]), (LANES,)),
-        carray(_doubles(frame[11]), (LANES,)),
-        carray(_doubles(frame[12]), (CLOCK, LANES)),
-    )
+        K, _table(frame[3], P, K), _table(frame[4], K, 3), _table(frame[5], K, 9), _table(frame[6], K, 6),
+        _table(frame[7], K, 6), _table(frame[8], K, 36), _table(frame[9], K, 36), _lanes(frame[10]),
+        _lanes(frame[11]), _rows(frame[12], CLOCK),
+    )  # fmt: skip
 
 
 _COMPILED: dict[Law, Any] = {}  # never removed: their addresses are in use

@@ -9,9 +9,35 @@ many above it, in the same order, and last the columns of the driving rods, whic
 
 from __future__ import annotations
 
+from typing import Any
+
 from wingfit.records.array_types import Array, Index
-from wingfit.sim.kernels.jit import kernel
-from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
+from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.lanes.vector import Vector, load, load1, store, store1
+
+
+@inlined
+def _row(A: Array, i: int) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
+    """Elements i to i + 5 of a block [36, W]."""
+    return load1(A, i), load1(A, i + 1), load1(A, i + 2), load1(A, i + 3), load1(A, i + 4), load1(A, i + 5)
+
+
+@inlined
+def _set_row(A: Array, i: int, x: Any) -> None:
+    """Put six vectors into the elements i to i + 5 of a block [36, W]."""
+    store1(A, i, x[0])
+    store1(A, i + 1, x[1])
+    store1(A, i + 2, x[2])
+    store1(A, i + 3, x[3])
+    store1(A, i + 4, x[4])
+    store1(A, i + 5, x[5])
+
+
+@inlined
+def _minus(x: Any, m: Vector, y: Any) -> Any:
+    """x - m y, of six vectors each."""
+    a, b, c = x[0] - m * y[0], x[1] - m * y[1], x[2] - m * y[2]
+    return a, b, c, x[3] - m * y[3], x[4] - m * y[4], x[5] - m * y[5]
 
 
 @kernel
@@ -22,18 +48,12 @@ def _invert(A: Array) -> None:
         store1(A, 7 * p, 1.0)
         for j in range(6):
             store1(A, 6 * p + j, load1(A, 6 * p + j) * pivot)
-        r0, r1, r2 = load1(A, 6 * p), load1(A, 6 * p + 1), load1(A, 6 * p + 2)
-        r3, r4, r5 = load1(A, 6 * p + 3), load1(A, 6 * p + 4), load1(A, 6 * p + 5)
+        row = _row(A, 6 * p)
         for i in range(6):
             if i != p:
                 m = load1(A, 6 * i + p)
                 store1(A, 6 * i + p, 0.0)
-                store1(A, 6 * i, load1(A, 6 * i) - m * r0)
-                store1(A, 6 * i + 1, load1(A, 6 * i + 1) - m * r1)
-                store1(A, 6 * i + 2, load1(A, 6 * i + 2) - m * r2)
-                store1(A, 6 * i + 3, load1(A, 6 * i + 3) - m * r3)
-                store1(A, 6 * i + 4, load1(A, 6 * i + 4) - m * r4)
-                store1(A, 6 * i + 5, load1(A, 6 * i + 5) - m * r5)
+                _set_row(A, 6 * i, _minus(_row(A, 6 * i), m, row))
 
 
 @kernel
@@ -52,36 +72,12 @@ def _times_inverse(A: Array, D: Array) -> None:
 def _subtract_product(A: Array, B: Array, C: Array) -> None:
     """C <- C - A B for 6 x 6 blocks [36, W], two rows of C at a time, to use both arithmetic units."""
     for i in range(0, 36, 12):
-        c0, c1, c2 = load1(C, i), load1(C, i + 1), load1(C, i + 2)
-        c3, c4, c5 = load1(C, i + 3), load1(C, i + 4), load1(C, i + 5)
-        d0, d1, d2 = load1(C, i + 6), load1(C, i + 7), load1(C, i + 8)
-        d3, d4, d5 = load1(C, i + 9), load1(C, i + 10), load1(C, i + 11)
+        c, d = _row(C, i), _row(C, i + 6)
         for k in range(6):
-            a, b = load1(A, i + k), load1(A, i + 6 + k)
-            x = load1(B, 6 * k)
-            c0, d0 = c0 - a * x, d0 - b * x
-            x = load1(B, 6 * k + 1)
-            c1, d1 = c1 - a * x, d1 - b * x
-            x = load1(B, 6 * k + 2)
-            c2, d2 = c2 - a * x, d2 - b * x
-            x = load1(B, 6 * k + 3)
-            c3, d3 = c3 - a * x, d3 - b * x
-            x = load1(B, 6 * k + 4)
-            c4, d4 = c4 - a * x, d4 - b * x
-            x = load1(B, 6 * k + 5)
-            c5, d5 = c5 - a * x, d5 - b * x
-        store1(C, i, c0)
-        store1(C, i + 1, c1)
-        store1(C, i + 2, c2)
-        store1(C, i + 3, c3)
-        store1(C, i + 4, c4)
-        store1(C, i + 5, c5)
-        store1(C, i + 6, d0)
-        store1(C, i + 7, d1)
-        store1(C, i + 8, d2)
-        store1(C, i + 9, d3)
-        store1(C, i + 10, d4)
-        store1(C, i + 11, d5)
+            x = _row(B, 6 * k)
+            c, d = _minus(c, load1(A, i + k), x), _minus(d, load1(A, i + 6 + k), x)
+        _set_row(C, i, c)
+        _set_row(C, i + 6, d)
 
 
 @kernel

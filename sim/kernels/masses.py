@@ -17,15 +17,19 @@ Both kinds enter as inertia: as explicit forces, air heavier than the wing would
 from __future__ import annotations
 
 from wingfit.records.array_types import Array, Index
-from wingfit.sim.kernels.connectors import add_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Six,
     Three,
     add_to_block,
+    add_wrench,
+    added,
     cross,
+    extended,
+    less,
     load_block,
+    load_matrix,
     load_vector,
     plus,
     product,
@@ -33,7 +37,9 @@ from wingfit.sim.kernels.lanes.matrices import (
     skew,
     skew_times,
     times,
+    times_six,
     times_skew,
+    transposed,
 )
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
@@ -49,30 +55,16 @@ def _across(masses: Array, k: int) -> Nine:
 
 
 @inlined
-def _times(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
-    a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2])
-
-
-@inlined
 def _in_body(R: Array, n: int, wind: Array) -> Three:
     """The wind in the frame of body n."""
-    x, y, z = load1(wind, 0), load1(wind, 1), load1(wind, 2)
-    return (
-        load(R, n, 0) * x + load(R, n, 3) * y + load(R, n, 6) * z,
-        load(R, n, 1) * x + load(R, n, 4) * y + load(R, n, 7) * z,
-        load(R, n, 2) * x + load(R, n, 5) * y + load(R, n, 8) * z,
-    )
+    return times(transposed(load_matrix(R, n)), (load1(wind, 0), load1(wind, 1), load1(wind, 2)))
 
 
 @inlined
 def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
     """Velocity of body n; for added mass relative to the wind."""
     v = load_vector(V, n, 3)
-    if air:
-        w = _in_body(R, n, wind)
-        return v[0] - w[0], v[1] - w[1], v[2] - w[2]
-    return v
+    return less(v, _in_body(R, n, wind)) if air else v
 
 
 @kernel
@@ -83,9 +75,9 @@ def add_momentum(
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
         M, omega = load_block(masses, k), load_vector(V, i, 0)
-        h, p = _times(M, load_vector(V, j, 0), load_vector(V, j, 3))
+        h, p = times_six(M, load_vector(V, j, 0), load_vector(V, j, 3))
         t, s, f = cross(h, omega), cross(p, load_vector(V, i, 3)), cross(p, omega)
-        add_wrench(wrench, i, (t[0] + s[0], t[1] + s[1], t[2] + s[2]), f)
+        add_wrench(wrench, i, added(t, s), f)
         t, f = _weight(M, gravity, R, i)
         add_wrench(wrench, i, t, f)
     for k in range(weighing, len(pairs)):
@@ -110,21 +102,14 @@ def _weight(M: Six, gravity: float, R: Array, i: int) -> tuple[Three, Three]:
 
 @kernel
 def add_mass_blocks(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    gravity: float,
-    wind: Array,
-    R: Array,
-    V: Array,
-    length: float,
+    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, length: float,
     blocks: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
     for k in range(weighing):
         i = pairs[k, 0]
         M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
-        h, p = _times(M, omega, v)
+        h, p = times_six(M, omega, v)
         zero = scaled(0.0, M[0])
         own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
         A = _by_twist(M, omega, v, 1.0 / length)
@@ -137,7 +122,7 @@ def add_mass_blocks(
         omega, w = load_vector(V, j, 0), _in_body(R, j, wind)
         v, factor = load_vector(V, j, 3), 1.0 / length
         A = (scaled(factor, M[0]), scaled(factor, M[1]), scaled(factor, M[2]), scaled(factor, M[3]))
-        joined = _with_motion(A, omega, (v[0] - w[0], v[1] - w[1], v[2] - w[2]), length)
+        joined = _with_motion(A, omega, less(v, w), length)
         add_to_block(blocks, pairs[k, 2], _with_wind(joined, M, omega, w, length))
 
 
@@ -173,39 +158,21 @@ def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
 
 @kernel
 def add_mass_terms(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    wind: Array,
-    R: Array,
-    V: Array,
-    factor: float,
-    lead: Array,
-    X: Array,
+    pairs: Index, masses: Array, weighing: int, wind: Array, R: Array, V: Array, factor: float, lead: Array, X: Array,
     wrench: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
     for k in range(weighing):
         i, j = pairs[k, 0], pairs[k, 1]
         M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         x, y = load_vector(X, j, 0), load_vector(X, j, 3)
         u, w = load_vector(lead, j, 0), load_vector(lead, j, 3)
-        a, b = _times(
-            M,
-            (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]),
-            (w[0] + factor * y[0], w[1] + factor * y[1], w[2] + factor * y[2]),
-        )
-        c, d = _times(M, x, y)
-        e, f, g = cross(omega, c), cross(v, d), cross(omega, d)
-        h, p = _times(M, load_vector(V, j, 0), load_vector(V, j, 3))
+        a, b = times_six(M, extended(u, factor, x), extended(w, factor, y))
+        c, d = times_six(M, x, y)
+        a, b = added(added(a, cross(omega, c)), cross(v, d)), added(b, cross(omega, d))
+        h, p = times_six(M, load_vector(V, j, 0), load_vector(V, j, 3))
         x, y = load_vector(X, i, 0), load_vector(X, i, 3)
-        q, r, s = cross(h, x), cross(p, y), cross(p, x)
-        add_wrench(
-            wrench,
-            i,
-            (a[0] + e[0] + f[0] - q[0] - r[0], a[1] + e[1] + f[1] - q[1] - r[1], a[2] + e[2] + f[2] - q[2] - r[2]),
-            (b[0] + g[0] - s[0], b[1] + g[1] - s[1], b[2] + g[2] - s[2]),
-        )
+        add_wrench(wrench, i, less(less(a, cross(h, x)), cross(p, y)), less(b, cross(p, x)))
     for k in range(weighing, len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         N, w = _across(masses, k), _in_body(R, j, wind)
@@ -219,22 +186,14 @@ def add_mass_terms(
 
 @kernel
 def add_energies(
-    pairs: Index,
-    masses: Array,
-    weighing: int,
-    gravity: float,
-    wind: Array,
-    R: Array,
-    p: Array,
-    V: Array,
-    kinetic: Array,
-    potential: Array,
-) -> None:
+    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, p: Array, V: Array,
+    kinetic: Array, potential: Array,
+) -> None:  # fmt: skip
     """Add the kinetic energy of all pairs and the potential energy of those with weight."""
     for k in range(len(pairs)):
         i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
         M, own = load_block(masses, k), _relative(V, R, i, wind, air)
-        h, q = _times(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+        h, q = times_six(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
         omega = load_vector(V, i, 0)
         work = h[0] * omega[0] + h[1] * omega[1] + h[2] * omega[2] + q[0] * own[0] + q[1] * own[1] + q[2] * own[2]
         store0(kinetic, load0(kinetic) + 0.5 * work)

@@ -16,12 +16,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.sim.kernels.connectors import add_wrench
-from wingfit.sim.kernels.jit import inlined, kernel
+from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.matrices import (
-    Nine,
-    Six,
     add_to_block,
+    add_wrench,
+    added,
     cross,
     load_block,
     load_matrix,
@@ -32,11 +31,13 @@ from wingfit.sim.kernels.lanes.matrices import (
     set_block,
     skew,
     skew_times,
+    store_matrix,
+    store_vector,
     times,
+    times_six,
     transposed,
 )
-from wingfit.sim.kernels.lanes.vector import load, store
-from wingfit.sim.kernels.tangents import moved
+from wingfit.sim.kernels.tangents import moved, turned_left, turned_right
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -50,14 +51,10 @@ def follow_points(
     for k in range(len(bodies)):
         i = bodies[k]
         A, b, omega, v = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0), load_vector(V, i, 3)
-        at, sweep = times(A, b), cross(omega, b)
-        rate, velocity = times(A, omega), times(A, (v[0] + sweep[0], v[1] + sweep[1], v[2] + sweep[2]))
-        for j in range(9):
-            store(turn, k, j, A[j])
-        for j in range(3):
-            store(place, k, j, load(p, i, j) + at[j])
-            store(twist, k, j, rate[j])
-            store(twist, k, 3 + j, velocity[j])
+        store_matrix(turn, k, A)
+        store_vector(place, k, 0, added(load_vector(p, i, 0), times(A, b)))
+        store_vector(twist, k, 0, times(A, omega))
+        store_vector(twist, k, 3, times(A, added(v, cross(omega, b))))
 
 
 @kernel
@@ -66,35 +63,14 @@ def add_point_wrenches(bodies: Index, arms: Array, R: Array, given: Array, wrenc
     for k in range(len(bodies)):
         back = transposed(load_matrix(R, bodies[k]))
         m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
-        lever = cross(load_vector(arms, k, 0), f)
-        add_wrench(wrench, bodies[k], (m[0] + lever[0], m[1] + lever[1], m[2] + lever[2]), f)
-
-
-@inlined
-def _in_body(A: Nine, K: Six) -> Six:
-    """``K`` of the world in the axes of the body."""
-    back = transposed(A)
-    return (
-        product(back, product(K[0], A)),
-        product(back, product(K[1], A)),
-        product(back, product(K[2], A)),
-        product(back, product(K[3], A)),
-    )
+        add_wrench(wrench, bodies[k], added(m, cross(load_vector(arms, k, 0), f)), f)
 
 
 @kernel
 def add_point_blocks(
-    bodies: Index,
-    arms: Array,
-    R: Array,
-    V: Array,
-    given: Array,
-    stiffness: Array,
-    damping: Array,
-    length: float,
-    drag: Array,
-    blocks: Array,
-) -> None:
+    bodies: Index, arms: Array, R: Array, V: Array, given: Array, stiffness: Array, damping: Array, length: float,
+    drag: Array, blocks: Array,
+) -> None:  # fmt: skip
     """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, and keep -dW/dV in ``drag`` [P, 36, W].
 
     Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -
@@ -103,7 +79,8 @@ def add_point_blocks(
     for k in range(len(bodies)):
         i = bodies[k]
         A, b, omega = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0)
-        K, D = _in_body(A, load_block(stiffness, k)), _in_body(A, load_block(damping, k))
+        K = turned_left(1.0, A, turned_right(1.0, load_block(stiffness, k), A))
+        D = turned_left(1.0, A, turned_right(1.0, load_block(damping, k), A))
         back = transposed(A)
         m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
         set_block(drag, k, moved(b, D, b))
@@ -125,6 +102,5 @@ def add_point_terms(bodies: Index, drag: Array, X: Array, wrench: Array) -> None
     """Add -dW/dV X to the wrenches, as :func:`wingfit.sim.kernels.tangents.add_own_terms` does."""
     for k in range(len(bodies)):
         i = bodies[k]
-        M, x, y = load_block(drag, k), load_vector(X, i, 0), load_vector(X, i, 3)
-        a, b, c, d = times(M[0], x), times(M[1], y), times(M[2], x), times(M[3], y)
-        add_wrench(wrench, i, (a[0] + b[0], a[1] + b[1], a[2] + b[2]), (c[0] + d[0], c[1] + d[1], c[2] + d[2]))
+        t, f = times_six(load_block(drag, k), load_vector(X, i, 0), load_vector(X, i, 3))
+        add_wrench(wrench, i, t, f)

@@ -17,19 +17,23 @@ each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gam
 from __future__ import annotations
 
 from wingfit.records.array_types import Array, Index
-from wingfit.sim.kernels.connectors import add_wrench, coupling_wrench, damper_wrench, relative_twist, spring_wrench
+from wingfit.sim.kernels.connectors import coupling_wrench, damper_wrench, relative_twist, spring_wrench
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
     Six,
     Three,
     add_to_block,
+    add_wrench,
+    added,
     axial,
     co_stiffness,
     co_stiffness_matrix,
     columns_scaled,
     cross,
+    extended,
     gyroscopic,
+    less,
     load_inertia,
     load_matrix,
     load_vector,
@@ -121,16 +125,9 @@ def turned_right(sign: float, A: Six, Q: Nine) -> Six:
 
 @kernel
 def start_blocks(
-    mass: Array,
-    inertia: Array,
-    damping: Array,
-    R: Array,
-    V: Array,
-    gravity: float,
-    length: float,
-    fill: Index,
+    mass: Array, inertia: Array, damping: Array, R: Array, V: Array, gravity: float, length: float, fill: Index,
     blocks: Array,
-) -> None:
+) -> None:  # fmt: skip
     """Set the diagonal to the bodies' own part of S: inertia, gyroscopic terms, gravity, the air's normal damping.
 
     ``damping`` [N, W] acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
@@ -164,41 +161,17 @@ def add_own_terms(
     for n in range(len(mass)):
         m, own, omega = mass[n], load_inertia(inertia, n), load_vector(V, n, 0)
         x, y, u, w = load_vector(X, n, 0), load_vector(X, n, 3), load_vector(lead, n, 0), load_vector(lead, n, 3)
-        spin = times(own, (u[0] + factor * x[0], u[1] + factor * x[1], u[2] + factor * x[2]))
-        t = times(gyroscopic(own, omega), x)
+        t = added(times(gyroscopic(own, omega), x), times(own, extended(u, factor, x)))
         f, g = cross(omega, y), cross(load_vector(V, n, 3), x)
-        add_wrench(
-            wrench,
-            n,
-            (t[0] + spin[0], t[1] + spin[1], t[2] + spin[2]),
-            (
-                m * (f[0] - g[0] + w[0] + factor * y[0]),
-                m * (f[1] - g[1] + w[1] + factor * y[1]),
-                m * (f[2] - g[2] + w[2] + factor * y[2]) + load1(damping, n) * y[2],
-            ),
-        )
+        h = extended(added(less(f, g), w), factor, y)
+        add_wrench(wrench, n, t, (m * h[0], m * h[1], m * h[2] + load1(damping, n) * y[2]))
 
 
 @kernel
 def add_connectors(
-    first: Index,
-    second: Index,
-    lower: Index,
-    upper: Index,
-    a: Array,
-    b: Array,
-    K: Array,
-    D: Array,
-    coupling: Array,
-    more: Array,
-    more_k: Array,
-    more_d: Array,
-    Q_: Array,
-    d_: Array,
-    V: Array,
-    length: float,
-    blocks: Array,
-) -> None:
+    first: Index, second: Index, lower: Index, upper: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array,
+    more: Array, more_k: Array, more_d: Array, Q_: Array, d_: Array, V: Array, length: float, blocks: Array,
+) -> None:  # fmt: skip
     """Add the connectors' part of S to the diagonal and set it beside.
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
@@ -222,20 +195,15 @@ def add_connectors(
             N = product(Q, co_stiffness_matrix(load_matrix(coupling, c)))
             K_ = sum_of(K_, coupling_tangent(N, d))
             pull_t, pull_f, _ = coupling_wrench(N, d)
-            t = (t[0] + pull_t[0], t[1] + pull_t[1], t[2] + pull_t[2])
-            f = (f[0] + pull_f[0], f[1] + pull_f[1], f[2] + pull_f[2])
+            t, f = added(t, pull_t), added(f, pull_f)
         t = (t[0] - loss_t[0], t[1] - loss_t[1], t[2] - loss_t[2])
         f = (f[0] - loss_f[0], f[1] - loss_f[1], f[2] - loss_f[2])
         if len(more):
-            t = (t[0] + load(more, c, 0), t[1] + load(more, c, 1), t[2] + load(more, c, 2))
-            f = (f[0] + load(more, c, 3), f[1] + load(more, c, 4), f[2] + load(more, c, 5))
+            t, f = added(t, load_vector(more, c, 0)), added(f, load_vector(more, c, 3))
             extra_o, extra_t = load_vector(more_k, c, 0), load_vector(more_k, c, 3)
             K_ = (with_diagonal(K_[0], extra_o), K_[1], K_[2], with_diagonal(K_[3], extra_t))
-            extra_o, extra_t = load_vector(more_d, c, 0), load_vector(more_d, c, 3)
-            do = (do[0] + extra_o[0], do[1] + extra_o[1], do[2] + extra_o[2])
-            dt = (dt[0] + extra_t[0], dt[1] + extra_t[1], dt[2] + extra_t[2])
-        sweep = cross(omega, e)
-        g = (slide[0] + velocity[0] + sweep[0], slide[1] + velocity[1] + sweep[1], slide[2] + velocity[2] + sweep[2])
+            do, dt = added(do, load_vector(more_d, c, 0)), added(dt, load_vector(more_d, c, 3))
+        g = added(added(slide, velocity), cross(omega, e))
         B = twist_tangent(g, omega, turning)
         by_first = sum_of(K_, damper_tangent(B, omega, velocity, e, do, dt))
         by_second = sum_of(K_, damper_tangent(B, turning, times(Q, load_vector(V, j, 3)), arm, do, dt))

@@ -12,7 +12,7 @@ from wingfit.sim.atmosphere import density
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import PORTS, STAGES, Setting, State, Trace
 from wingfit.sim.kernels.integrate import NODES, SLOPES
-from wingfit.sim.kernels.lanes.memory import aligned, zeros
+from wingfit.sim.kernels.lanes.memory import aligned, several, zeros
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.wing.drive import RodDrive
 from wingfit.sim.wing.structure import Structure
@@ -90,14 +90,9 @@ def setting(condition: Condition, steps: int) -> Setting:
 def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
     """Arrays for the results of one beat; those of the motion are empty unless ``with_motion``."""
     rows, bodies = steps if with_motion else 0, len(structure.bodies) + 2
-    return Trace(
-        tracks=zeros((steps, len(structure.wing.markers), 3, LANES)),
-        rods=zeros((steps, 2, 6, LANES)),
-        air=zeros((steps, 3, LANES)),
-        power=zeros((steps, PORTS, LANES)),
-        energy=zeros((steps, 3, LANES)),
-        R=zeros((rows, bodies, 9, LANES)),
-        p=zeros((rows, bodies, 3, LANES)),
-        V=zeros((rows, bodies, 6, LANES)),
-        z=zeros((rows, states, LANES)),
-    )
+    shapes: dict[str, tuple[int, ...]] = {
+        "tracks": (steps, len(structure.wing.markers), 3), "rods": (steps, 2, 6), "air": (steps, 3),
+        "power": (steps, PORTS), "energy": (steps, 3),
+        "R": (rows, bodies, 9), "p": (rows, bodies, 3), "V": (rows, bodies, 6), "z": (rows, states),
+    }  # fmt: skip
+    return Trace(**several(shapes))

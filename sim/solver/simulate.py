@@ -153,12 +153,9 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
         course.before = course.copy()
     if last and not course.done:
         course.done = True
-        estimate = (
-            f"estimated error {course.error * 1e3:.3g} mm" if course.changes else "no coarser motion for comparison"
-        )
-        course.reason = (
-            f"not accurate enough with {steps} steps a beat: {estimate}, requested {numerics.accuracy * 1e3:g} mm"
-        )
+        error, wanted = course.error * 1e3, f"requested {numerics.accuracy * 1e3:g} mm"
+        estimate = f"estimated error {error:.3g} mm" if course.changes else "no coarser motion for comparison"
+        course.reason = f"not accurate enough with {steps} steps a beat: {estimate}, {wanted}"
 
 
 def _refuse_flutter(group: list[Course]) -> None:
@@ -173,19 +170,8 @@ def _refuse_flutter(group: list[Course]) -> None:
 def _beat(structure: Structure, course: Course, with_motion: bool) -> Beat:
     trace = course.trace
     if trace is None or course.reason is not None:
-        trace = Trace(
-            *(np.full(a.shape[:-1], np.nan) for a in new_trace(structure, LADDER[0], with_motion=with_motion))
-        )
+        blank = new_trace(structure, LADDER[0], with_motion=with_motion)
+        trace = Trace(*(np.full(array.shape[:-1], np.nan) for array in blank))
     motion = State(trace.R, trace.p, trace.V, trace.z) if with_motion else None
-    return Beat(
-        trace.tracks,
-        trace.rods,
-        trace.air,
-        trace.energy,
-        trace.power,
-        course.beats,
-        course.error,
-        course.growth,
-        course.reason,
-        motion,
-    )
+    arrays = (trace.tracks, trace.rods, trace.air, trace.energy, trace.power)
+    return Beat(*arrays, course.beats, course.error, course.growth, course.reason, motion)

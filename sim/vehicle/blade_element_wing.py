@@ -130,7 +130,8 @@ class BladeElementWing:
             weights = self._weights(self._coefficients(batch), len(batch))
             rows = self._rows(batch, recording)
         for name, weight, row in zip(self._active, weights[0], rows[0], strict=True):
-            parts[_ROWS[name]] = parts.get(_ROWS[name], 0.0) + weight * row.T
+            term = _ROWS[name][0]
+            parts[term] = parts.get(term, 0.0) + weight * row.T
         return parts
 
     @one_blas_thread
@@ -202,24 +203,15 @@ class BladeElementWing:
             return coefficients.get(name, zero)
 
         lever = ROTATION_POINT - self.vehicle.pitch_axis
-        scale = {
-            "inertial": one,
-            "translation": value("C_l"),
-            "rotation": value("C_r") * lever,
-            "clap_and_peel": -value("C_F"),  # theta_fling' = -theta_w'
-            "added_mass": one,
-            "viscous_0": value("C_D0"),
-            "viscous_90": value("C_Dpi2"),
-            "wing_acceleration": one,
-            "lift_curve": value("K_l"),
-            "drag_curve": value("K_d"),
-        }
+        scale = {row: value(name) if name else one for row, (_, name) in _ROWS.items()}
+        scale["rotation"] = scale["rotation"] * lever
+        scale["clap_and_peel"] = -scale["clap_and_peel"]  # theta_fling' = -theta_w'
         return np.stack([scale[row] for row in self._active], axis=1)
 
     @cached_property
     def _active(self) -> tuple[str, ...]:
         """Rows of the active terms."""
-        return tuple(row for row, term in _ROWS.items() if term in self.terms)
+        return tuple(row for row, (term, _) in _ROWS.items() if term in self.terms)
 
     @cached_property
     def _cache(self) -> WeakKeyDictionary[Recording, OrderedDict[bytes, Array]]:
@@ -313,25 +305,19 @@ class BladeElementWing:
         return {}  # of the last recording only, since those of long recordings are large
 
 
-# The term to which each row of the elements belongs.
+# The term to which each row of the elements belongs, and its coefficient, if any.
 _ROWS = {
-    "inertial": "inertial",
-    "translation": "translation",
-    "rotation": "rotation",
-    "clap_and_peel": "clap_and_peel",
-    "added_mass": "added_mass",
-    "viscous_0": "viscous",
-    "viscous_90": "viscous",
-    "wing_acceleration": "wing_acceleration",
-    "lift_curve": "steady_curves",
-    "drag_curve": "steady_curves",
-}
+    "inertial": ("inertial", ""), "translation": ("translation", "C_l"), "rotation": ("rotation", "C_r"),
+    "clap_and_peel": ("clap_and_peel", "C_F"), "added_mass": ("added_mass", ""), "viscous_0": ("viscous", "C_D0"),
+    "viscous_90": ("viscous", "C_Dpi2"), "wing_acceleration": ("wing_acceleration", ""),
+    "lift_curve": ("steady_curves", "K_l"), "drag_curve": ("steady_curves", "K_d"),
+}  # fmt: skip
 # The row of the elements; clap_and_peel is that of rotation while the wings peel.
 _INDEX = {name: (*ROWS, *CURVE_ROWS).index("rotation" if name == "clap_and_peel" else name) for name in _ROWS}
 
 
 # Genes on which the flow at the stations depends; a scene without effects depends on the motion alone.
-_COEFFICIENTS = ("C_l", "C_r", "C_F", "C_D0", "C_Dpi2", "K_l", "K_d")
+_COEFFICIENTS = {name for _, name in _ROWS.values() if name}
 
 
 def _check_effects(model: BladeElementWing) -> None:

@@ -83,16 +83,9 @@ def velocities(
 
 @inlined
 def _element_forces(
-    motion: Array,
-    side: Side,
-    r: Array,
-    chord: Array,
-    mass: Array,
-    rho: float,
-    loading: Array,
-    constants: Constants,
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
     out: Array,
-) -> None:
+) -> None:  # fmt: skip
     """The rows of ROWS for one individual: ``motion`` [14, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
     dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
@@ -198,28 +191,14 @@ def _curve_forces(
 
 @kernel
 def wing_forces(
-    motion: Array,
-    side: Side,
-    r: Array,
-    chord: Array,
-    mass: Array,
-    density: Array,
-    loading: Array,
-    constants: Constants,
-    out: Array,
-) -> None:
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, loading: Array,
+    constants: Constants, out: Array,
+) -> None:  # fmt: skip
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
 
-    Args:
-        motion: [B, 14, n / 8, 8], rows as named above.
-        side: the stream relative to this side.
-        r: [E] distances from the flapping axis in equal steps, m.
-        chord: [E], m.
-        mass: [B, E] of the wing per length, kg/m.
-        density: [B] of the air, kg/m^3.
-        loading: [B, E], factor on the circulation.
-        constants: of all elements.
-        out: added to, in the order of ROWS, then CURVE_ROWS where there is room for them.
+    ``motion`` [B, 14, n / 8, 8]: rows as named above; ``r`` [E]: distances from the flapping axis in equal steps, m;
+    ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air, kg/m^3; ``loading``
+    [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then CURVE_ROWS where there is room for them.
     """
     for b in range(len(motion)):
         _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])

@@ -57,34 +57,16 @@ def motion_genes(motion: WingMotion) -> tuple[Gene, ...]:
     )
 
 
-def angles(
-    motion: WingMotion,
-    values: Mapping[str, Array],
-    frequency: float,
-    instants: int,
-    claps: bool,
-    peel_width: float = 0.0,
-) -> Angles:
+def angles_of(
+    series: Complex, motion: WingMotion, values: Mapping[str, Array], frequency: float, instants: int, claps: bool,
+    peel_width: float,
+) -> Angles:  # fmt: skip
     """Flap angle, pitch and peel over one beat of ``instants`` equal steps at ``frequency`` (Hz), for B individuals.
 
-    ``values`` are genes [B] of the motion; other parameters have the motion's own values. ``peel_width`` is the time,
-    in beats, in which rotational circulation replaces fling circulation; at 0 it is one step, as printed (Eq. 7).
+    The flap angle is a ``series`` [B, K + 1] (:func:`flap_series`). ``values`` are genes [B] of the motion; other
+    parameters have the motion's own values. ``peel_width`` is the time, in beats, in which rotational circulation
+    replaces fling circulation; at 0 it is one step, as printed (Eq. 7).
     """
-    count = max((len(v) for v in values.values()), default=1)
-    series = flap_series(motion.flap, values, count, instants)
-    return angles_of(series, motion, values, frequency, instants, claps, peel_width)
-
-
-def angles_of(
-    series: Complex,
-    motion: WingMotion,
-    values: Mapping[str, Array],
-    frequency: float,
-    instants: int,
-    claps: bool,
-    peel_width: float = 0.0,
-) -> Angles:
-    """As :func:`angles`, for a flap angle given as a ``series`` [B, K + 1] (see :func:`flap_series`)."""
     flap = _derivatives(series, frequency, instants, 3)
     pitch = _pitch(motion.pitch, values, flap, frequency, instants)
     t_star = np.arange(instants) / instants

@@ -37,12 +37,8 @@ def followed(speed: Array, share: Array, target: Array, step: float, out: Array)
 
     One sweep from zero, which gives the periodic start, then another from there.
 
-    Args:
-        speed: [sides, B, n, 8], m/s; the mean over the ends of a step is used in the step.
-        share: [B, 8], 1/m, not negative.
-        target: [sides, B, n, 8], linear over a step.
-        step: s.
-        out: x [sides, B, n, 8], is set.
+    ``out`` is set to x; ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out``
+    [sides, B, n, 8]; ``share`` [B, 8], 1/m, not negative; ``step`` in s.
     """
     n = speed.shape[2]
     start, kept = np.zeros(LANES), np.ones(LANES)
@@ -97,14 +93,8 @@ def steady_attachment(
 ) -> None:
     """X_0(alpha - tau_2 alpha') = 1 / (1 + exp((alpha - tau_2 alpha' - angle) / width)) over a beat.
 
-    Args:
-        along: [sides, B, n, 8], m/s.
-        normal: [sides, B, n, 8], m/s.
-        speed: [sides, B, n, 8], m/s.
-        chord: [8], m.
-        stall: [B, 3]: angle and width, rad, and tau_2 in chords travelled.
-        step: s.
-        out: X_0 [sides, B, n, 8], is set.
+    ``out`` is set to X_0; ``along``, ``normal``, ``speed`` (m/s) and ``out`` [sides, B, n, 8]; ``chord`` [8], m;
+    ``stall`` [B, 3]: angle and width, rad, and tau_2 in chords travelled; ``step`` in s.
     """
     n = speed.shape[2]
     for k in range(len(speed)):
@@ -161,14 +151,8 @@ def settled_inflow(
 ) -> None:
     """Periodic inflow v of m v' + F V_T v = force - slope v, V_T^2 = (U_x + mean v)^2 + U_z^2, by the trapezoidal rule.
 
-    Args:
-        force: [B, n], N.
-        slope: [B, n], N s/m.
-        flux: [B], F = 2 rho A, kg/m.
-        mass: [B], m, kg.
-        stream: [B, 2], U through the disc and along it, m/s.
-        step: s.
-        out: [B, n], v in m/s, is set.
+    ``out`` [B, n] is set to v, m/s; ``force`` [B, n], N; ``slope`` [B, n], N s/m; ``flux`` [B]: F = 2 rho A, kg/m;
+    ``mass`` [B]: m, kg; ``stream`` [B, 2]: U through the disc and along it, m/s; ``step`` in s.
     """
     n = force.shape[1]
     for b in range(len(force)):

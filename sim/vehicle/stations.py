@@ -118,28 +118,14 @@ def _attack(along: float, normal: float) -> float:
 
 @kernel
 def station_circulation(
-    along: Array,
-    normal: Array,
-    turning: Array,
-    coefficient: Array,
-    twist: Array,
-    chord: Array,
-    loading: Array,
-    speed: Array,
-    circulation: Array,
-) -> None:
+    along: Array, normal: Array, turning: Array, coefficient: Array, twist: Array, chord: Array, loading: Array,
+    speed: Array, circulation: Array,
+) -> None:  # fmt: skip
     """Speed (m/s) and quasi-steady circulation (m^2/s), positive as in Eq. 8, both [B, n, 8] (Eqs. 2-4, 7).
 
-    Args:
-        along: [B, n, 8], m/s.
-        normal: [B, n, 8], m/s.
-        turning: [B, n], C_R theta_w' at the pitch station, or what replaces it in Eq. 2, rad/s.
-        coefficient: [B, 2], C_l of the sine law and the factor on the measured curve.
-        twist: [8], fractions of that value.
-        chord: [8], m.
-        loading: [B, 8], factor on the circulation.
-        speed: is set.
-        circulation: is set.
+    ``along`` and ``normal`` [B, n, 8], m/s; ``turning`` [B, n]: C_R theta_w' at the pitch station, or what replaces it
+    in Eq. 2, rad/s; ``coefficient`` [B, 2]: C_l of the sine law and the factor on the measured curve; ``twist`` [8]:
+    fractions of ``turning``; ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
     """
     for b in range(len(along)):
         C_l, K_l = coefficient[b, 0], coefficient[b, 1]
@@ -160,19 +146,9 @@ def station_circulation(
 
 @allocating
 def station_forces(
-    motion: Array,
-    side: Side,
-    cosine: Array,
-    sine: Array,
-    along: Array,
-    normal: Array,
-    speed: Array,
-    circulation: Array,
-    places: Stations,
-    density: Array,
-    drag: Array,
-    out: Array,
-) -> None:
+    motion: Array, side: Side, cosine: Array, sine: Array, along: Array, normal: Array, speed: Array,
+    circulation: Array, places: Stations, density: Array, drag: Array, out: Array,
+) -> None:  # fmt: skip
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
     ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; others as in the

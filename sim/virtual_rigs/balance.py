@@ -122,22 +122,12 @@ def delfly() -> Vehicle:
     weight.
     """
     stations = (ChordStation(0.0, 0.085), ChordStation(0.0685, 0.0835), ChordStation(0.137, 0.056))
+    flap = SplitCycleFlap(amplitude=0.34, bias=0.34, split=0.35)
+    pitch = PassivePitch(0.3139, -1.1382, -0.0179, -0.0002)
     return Vehicle(
-        name="delfly",
-        layout="x4",
-        claps=True,
-        stations=stations,
-        wing_mass=0.29e-3,
-        thickness=1e-5,
-        pitch_axis=0.0,
-        dihedral=0.0,
-        mass=17.4e-3,
-        motion=WingMotion(
-            flap=SplitCycleFlap(amplitude=0.34, bias=0.34, split=0.35),
-            pitch=PassivePitch(0.3139, -1.1382, -0.0179, -0.0002),
-            root_pitch=math.pi / 2,
-        ),
-    )
+        name="delfly", layout="x4", claps=True, stations=stations, wing_mass=0.29e-3, thickness=1e-5,
+        pitch_axis=0.0, dihedral=0.0, mass=17.4e-3, motion=WingMotion(flap, pitch, root_pitch=math.pi / 2),
+    )  # fmt: skip
 
 
 def blank_recording(condition: Condition, name: str = "blank", samples: int = 8) -> Recording:
@@ -168,16 +158,9 @@ def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator
     forces = forces * (1.0 + balance.scatter * _by_beat(at, balance.memory, rng)[:, None])
     measured = np.stack([_measured(force, k, balance, rng) for k, force in enumerate(forces.T)], axis=1)
     kept = _decimation_filtered(measured, balance.every)[lead : lead + samples : balance.every]
-    return Recording(
-        name=trial.name,
-        rig="wind_tunnel",
-        condition=trial.condition,
-        times=np.round(np.arange(len(kept)) * balance.every / balance.rate, 9),
-        markers=(),
-        values=np.round(kept, balance.decimals),
-        forces=("x", "z"),
-        mass=trial.mass,
-    )
+    times = np.round(np.arange(len(kept)) * balance.every / balance.rate, 9)
+    values = np.round(kept, balance.decimals)
+    return Recording(trial.name, "wind_tunnel", trial.condition, times, (), values, forces=("x", "z"), mass=trial.mass)
 
 
 def campaign(

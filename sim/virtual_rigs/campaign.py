@@ -113,19 +113,13 @@ def robird_wing() -> Wing:
     u = (np.arange(7) + 0.5) / 7
     span = y[0] + (y[-1] - y[0]) * (1 - (1 - u) ** 1.25)
     along = 1 - (1 - (0.03 + 0.94 * np.arange(7) / 6)) ** 1.3
-    markers = tuple(
-        Marker(
-            f"m{7 * i + k + 1:02d}",
-            (
-                round(float(np.interp(b, y, le) + s * np.interp(b, y, chord)), 5),
-                round(float(b), 5),
-                round(float(np.interp(b, y, thickness) / 2), 5),
-            ),
-            5e-5,
-        )
-        for i, b in enumerate(span)
-        for k, s in enumerate(along)
-    )
+    places = [
+        (np.interp(b, y, le) + s * np.interp(b, y, chord), b, np.interp(b, y, thickness) / 2)
+        for b in span
+        for s in along
+    ]
+    rounded = [(round(float(x), 5), round(float(b), 5), round(float(z), 5)) for x, b, z in places]
+    markers = tuple(Marker(f"m{k:02d}", place, 5e-5) for k, place in enumerate(rounded, 1))
     return Wing(
         name="robird",
         stations=stations,
@@ -189,14 +183,8 @@ def record(
     tracks[_gaps(tracks.shape[:2], tracking, rng)] = np.nan
     names = [m.name for m in model.wing.markers]
     visible = np.sort(rng.permutation(len(names))[: len(names) - LOST_MARKERS])
-    return Recording(
-        name_of(condition),
-        blank.rig,
-        condition,
-        np.round(times, 7),
-        tuple(names[k] for k in visible),
-        tracks[:, visible].reshape(frames, -1),
-    )
+    seen, values = tuple(names[k] for k in visible), tracks[:, visible].reshape(frames, -1)
+    return Recording(name_of(condition), blank.rig, condition, np.round(times, 7), seen, values)
 
 
 def _sample(tracks: Array, beats: Array) -> Array:
@@ -270,7 +258,6 @@ def write_campaign(
     dataset, truth = campaign(division=division, small=small, seed=seed, progress=progress)
     save_dataset(dataset, path)
     truth_path = path.with_name(path.stem + ".truth.json")
-    truth_path.write_text(
-        json.dumps({"division": division, "seed": seed, "genome": truth.as_dict()}, indent=2) + "\n", encoding="utf-8"
-    )
+    known = {"division": division, "seed": seed, "genome": truth.as_dict()}
+    truth_path.write_text(json.dumps(known, indent=2) + "\n", encoding="utf-8")
     return truth_path

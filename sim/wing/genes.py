@@ -100,20 +100,14 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
         weights = np.array([value(f"{prefix}_{k}") for k in range(1, QUARTERS + 1)])
         shares[prefix], places[prefix] = _distribute(structure, weights / weights.sum(axis=0))
     return Lanes(
-        stiffness=aligned(stiffness),
-        damping=aligned(damping),
+        stiffness=aligned(stiffness), damping=aligned(damping),
         coefficients=aligned([value(name) for name in ("L_a", "L_b", "ID_a", "ID_b")]),
-        lift_share=aligned(shares["L"]),
-        lift_x=aligned(places["L"]),
-        drag_share=aligned(shares["ID"]),
-        drag_x=aligned(places["ID"]),
+        lift_share=aligned(shares["L"]), lift_x=aligned(places["L"]),
+        drag_share=aligned(shares["ID"]), drag_x=aligned(places["ID"]),
         hinge=aligned(np.repeat([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, hinge.y, hinge.z], LANES).reshape(9, LANES)),
-        coupling=np.zeros((0, 9, LANES)),
-        pairs=np.zeros((0, 3), np.int64),
-        masses=np.zeros((0, 36, LANES)),
-        weighing=0,
-        laws=NO_LAWS,
-    )
+        coupling=np.zeros((0, 9, LANES)), pairs=np.zeros((0, 3), np.int64), masses=np.zeros((0, 36, LANES)),
+        weighing=0, laws=NO_LAWS,
+    )  # fmt: skip
 
 
 def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:

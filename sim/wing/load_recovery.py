@@ -44,22 +44,15 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
     _added_mass_loads(parts, scene, motion, sums)
     incidence = _incidence(scene.condition)
     return Outputs(
-        phase=np.arange(n) / n,
-        crossing=crossing,
+        phase=np.arange(n) / n, crossing=crossing,
         motors=(_motor(parts, motion, sums, 0), _motor(parts, motion, sums, 1)),
-        connectors=_named(structure, sums),
-        sections=_sections(structure, motion, sums),
-        strips=_strips(structure, sums),
-        air_wrench=sums.air_wrench,
-        held=sums.held,
-        held_lost=sums.held_lost,
-        held_stored=sums.held_stored,
+        connectors=_named(structure, sums), sections=_sections(structure, motion, sums),
+        strips=_strips(structure, sums), air_wrench=sums.air_wrench,
+        held=sums.held, held_lost=sums.held_lost, held_stored=sums.held_stored,
         lift_axis=np.array([-np.sin(incidence), 0.0, np.cos(incidence)]),
         thrust_axis=-np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
-        kinetic=sums.kinetic,
-        elastic=sums.stored.sum(axis=1) + sums.held_stored,
-        gravitational=sums.gravitational,
-    )
+        kinetic=sums.kinetic, elastic=sums.stored.sum(axis=1) + sums.held_stored, gravitational=sums.gravitational,
+    )  # fmt: skip
 
 
 class _Sums:

@@ -145,35 +145,19 @@ def station_motion(
     place, normal, chordwise, turning, rigid = _strips(structure, motion)
     rate = _derivative(place, frequency)
     through = rate - wind
-    across = (through * normal).sum(axis=-1)
-    series = np.stack(
-        [
-            across,
-            -(through * chordwise).sum(axis=-1),
-            (_derivative(rate, frequency) * normal).sum(axis=-1),
-            ((place - rigid) * normal).sum(axis=-1),
-            turning,
-        ]
-    )  # [5, n, S]
-    weights = _between(strip_middles(structure), stations)
-    velocity, forward, acceleration, deflection, pitch_rate = _resampled(
-        np.einsum("qns,js->qjn", series, weights), start, instants
-    )
-    edges = structure.planform.strips(structure.division)
-    mass = np.add.reduceat(structure.wiring.mass, structure.wiring.strip_start[:-1]) / np.diff(edges)
+    across, ahead = (through * normal).sum(axis=-1), -(through * chordwise).sum(axis=-1)
+    gaining = (_derivative(rate, frequency) * normal).sum(axis=-1)
+    bent = ((place - rigid) * normal).sum(axis=-1)
+    series = np.stack([across, ahead, gaining, bent, turning])  # [5, n, S]
+    at_stations = np.einsum("qns,js->qjn", series, _between(strip_middles(structure), stations))
+    velocity, forward, acceleration, deflection, pitch_rate = _resampled(at_stations, start, instants)
+    edges, phase = structure.planform.strips(structure.division), np.arange(instants) / instants
+    per_metre = np.add.reduceat(structure.wiring.mass, structure.wiring.strip_start[:-1]) / np.diff(edges)
+    mass = np.interp(stations, strip_middles(structure), per_metre)
+    chord = structure.planform.chord(edges[0] + stations * (edges[-1] - edges[0]))
+    air, airspeed = density(condition.pressure, condition.temperature), condition.airspeed
     return StationMotion(
-        stations,
-        np.arange(instants) / instants,
-        velocity,
-        forward,
-        acceleration,
-        deflection,
-        pitch_rate,
-        chord=structure.planform.chord(edges[0] + stations * (edges[-1] - edges[0])),
-        mass=np.interp(stations, strip_middles(structure), mass),
-        density=density(condition.pressure, condition.temperature),
-        airspeed=condition.airspeed,
-        flap_frequency=frequency,
+        stations, phase, velocity, forward, acceleration, deflection, pitch_rate, chord, mass, air, airspeed, frequency
     )
 
 

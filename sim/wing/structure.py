@@ -278,30 +278,19 @@ def _wiring(
     strip_area = np.add.reduceat(area, starts[:-1])
     markers = planform.wing.markers
     carriers = marker_carriers(planform, panels, markers)
+    lower = [*(work.position[j, i] for i, j in joined), *range(last, last + outer)]
+    upper = [*(work.position[i, j] for i, j in joined), *[-1] * outer]
     wiring = Wiring(
-        mass=np.array([part.mass for part in parts]),
-        inertia=np.array([part.inertia.ravel() for part in parts]),
-        first=first,
-        second=second,
-        lower=np.array([*(work.position[j, i] for i, j in joined), *range(last, last + outer)], np.int64),
-        upper=np.array([*(work.position[i, j] for i, j in joined), *[-1] * outer], np.int64),
-        driven=int(np.argmax(first >= n)),
-        a=np.array(base),
-        b=b,
-        order=work.order,
-        start=work.start,
-        below=work.below,
-        row=work.row,
-        products=work.products,
-        product_start=work.product_start,
-        fill=work.fill,
-        strip_start=starts,
-        weight=area / np.repeat(strip_area, division.bodies),
+        mass=np.array([part.mass for part in parts]), inertia=np.array([part.inertia.ravel() for part in parts]),
+        first=first, second=second, lower=np.array(lower, np.int64), upper=np.array(upper, np.int64),
+        driven=int(np.argmax(first >= n)), a=np.array(base), b=b,
+        order=work.order, start=work.start, below=work.below, row=work.row,
+        products=work.products, product_start=work.product_start, fill=work.fill,
+        strip_start=starts, weight=area / np.repeat(strip_area, division.bodies),
         centroid=np.array([(part.centroid - part.centre)[:2] for part in parts]),
-        geometry=_geometry(planform, division, strip_area),
+        geometry=_geometry(planform, division, strip_area), carrier=carriers,
         markers=np.array([np.array(m.position) - parts[k].centre for m, k in zip(markers, carriers, strict=True)]),
-        carrier=carriers,
-    )
+    )  # fmt: skip
     return wiring, work.position
 
 

@@ -90,18 +90,10 @@ class VehicleScene:
         flap = flap_series(setting.motion.flap, genes, count, n)
         if len(flap) < count:
             flap = np.repeat(flap, count, axis=0)
-        return cls(
-            setting,
-            genes,
-            flap,
-            airspeed=np.full(count, air.airspeed),
-            density=np.full(count, density(air.pressure, air.temperature)),
-            mass_factor=np.ones(count),
-            inflow=np.zeros((count, n)),
-            loading=np.ones((count, len(setting.r) + LANES)),
-            fling=np.zeros(count),
-            added=np.zeros((count, 2, n)),
-        )
+        airspeed, rho = np.full(count, air.airspeed), np.full(count, density(air.pressure, air.temperature))
+        loading, inflow, added = np.ones((count, len(setting.r) + LANES)), np.zeros((count, n)), np.zeros((count, 2, n))
+        one, none = np.ones(count), np.zeros(count)
+        return cls(setting, genes, flap, airspeed, rho, one, inflow, loading, none, added)
 
     def __len__(self) -> int:
         """Individuals."""
@@ -134,16 +126,8 @@ class VehicleScene:
     def angles(self) -> Angles:
         """Motion of the wings; the flap angle is read-only after the first access."""
         self.flap.setflags(write=False)
-        own = self.setting
-        return angles_of(
-            self.flap,
-            own.motion,
-            self.genes,
-            own.condition.flap_frequency,
-            own.instants,
-            own.vehicle.claps,
-            own.peel_width,
-        )
+        own, frequency = self.setting, self.setting.condition.flap_frequency
+        return angles_of(self.flap, own.motion, self.genes, frequency, own.instants, own.vehicle.claps, own.peel_width)
 
     # -- for effects of the loading ----------------------------------------------------------------------------
 

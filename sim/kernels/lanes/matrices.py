@@ -23,11 +23,54 @@ def load_vector(array: Array, n: int, k: int) -> Three:
 @inlined
 def load_matrix(array: Array, n: int) -> Nine:
     """The nine elements of row n."""
-    return (
-        load(array, n, 0), load(array, n, 1), load(array, n, 2),
-        load(array, n, 3), load(array, n, 4), load(array, n, 5),
-        load(array, n, 6), load(array, n, 7), load(array, n, 8),
-    )  # fmt: skip
+    return load_vector(array, n, 0) + load_vector(array, n, 3) + load_vector(array, n, 6)
+
+
+@inlined
+def store_vector(array: Array, n: int, k: int, x: Three) -> None:
+    """Put x into the elements k, k + 1, k + 2 of row n."""
+    store(array, n, k, x[0])
+    store(array, n, k + 1, x[1])
+    store(array, n, k + 2, x[2])
+
+
+@inlined
+def store_matrix(array: Array, n: int, A: Nine) -> None:
+    """Put A into row n."""
+    store_vector(array, n, 0, A[:3])
+    store_vector(array, n, 3, A[3:6])
+    store_vector(array, n, 6, A[6:])
+
+
+@inlined
+def add_wrench(wrench: Array, n: int, t: Three, f: Three) -> None:
+    """Add a wrench to that of body n."""
+    store_vector(wrench, n, 0, added(load_vector(wrench, n, 0), t))
+    store_vector(wrench, n, 3, added(load_vector(wrench, n, 3), f))
+
+
+@inlined
+def added(a: Three, b: Three) -> Three:
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inlined
+def less(a: Three, b: Three) -> Three:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inlined
+def negative(a: Three) -> Three:
+    """-a."""
+    return -a[0], -a[1], -a[2]
+
+
+@inlined
+def extended(a: Three, factor: float, b: Three) -> Three:
+    """a + ``factor`` b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @inlined
@@ -122,6 +165,12 @@ def cross(a: Three, b: Three) -> Three:
 
 
 @inlined
+def times_six(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
+    """M times (x, y)."""
+    return added(times(M[0], x), times(M[1], y)), added(times(M[2], x), times(M[3], y))
+
+
+@inlined
 def skew(e: Three) -> Nine:
     """e~."""
     zero = e[0] - e[0]
@@ -196,11 +245,7 @@ def co_stiffness_matrix(K: Nine) -> Nine:
 @inlined
 def _quarter(blocks: Array, m: int, at: int) -> Nine:
     """The quarter of block m that starts at element ``at``."""
-    return (
-        load(blocks, m, at), load(blocks, m, at + 1), load(blocks, m, at + 2),
-        load(blocks, m, at + 6), load(blocks, m, at + 7), load(blocks, m, at + 8),
-        load(blocks, m, at + 12), load(blocks, m, at + 13), load(blocks, m, at + 14),
-    )  # fmt: skip
+    return load_vector(blocks, m, at) + load_vector(blocks, m, at + 6) + load_vector(blocks, m, at + 12)
 
 
 @inlined
@@ -210,40 +255,20 @@ def load_block(blocks: Array, m: int) -> Six:
 
 
 @inlined
-def _add_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
-    """Add A to the quarter of block m that starts at element ``at``."""
-    store(blocks, m, at, load(blocks, m, at) + A[0])
-    store(blocks, m, at + 1, load(blocks, m, at + 1) + A[1])
-    store(blocks, m, at + 2, load(blocks, m, at + 2) + A[2])
-    store(blocks, m, at + 6, load(blocks, m, at + 6) + A[3])
-    store(blocks, m, at + 7, load(blocks, m, at + 7) + A[4])
-    store(blocks, m, at + 8, load(blocks, m, at + 8) + A[5])
-    store(blocks, m, at + 12, load(blocks, m, at + 12) + A[6])
-    store(blocks, m, at + 13, load(blocks, m, at + 13) + A[7])
-    store(blocks, m, at + 14, load(blocks, m, at + 14) + A[8])
-
-
-@inlined
 def add_to_block(blocks: Array, m: int, A: Six) -> None:
     """Add the 6 x 6 matrix of four to block m of ``blocks`` [NB, 36, W]."""
-    _add_quarter(blocks, m, 0, A[0])
-    _add_quarter(blocks, m, 3, A[1])
-    _add_quarter(blocks, m, 18, A[2])
-    _add_quarter(blocks, m, 21, A[3])
+    _set_quarter(blocks, m, 0, plus(_quarter(blocks, m, 0), A[0]))
+    _set_quarter(blocks, m, 3, plus(_quarter(blocks, m, 3), A[1]))
+    _set_quarter(blocks, m, 18, plus(_quarter(blocks, m, 18), A[2]))
+    _set_quarter(blocks, m, 21, plus(_quarter(blocks, m, 21), A[3]))
 
 
 @inlined
 def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
     """Put A into the quarter of block m that starts at element ``at``."""
-    store(blocks, m, at, A[0])
-    store(blocks, m, at + 1, A[1])
-    store(blocks, m, at + 2, A[2])
-    store(blocks, m, at + 6, A[3])
-    store(blocks, m, at + 7, A[4])
-    store(blocks, m, at + 8, A[5])
-    store(blocks, m, at + 12, A[6])
-    store(blocks, m, at + 13, A[7])
-    store(blocks, m, at + 14, A[8])
+    store_vector(blocks, m, at, A[:3])
+    store_vector(blocks, m, at + 6, A[3:6])
+    store_vector(blocks, m, at + 12, A[6:])
 
 
 @inlined

@@ -88,7 +88,7 @@ class Bench:
     @property
     def moment(self) -> Array:
         """Moment [3] on the second body."""
-        return self.work.more[self.at, :3, 0]
+        return np.asarray(self.work.more[self.at, :3, 0])
 
     @property
     def energy(self) -> float:

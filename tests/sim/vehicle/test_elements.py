@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from tests.oracles.armanini_2016 import forces
-from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, genome, plate, recording
+from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, angles, genome, plate, recording
 from wingfit.records import FourierFlap, FourierPitch
 from wingfit.sim.atmosphere import density
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
-from wingfit.sim.vehicle.motion import angles
 from wingfit.sim.vehicle.terms import PRESETS, TERMS, chosen
 
 RHO = density(101325.0, 293.15)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.oracles.armanini_2016 import split_cycle
-from tests.sim.vehicle.vehicles import DELFLY, PASSIVE
+from tests.sim.vehicle.vehicles import DELFLY, PASSIVE, angles
 from wingfit.records import FourierFlap, FourierPitch, SplitCycleFlap, WingMotion
-from wingfit.sim.vehicle.motion import angles, motion_genes, split_cycle_series
+from wingfit.sim.vehicle.motion import motion_genes, split_cycle_series
 
 SHARP = replace(DELFLY.motion, flap=SplitCycleFlap(0.34, 0.34, 0.35, smoothing=1e-3))
 

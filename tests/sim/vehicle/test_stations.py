@@ -9,10 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, genome, recording
+from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, angles, genome, recording
 from wingfit.sim.effects.ports.vehicle import Setting, VehicleScene
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
-from wingfit.sim.vehicle.motion import angles
 from wingfit.sim.vehicle.states import followed, separate, settled_inflow, steady_attachment
 from wingfit.sim.vehicle.stations import stations
 from wingfit.sim.vehicle.terms import PRESETS

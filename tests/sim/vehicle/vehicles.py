@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from wingfit.records import (
     ChordStation,
@@ -20,6 +22,7 @@ from wingfit.records import (
 )
 from wingfit.records.dataset import ForceAxis
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.vehicle.motion import Angles, angles_of, flap_series
 
 PASSIVE = PassivePitch(0.3139, -1.1382, -0.0179, -0.0002)
 DELFLY = Vehicle(
@@ -66,3 +69,17 @@ def genome(model: BladeElementWing, **values: float) -> list[float]:
     known = {gene.name: gene.nominal for gene in model.genes}
     assert set(values) <= set(known), sorted(set(values) - set(known))
     return list((known | values).values())
+
+
+def angles(
+    motion: WingMotion,
+    values: Mapping[str, npt.NDArray[np.float64]],
+    frequency: float,
+    instants: int,
+    claps: bool,
+    peel_width: float = 0.0,
+) -> Angles:
+    """The angles of a motion with ``values`` [B] of its genes; other parameters have the motion's own values."""
+    count = max((len(v) for v in values.values()), default=1)
+    series = flap_series(motion.flap, values, count, instants)
+    return angles_of(series, motion, values, frequency, instants, claps, peel_width)

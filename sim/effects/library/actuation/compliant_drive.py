@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.motor import AVERAGING, DROOP, FOLLOWING, HOLDING, MOTOR
@@ -24,16 +24,12 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.motor = motor
 
 
-EFFECT = Effect(
+_TEXT = "relative loss of motor speed per watt, for loads much faster than the beat"
+
+EFFECT = effect_of_drive(
     name="compliant_drive",
     title="Compliant drive",
-    family="actuation",
-    port="drive",
-    size=(
-        Parameter(
-            "d", "1/W", 0.0, 0.02, 0.005, "relative loss of motor speed per watt, for loads much faster than the beat"
-        ),
-    ),
+    size=(Parameter("d", "1/W", 0.0, 0.02, 0.005, _TEXT),),
     shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time constant with which the motor follows its load", scale="log"),),
     memory="the lead of the crank, its speed error and the mean load",
     law="tau' = sigma\nsigma' = -(d (P - P_m) + sigma) / t - (2 pi f / t) tau\nP_m' = 2 pi f (P - P_m)",

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
 HARMONICS = {2: 0.02, 3: 0.02, 4: 0.01}
 """Order and typical size of each; in a four-bar linkage with wrong lengths each is smaller than the one before."""
+_TEXT = "{} of harmonic {} of the drive over the first harmonic"
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
@@ -28,22 +29,13 @@ def _wing(scene: WingScene, values: Values) -> None:
         rods.series[k] += error * np.exp(-1j * k * np.array([[0.0], [lag]]))
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="drive_harmonics",
     title="Higher harmonics of the drive",
-    family="actuation",
-    port="drive",
     size=tuple(
-        Parameter(
-            f"{wave}{k}",
-            "1",
-            -5.0 * typical,
-            5.0 * typical,
-            typical,
-            f"{'cosine' if wave == 'cos' else 'sine'} of harmonic {k} of the drive over the first harmonic",
-        )
+        Parameter(f"{wave}{k}", "1", -5.0 * typical, 5.0 * typical, typical, _TEXT.format(what, k))
         for k, typical in HARMONICS.items()
-        for wave in ("cos", "sin")
+        for wave, what in (("cos", "cosine"), ("sin", "sine"))
     ),
     law="zeta' = zeta + a_1 (cos2 cos 2 psi + sin2 sin 2 psi + ... + cos4 cos 4 psi + sin4 sin 4 psi)",
     source="the leading errors of a four-bar linkage with wrong lengths (Freudenstein 1955)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -14,11 +14,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.lanes.hinge[6:9] += offset
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="hinge_offset",
     title="Hinge offset",
-    family="actuation",
-    port="drive",
     size=tuple(
         Parameter(axis, "m", -0.4, 0.4, 0.03, f"distance of the true axis {where} the described one", of="chord")
         for axis, where in (("y", "outboard of"), ("z", "above"))

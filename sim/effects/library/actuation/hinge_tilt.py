@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
+
+_FROM_TO = "from the described axis to the true one"
 
 
 def _wing(scene: WingScene, values: Values) -> None:
@@ -15,16 +17,11 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.lanes.hinge[:3] = tilt.apply(axes).T
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="hinge_tilt",
     title="Hinge tilt",
-    family="actuation",
-    port="drive",
     size=tuple(
-        Parameter(
-            axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation from the described axis to the true one"
-        )
-        for axis in "yz"
+        Parameter(axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation {_FROM_TO}") for axis in "yz"
     ),
     law="u = R(0, y, z) e_x,     R_rod = cos phi I + sin phi u~ + (1 - cos phi) u u^T",
     source="rotation about a tilted axis by the formula of Rodrigues (1840); the tilt is the rotation vector (0, y, z)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 
 
@@ -13,11 +13,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.rods.series[:, 1] *= np.exp(-1j * harmonics[:, None] * values["angle"])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="phase_lag_error",
     title="Phase lag error",
-    family="actuation",
-    port="drive",
     size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "drive phase of the rear rod's additional lag"),),
     law="zeta_rear(psi) = zeta(psi - lag - angle)",
     source="van der Grinten, section III-F: lags of 0, 3 and 7 degrees; shift theorem of Fourier series (Bracewell "

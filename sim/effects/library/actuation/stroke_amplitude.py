@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -15,11 +15,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.rods.series[1:] *= 1.0 + values["part"]
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="stroke_amplitude",
     title="Stroke amplitude error",
-    family="actuation",
-    port="drive",
     size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of the stroke; positive if larger than described"),),
     law="zeta(t) = zeta_0 + (1 + part) sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
     source="every harmonic of the flap angle but the mean is scaled, rates and accelerations with it; wing pitch that "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -15,11 +15,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.rods.series[0] += values["angle"]
 
 
-EFFECT = Effect(
+EFFECT = effect_of_drive(
     name="stroke_bias",
     title="Stroke bias",
-    family="actuation",
-    port="drive",
     size=(Parameter("angle", "rad", -0.2, 0.2, 0.03, "angle added to the flap angle at every phase"),),
     law="zeta(t) = zeta_0 + angle + sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
     source="mean flap angle, eta of Armanini et al. (2016), Eqs. 20-21",

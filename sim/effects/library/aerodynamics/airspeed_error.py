@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -15,11 +15,9 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     scene.airspeed *= 1.0 + values["part"]
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="airspeed_error",
     title="Airspeed error, tunnel blockage",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of airspeed; positive if faster than described"),),
     law="U' = U (1 + part)",
     source="solid and wake blockage raise the speed of a closed tunnel like this (Barlow, Rae and Pope 1999, ch. 10)",

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
@@ -64,11 +64,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["share"], values["rate"]], states=[seconds, seconds])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="circulation_lag",
     title="Lagged circulation (Wagner, Theodorsen)",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("share", "1", 0.0, 1.5, 1.0, "fraction of Wagner's deficit; 1 is a thin wing in plane flow"),),
     shape=(
         Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states as a fraction of that in plane flow", scale="log"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CHORD_Y, CHORD_Z, CIRCULATION, MEAN_CHORD, PITCH_RATE, PLACE_Y, PLACE_Z
@@ -63,16 +63,12 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"], sine, cosine, hinge])
 
 
-EFFECT = Effect(
+_TEXT = "C_F + C_R: circulation while the wings peel, in 1/2 c^2 (-theta_w')"
+
+EFFECT = effect_of_air(
     name="clap_and_peel",
     title="Clap and peel",
-    family="aerodynamics",
-    port="air",
-    size=(
-        Parameter(
-            "coefficient", "1", 0.0, 8.0, 2.7, "C_F + C_R: circulation while the wings peel, in 1/2 c^2 (-theta_w')"
-        ),
-    ),
+    size=(Parameter("coefficient", "1", 0.0, 8.0, 2.7, _TEXT),),
     shape=(
         Parameter("clearance", "rad", 0.0, 0.5, 0.0, "angle between wing and mirror plane at the top of the stroke"),
     ),

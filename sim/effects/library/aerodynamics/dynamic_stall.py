@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
@@ -62,11 +62,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values[name] for name in names], states=[_METRES, _METRES])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="dynamic_stall",
     title="Dynamic stall",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("share", "1", 0.0, 1.0, 0.5, "fraction of Kirchhoff's loss of lift; 1 is the full loss"),),
     shape=(
         Parameter("angle", "rad", 0.15, 1.2, 0.4, "angle of attack with steady flow separated from half of the chord"),

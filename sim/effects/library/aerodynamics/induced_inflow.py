@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import AREA, CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
@@ -100,11 +100,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, parameters, states=[_SCALE / scene.angular_rate] * 3, before=True)
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="induced_inflow",
     title="Induced inflow",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("share", "1", 0.0, 2.0, 0.5, "fraction of the thrust or lift that drives the inflow"),),
     shape=(Parameter("inertia", "1", 0.1, 3.0, 1.0, "mass of that air over the apparent mass of a disc", scale="log"),),
     memory="the mean inflow through the swept disc; of a wing in a tunnel the inflow of each strip",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import (
     ALPHA,
@@ -57,11 +57,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [*own, *scene.lanes.coefficients])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="leading_edge_vortex",
     title="Leading-edge vortex",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("part", "1", 0.0, 1.0, 0.5, "fraction of the affine coefficients that it replaces"),),
     shape=(
         Parameter("coefficient", "1", 0.5, 3.0, 1.58, "half the coefficient of the force on the wing at 90 deg"),

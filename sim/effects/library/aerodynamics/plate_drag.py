@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import DRAG_SLOPE, MEAN_CHORD, PITCH_RATE, PUSH_M, PUSH_N, STREAM_N
 from wingfit.sim.kernels.lanes.vector import load, magnitude, store
@@ -39,16 +39,12 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"]])
 
 
-EFFECT = Effect(
+_TEXT = "drag at 90 deg beyond that of the affine law; a plate has 1.2 to 2"
+
+EFFECT = effect_of_air(
     name="plate_drag",
     title="Normal plate drag",
-    family="aerodynamics",
-    port="air",
-    size=(
-        Parameter(
-            "coefficient", "1", 0.0, 2.0, 0.5, "drag at 90 deg beyond that of the affine law; a plate has 1.2 to 2"
-        ),
-    ),
+    size=(Parameter("coefficient", "1", 0.0, 2.0, 0.5, _TEXT),),
     power="dissipative",
     law="dF_n = coefficient (rho / 2) |w| w dx dy,     w = u_n + theta' x",
     source="Hoerner, Fluid-Dynamic Drag (1965), ch. III: plates across the stream and the cross-flow principle; of "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -13,16 +13,12 @@ def _change(scene: WingScene | VehicleScene, values: Values) -> None:
     scene.density = np.maximum(scene.density + values["density"], 0.0)
 
 
-EFFECT = Effect(
+_TEXT = "density beyond that at the described pressure and temperature"
+
+EFFECT = effect_of_air(
     name="residual_air",
     title="Residual air, density error",
-    family="aerodynamics",
-    port="air",
-    size=(
-        Parameter(
-            "density", "kg/m^3", -0.01, 0.1, 0.02, "density beyond that at the described pressure and temperature"
-        ),
-    ),
+    size=(Parameter("density", "kg/m^3", -0.01, 0.1, 0.02, _TEXT),),
     law="rho = max(p / (R T) + density, 0)",
     source="ideal gas law (Clapeyron 1834) with an error of density; never below zero",
     signature="aerodynamic forces in what is described as a vacuum; in open air, a proportional change of all of them",

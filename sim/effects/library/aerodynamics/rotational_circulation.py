@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, MEAN_CHORD, PITCH_RATE
 from wingfit.sim.kernels.lanes.vector import load, store
@@ -30,11 +30,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"]])
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="rotational_circulation",
     title="Rotational circulation",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("coefficient", "1", -10.0, 10.0, 6.2832, "rotational circulation; 2 pi for thin airfoils"),),
     law="Gamma_r = coefficient (3/4 - x_0) c^2 theta' / 2,     x_0 = 1/2",
     source="Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002): pi (3/4 - x_0) omega c^2; "

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE
@@ -54,11 +54,9 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     scene.load(lambda r: prandtl(span - r, values["spacing"][:, None]))
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="tip_loss",
     title="Tip loss",
-    family="aerodynamics",
-    port="air",
     size=(
         Parameter("spacing", "m", 0.0, 2.0, 0.5, "distance between vortex sheets of successive strokes", of="chord"),
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 REFERENCE_FREQUENCY = 12.0  # Hz: at this and the pitch below, coefficients equal their genes
@@ -32,11 +32,9 @@ def _vary(scene: VehicleScene, values: Values) -> None:
     scene.fling = scene.fling * fling
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="varying_coefficients",
     title="Coefficients that vary with flight",
-    family="aerodynamics",
-    port="air",
     size=(
         Parameter("lift_by_frequency", "1", -8.0, 8.0, -3.5, "relative change of C_l or K_l with f / 12 Hz"),
         Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "relative change of C_l or K_l with body pitch"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import MEAN_CHORD, PUSH_C, STREAM_C
 from wingfit.sim.kernels.lanes.vector import load, magnitude, root, store
@@ -38,16 +38,12 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [_BLASIUS * values["part"] * np.sqrt(kinematic / chord)])
 
 
-EFFECT = Effect(
+_TEXT = "skin friction over that of a smooth flat plate; above 1 for rough skin"
+
+EFFECT = effect_of_air(
     name="viscous_drag",
     title="Viscous drag",
-    family="aerodynamics",
-    port="air",
-    size=(
-        Parameter(
-            "part", "1", 0.0, 20.0, 2.0, "skin friction over that of a smooth flat plate; above 1 for rough skin"
-        ),
-    ),
+    size=(Parameter("part", "1", 0.0, 20.0, 2.0, _TEXT),),
     power="dissipative",
     law="F_c = part (rho / 2) S 2.656 (nu / c)^(1/2) |u_c|^(1/2) u_c",
     source="Blasius (1908): 1.328 / sqrt(Re) for each face of a plate; Schlichting (1979), Boundary-Layer Theory, ch. "

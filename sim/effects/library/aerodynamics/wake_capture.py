@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
@@ -72,11 +72,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["share"], values["chords"], recent], states=seconds, before=True)
 
 
-EFFECT = Effect(
+EFFECT = effect_of_air(
     name="wake_capture",
     title="Wake capture",
-    family="aerodynamics",
-    port="air",
     size=(Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the wake over the wing's earlier velocity"),),
     shape=(Parameter("chords", "1", 0.5, 10.0, 2.0, "chords travelled in which the wake decays", scale="log"),),
     memory="the velocity of the wake at each station or strip; of a strip also its own last velocity",

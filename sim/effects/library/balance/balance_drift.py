@@ -21,14 +21,10 @@ EFFECT = fault_of_forces(
     name="balance_drift",
     title="Balance drift",
     size=(
-        *(
-            Parameter(axis, "1/s", -0.1, 0.1, 0.005, f"steady drift along {axis}, in weights per second")
-            for axis in "xz"
-        ),
-        *(
-            Parameter(f"thermal_{axis}", "1", -0.3, 0.3, 0.01, f"force along {axis} after warming up, in weights")
-            for axis in "xz"
-        ),
+        Parameter("x", "1/s", -0.1, 0.1, 0.005, "steady drift along x, in weights per second"),
+        Parameter("z", "1/s", -0.1, 0.1, 0.005, "steady drift along z, in weights per second"),
+        Parameter("thermal_x", "1", -0.3, 0.3, 0.01, "force along x after warming up, in weights"),
+        Parameter("thermal_z", "1", -0.3, 0.3, 0.01, "force along z after warming up, in weights"),
     ),
     shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "time constant of warming", scale="log"),),
     memory="temperature of the gauges, from the first sample of a recording",

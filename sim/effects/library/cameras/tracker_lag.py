@@ -55,19 +55,12 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(response(values["smoothing"], order * step))
 
 
+_TEXT = "assumed noise of positions over that of accelerations times frame time squared"
+
 EFFECT = fault_of_tracks(
     name="tracker_lag",
     title="Tracker lag and smoothing",
-    size=(
-        Parameter(
-            "smoothing",
-            "1",
-            0.0,
-            100.0,
-            2.0,
-            "assumed noise of positions over that of accelerations times frame time squared",
-        ),
-    ),
+    size=(Parameter("smoothing", "1", 0.0, 100.0, 2.0, _TEXT),),
     memory="position, velocity and acceleration of each marker, from frame to frame",
     law="H = N / (N + (1 - alpha) d^3),     N = alpha d^2 + beta q d + gamma q (q + d / 2)\n"
     "2 (1 - s)^3 smoothing = s (1 + s),   alpha = 1 - s^2,   beta = 2 (1 - s)^2,   gamma = beta^2 / (2 alpha)",

@@ -13,19 +13,12 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.times = times + values["part"][:, None] * (times - start)
 
 
+_TEXT = "relative error of flap frequency over frame rate; positive if larger than recorded"
+
 EFFECT = fault_of_recordings(
     name="strobe_rate",
     title="Strobe-rate error",
-    size=(
-        Parameter(
-            "part",
-            "1",
-            -2e-3,
-            2e-3,
-            1e-4,
-            "relative error of flap frequency over frame rate; positive if larger than recorded",
-        ),
-    ),
+    size=(Parameter("part", "1", -2e-3, 2e-3, 1e-4, _TEXT),),
     law="t' = t + part (t - t_0)",
     source="aliased time: each frame is from another beat and adds to the error (van der Grinten, The bird is the "
     "word, Appendix A; Bendat and Piersol 2010, Random Data)",

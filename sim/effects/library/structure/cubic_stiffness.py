@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
@@ -62,16 +62,12 @@ def shape(change: Array) -> tuple[Array, Array]:
     return np.where(change > 0.0, change, -2.0 * _SOFTEST * level), level
 
 
-EFFECT = Effect(
+_TEXT = "relative growth of bending stiffness at a bend of one radian over the span"
+
+EFFECT = effect_of_joints(
     name="cubic_stiffness",
     title="Cubic bending stiffness",
-    family="structure",
-    port="connector",
-    size=(
-        Parameter(
-            "change", "1", -0.5, 10.0, 3.0, "relative growth of bending stiffness at a bend of one radian over the span"
-        ),
-    ),
+    size=(Parameter("change", "1", -0.5, 10.0, 3.0, _TEXT),),
     power="conservative",
     law="M = -E K s (u + c u^2 / 2) / (1 + c u)^2,     u = (s / p)^2\n"
     "change >= 0:   E = change,   c = 0\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 
@@ -30,11 +30,9 @@ def remaining(joints: Joints, values: Values) -> Array:
     return np.asarray(np.where(joints.along_span[:, None], in_a_row, abreast))
 
 
-EFFECT = Effect(
+EFFECT = effect_of_joints(
     name="damage",
     title="Local loss of stiffness",
-    family="structure",
-    port="connector",
     size=(Parameter("loss", "1", -2.0, 0.9, 0.5, "fraction of stiffness and damping lost; negative for a gain"),),
     shape=(
         Parameter("station", "1", 0.0, 1.0, 0.5, "place along the span, fraction of it from root to tip", place=True),

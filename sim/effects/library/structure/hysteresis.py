@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.lanewise import power
@@ -49,11 +49,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_connector_law(_law, parameters, axes=[0, 1], states=_METRES)
 
 
-EFFECT = Effect(
+EFFECT = effect_of_joints(
     name="hysteresis",
     title="Hysteresis",
-    family="structure",
-    port="connector",
     size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that yields, as a fraction of the elastic stiffness"),),
     shape=(
         Parameter("yield_angle", "rad", 0.01, 1.0, 0.1, "bend or twist over the span at which it yields", scale="log"),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Array, Effect, Parameter, Values
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1, magnitude, store, store0, store1
@@ -29,10 +29,8 @@ def _law(frame: Any, moment: int) -> None:
     stored, lost = load0(port.stored), load0(port.lost)
     for c in range(port.places):
         if port.parameters[4, c, 0] == 0.0:  # no rods here, in any individual
-            store1(rate, c, 0.0)
-            store1(decay, c, 0.0)
-            store1(drive, c, 0.0)
-            store1(pull, c, 0.0)
+            for array in (rate, decay, drive, pull):
+                store1(array, c, 0.0)
             continue
         spring, play, per = load(port.parameters, 0, c), load(port.parameters, 1, c), load(port.parameters, 2, c)
         shake = load(port.parameters, 3, c)
@@ -76,23 +74,15 @@ def of_rods(scene: WingScene) -> Array:
     return found
 
 
-EFFECT = Effect(
+_STICK = "stiffness of sticking rods over all bending stiffness of the rods"
+
+EFFECT = effect_of_joints(
     name="rod_slip",
     title="Rods that slip in their straw",
-    family="structure",
-    port="connector",
     size=(Parameter("friction", "rad", 0.0, 0.5, 0.05, "bend over the whole span at which the rods slip"),),
     shape=(
         Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bend over the whole span, to either side, with loose rods"),
-        Parameter(
-            "stick",
-            "1",
-            0.02,
-            1.0,
-            0.3,
-            "stiffness of sticking rods over all bending stiffness of the rods",
-            scale="log",
-        ),
+        Parameter("stick", "1", 0.02, 1.0, 0.3, _STICK, scale="log"),
     ),
     power="dissipative",
     memory="bending carried by friction, of each connector with rods",

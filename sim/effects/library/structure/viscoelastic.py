@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.contract import Parameter, Values, effect_of_joints
 from wingfit.sim.effects.ports.joints import Joints
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store, store0, store1
@@ -40,11 +40,9 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
 
 
-EFFECT = Effect(
+EFFECT = effect_of_joints(
     name="viscoelastic",
     title="Viscoelastic relaxation",
-    family="structure",
-    port="connector",
     size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that relaxes, as a fraction of the elastic stiffness"),),
     shape=(Parameter("tau", "s", 0.002, 0.5, 0.05, "relaxation time", scale="log"),),
     power="dissipative",
