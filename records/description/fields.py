@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import Annotated, Any, Literal, get_args
 
@@ -87,6 +87,11 @@ def tag_of(model: type[BaseModel]) -> str | None:
     """The value of the key ``kind`` that selects ``model`` in a union; None for a model without that key."""
     field = model.model_fields.get("kind")
     return str(get_args(field.annotation)[0]) if field else None
+
+
+def one_or_each(value: Any) -> str:
+    """Tag of a noise level in a union: one number for all channels, or a mapping with one for each."""
+    return "each" if isinstance(value, Mapping) else "one"
 
 
 def whole(value: Any) -> Any:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, StrictBool, Tag
 
@@ -107,11 +106,9 @@ class AxesFile(Strict):
     z: Deviation | None = None
 
 
-def _noise_kind(value: Any) -> str:
-    return "per_axis" if isinstance(value, Mapping) else "one"
-
-
-Noise = Annotated[Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")], Discriminator(_noise_kind)]
+Noise = Annotated[
+    Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("each")], Discriminator(fields.one_or_each)
+]
 
 
 class VehicleRecordingFile(Strict):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -112,14 +111,10 @@ class WingFile(Strict):
     estimates: fields.Estimates
 
 
-def _noise_kind(value: Any) -> str:
-    return "per_marker" if isinstance(value, Mapping) else "one"
-
-
 Noise = Annotated[
     Annotated[Deviation, Tag("one")]
-    | Annotated[dict[fields.Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("per_marker")],
-    Discriminator(_noise_kind),
+    | Annotated[dict[fields.Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("each")],
+    Discriminator(fields.one_or_each),
 ]
 
 

@@ -10,21 +10,12 @@ import zlib
 from collections.abc import Sequence
 
 from wingfit.records.dataset import Dataset
-from wingfit.records.errors import Faults, fail
+from wingfit.records.errors import Faults, check_most, fail
 from wingfit.records.files.folder import DESCRIPTION, contents, read_files
 from wingfit.records.limits import MAX_COMPRESSION_RATIO, MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB, RATIO_FREE_BYTES
 
-_BROKEN = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    RuntimeError,
-    ValueError,
-    OverflowError,
-    IndexError,
-)
+# NotImplementedError is a RuntimeError.
+_BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, OverflowError, IndexError)
 _METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 _JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\._)")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -75,19 +66,12 @@ def write_zip(dataset: Dataset) -> bytes:
 
 
 def _check_entries(entries: Sequence[zipfile.ZipInfo], packed: int, label: str) -> None:
-    if len(entries) > MAX_ENTRIES:
-        message = f"has {len(entries)} entries; at most {MAX_ENTRIES} are read: is this the right file?"
-        raise fail(label, len(entries), message)
+    check_most(label, "has", len(entries), MAX_ENTRIES, "entries", "is this the right file?")
     expanded = sum(entry.file_size for entry in entries)
-    if expanded > MAX_EXPANDED_BYTES:
-        message = f"unpacks to {expanded / MIB:.0f} MiB; at most {MAX_EXPANDED_BYTES // MIB} MiB are read: split it"
-        raise fail(label, expanded, message)
-    if expanded > RATIO_FREE_BYTES and expanded > MAX_COMPRESSION_RATIO * packed:
-        message = (
-            f"unpacks to {expanded / packed:.0f} times its size; at most {MAX_COMPRESSION_RATIO} times are "
-            "read: zip with less compression, or upload NetCDF"
-        )
-        raise fail(label, expanded, message)
+    check_most(label, "unpacks to", expanded / MIB, MAX_EXPANDED_BYTES / MIB, "MiB", "split it")
+    if expanded > RATIO_FREE_BYTES:
+        remedy = "zip with less compression, or upload NetCDF"
+        check_most(label, "unpacks to", expanded / packed, MAX_COMPRESSION_RATIO, "times its size", remedy)
     faults, seen = Faults(), set[str]()
     for entry in entries:
         problem = _entry_problem(entry) or ("appears twice in the zip; keep one" if entry.filename in seen else None)

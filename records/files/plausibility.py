@@ -23,15 +23,11 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
-        faults.add(
-            where,
-            frames,
-            f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it",
-        )
-    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= limits.MAX_MARKERS:
-        faults.add(
-            where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {limits.MAX_MARKERS}"
-        )
+        message = f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it"
+        faults.add(where, frames, message)
+    markers = len(recording.markers)
+    if isinstance(rig, Wing) and not 1 <= markers <= limits.MAX_MARKERS:
+        faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
     increasing = _check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:_SHOWN]:
@@ -74,13 +70,11 @@ def _check_positions(
     limit = limits.IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
         far = distance / wing.span
-        unit = (
-            "millimetres" if far > 100 else "centimetres" if far > 10 else "feet, or a frame whose origin is elsewhere,"
-        )
+        elsewhere = "feet, or a frame whose origin is elsewhere,"
+        unit = "millimetres" if far > 100 else "centimetres" if far > 10 else elsewhere
         message = (
-            f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span "
-            f"(limit {limit:.4g} m); that looks like {unit} in columns named _m: "
-            "convert to metres, in the wing frame"
+            f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span (limit "
+            f"{limit:.4g} m); that looks like {unit} in columns named _m: convert to metres, in the wing frame"
         )
         faults.add(where, f"{distance:.4g}", message)
         return
