@@ -10,12 +10,11 @@ from scipy.spatial.transform import Rotation
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
+# Markers whose second principal extent is below this fraction of the first count as collinear: no attitude.
 _FLAT = 0.02
-"""Markers whose second principal extent is below this fraction of the first count as collinear: no attitude."""
 _OUTLIER = 8.0
 _PASSES = 3
-_WRONG_SCALE = 1.3
-"""Beyond this ratio of distances between tracks and body file, the units or the markers must differ."""
+_WRONG_SCALE = 1.3  # beyond this ratio of distances between tracks and body file, the units or the markers must differ
 _OFF_SCALE = 1.05
 _LARGEST = 10.0
 

@@ -52,18 +52,12 @@ class Wish(StrEnum):
 class Instruction(StrEnum):
     """What the caller of :func:`step` must do after it has stored the new job."""
 
-    ENQUEUE = "ENQUEUE"
-    """Put the job at the end of the queue."""
-    DEQUEUE = "DEQUEUE"
-    """Take the job out of the queue."""
-    RUN = "RUN"
-    """Start, or continue from the last stored generation."""
-    STORE = "STORE"
-    """Store the generation that came with the event; in the same transaction as the job."""
-    STOP = "STOP"
-    """The runner stops; without this instruction it continues with the next generation."""
-    PUBLISH = "PUBLISH"
-    """The state changed: notify subscribers."""
+    ENQUEUE = "ENQUEUE"  # put the job at the end of the queue
+    DEQUEUE = "DEQUEUE"  # take the job out of the queue
+    RUN = "RUN"  # start, or continue from the last stored generation
+    STORE = "STORE"  # store the generation that came with the event; in the same transaction as the job
+    STOP = "STOP"  # the runner stops; without this instruction it continues with the next generation
+    PUBLISH = "PUBLISH"  # the state changed: notify subscribers
 
 
 @dataclass(frozen=True)
@@ -261,8 +255,7 @@ def _given_up(job: Job) -> str:
     )
 
 
-ETA_MEMORY = 0.2
-"""Fraction of the elapsed time after which the weight of old progress has fallen by a factor e."""
+ETA_MEMORY = 0.2  # fraction of the elapsed time after which the weight of old progress has fallen by a factor e
 ETA_LONGEST = 1e9  # s, thirty years: larger estimates are dropped
 
 

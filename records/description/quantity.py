@@ -13,8 +13,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from wingfit.records.errors import shown
 from wingfit.records.units import number_text
 
-FAULT = "wingfit"
-"""Type of the pydantic errors whose message is final."""
+FAULT = "wingfit"  # type of the pydantic errors whose message is final
 
 
 def fault(message: str) -> PydanticCustomError:

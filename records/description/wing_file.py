@@ -83,16 +83,12 @@ class FourBarFile(Strict):
     def _crank_turns(self) -> FourBarFile:
         others = sorted((self.ground_m, self.coupler_m, self.rocker_m))
         if self.crank_m >= others[0]:
-            raise fault(
-                f"crank_m is {self.crank_m} m; it must be below the shortest of the other links, "
-                f"{others[0]} m, for the crank to turn fully (Grashof): shorten it or check the links"
-            )
+            rule = f"it must be below the shortest of the other links, {others[0]} m, for the crank to turn fully"
+            raise fault(f"crank_m is {self.crank_m} m; {rule} (Grashof): shorten it or check the links")
         longest, rest = self.crank_m + others[2], others[0] + others[1]
         if longest >= rest:
-            raise fault(
-                f"shortest + longest link is {longest} m; it must be below the sum of the other two, "
-                f"{rest} m, for the crank to turn fully (Grashof): check the lengths"
-            )
+            rule = f"it must be below the sum of the other two, {rest} m, for the crank to turn fully"
+            raise fault(f"shortest + longest link is {longest} m; {rule} (Grashof): check the lengths")
         return self
 
 

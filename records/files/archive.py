@@ -21,36 +21,24 @@ _JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-class ZipFiles:
-    """Files in a zip; names are relative to the top-level folder if there is only one."""
-
-    def __init__(self, data: bytes, label: str) -> None:
-        self.label = label
-        try:
-            self._zip = zipfile.ZipFile(io.BytesIO(data))
-        except _BROKEN as error:
-            raise fail(label, None, f"not a readable zip: {error}; it may be cut off: zip and upload again") from None
-        entries = self._zip.infolist()
-        _check_entries(entries, len(data), label)
-        files = [entry for entry in entries if not entry.is_dir() and not _JUNK.search(entry.filename)]
-        prefix = _prefix([entry.filename for entry in files])
-        self._entries = {entry.filename.removeprefix(prefix): entry for entry in files}
-
-    def names(self) -> list[str]:
-        """Names of all files."""
-        return list(self._entries)
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError if the archive is damaged."""
-        try:
-            return self._zip.read(self._entries[name])
-        except _BROKEN as error:
-            raise fail(f"{self.label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
-
-
 def read_zip(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a zip."""
-    return read_files(ZipFiles(data, label))
+    """Read a dataset from the bytes of a zip; names are relative to the top-level folder if there is only one."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except _BROKEN as error:
+        raise fail(label, None, f"not a readable zip: {error}; it may be cut off: zip and upload again") from None
+    _check_entries(archive.infolist(), len(data), label)
+    files = [entry for entry in archive.infolist() if not entry.is_dir() and not _JUNK.search(entry.filename)]
+    prefix = _prefix([entry.filename for entry in files])
+    entries = {entry.filename.removeprefix(prefix): entry for entry in files}
+
+    def read(name: str) -> bytes:
+        try:
+            return archive.read(entries[name])
+        except _BROKEN as error:
+            raise fail(f"{label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
+
+    return read_files(label, list(entries), read)
 
 
 def write_zip(dataset: Dataset) -> bytes:

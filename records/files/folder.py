@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 from wingfit.records.dataset import Dataset
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
@@ -20,54 +20,30 @@ DESCRIPTION = "dataset.yaml"
 RECORDINGS = "recordings"
 
 
-class Files(Protocol):
-    """A folder or archive."""
+def read_folder(path: Path) -> Dataset:
+    """Read the dataset in a folder; DatasetError lists its errors."""
+    top = [file.name for file in path.iterdir() if file.is_file()]
+    names = top + [f"{RECORDINGS}/{file.name}" for file in (path / RECORDINGS).glob("*") if file.is_file()]
+    check_most(str(path), "holds", len(names), MAX_ENTRIES, "files", "is this the right folder?")
 
-    @property
-    def label(self) -> str:
-        """Its name in messages."""
-        ...
-
-    def names(self) -> list[str]:
-        """Names of all files, folders separated by '/'."""
-        ...
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file."""
-        ...
-
-
-class FolderFiles:
-    """Files in a folder."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.label = str(path)
-
-    def names(self) -> list[str]:
-        """Files that may belong to a dataset: those of the folder and of ``recordings``."""
-        top = [path.name for path in self.path.iterdir() if path.is_file()]
-        inner = [f"{RECORDINGS}/{p.name}" for p in (self.path / RECORDINGS).glob("*") if p.is_file()]
-        names = top + inner
-        check_most(self.label, "holds", len(names), MAX_ENTRIES, "files", "is this the right folder?")
-        return names
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError if it is too large or not readable."""
-        path = self.path / name
+    def read(name: str) -> bytes:
         try:
-            check_most(name, "is", path.stat().st_size / MIB, MAX_EXPANDED_BYTES / MIB, "MiB", "split it")
-            return path.read_bytes()
+            check_most(name, "is", (path / name).stat().st_size / MIB, MAX_EXPANDED_BYTES / MIB, "MiB", "split it")
+            return (path / name).read_bytes()
         except OSError as error:
             raise fail(name, None, f"cannot be read: {error.strerror}; check its permissions") from None
 
+    return read_files(str(path), names, read)
 
-def read_files(files: Files) -> Dataset:
-    """Read a dataset; DatasetError lists its errors."""
-    names = files.names()
+
+def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> Dataset:
+    """Read a dataset from files called ``names``, folders separated by "/"; DatasetError lists its errors.
+
+    ``label`` is the name of the folder or archive in messages.
+    """
     if DESCRIPTION not in names:
-        raise fail(files.label, None, _no_description(names))
-    document = read_yaml(files.read(DESCRIPTION), DESCRIPTION)
+        raise fail(label, None, _no_description(names))
+    document = read_yaml(contents_of(DESCRIPTION), DESCRIPTION)
     markers = document.names("wing", "markers")
     listed = document.names("recordings")
 
@@ -77,8 +53,8 @@ def read_files(files: Files) -> Dataset:
             place = ("recordings", listed.index(name), "name") if name in listed else ("recordings",)
             raise fail(document.where(place), name, _no_samples(file, names))
         if model_of(document.data) is VehicleDatasetFile:
-            return read_forces(files.read(file), file, room)
-        return read_tracks(files.read(file), file, markers, room)
+            return read_forces(contents_of(file), file, room)
+        return read_tracks(contents_of(file), file, markers, room)
 
     faults, dataset = Faults(), None
     try:

@@ -225,10 +225,8 @@ def _check_storage(variable: Any, where: str) -> None:
     pipeline = variable.id.get_create_plist()
     filters = [pipeline.get_filter(index)[0] for index in range(pipeline.get_nfilters())]
     if set(filters) - FILTERS or len(set(filters)) < len(filters):
-        message = (
-            f"{variable.name} is packed by the HDF5 filters {filters}; pack it by deflate alone, once, or not at all"
-        )
-        raise fail(where, str(filters), message)
+        remedy = "pack it by deflate alone, once, or not at all"
+        raise fail(where, str(filters), f"{variable.name} is packed by the HDF5 filters {filters}; {remedy}")
 
 
 def _names(variable: Any, name: str, where: str, limit: Limit) -> tuple[str, ...]:

@@ -115,8 +115,7 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
         which = " and ".join(sizes) + (" are" if len(sizes) > 1 else " is")
         faults.add(where, 0.0, f"{which} zero throughout; check the channel, or leave the recording out")
         return
-    mass = vehicle.mass if recording.mass is None else recording.mass
-    weight = mass * STANDARD_GRAVITY
+    weight = STANDARD_GRAVITY * (vehicle.mass if recording.mass is None else recording.mass)
     largest, force = max(sizes.items(), key=lambda item: item[1])
     low, high = limits.NEGLIGIBLE_WEIGHTS * weight, limits.IMPLAUSIBLE_WEIGHTS * weight
     if not low <= force <= high:
@@ -173,8 +172,5 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
         )
         faults.add(where, low_pass.cutoff, message)
     if low_pass is not None and low_pass.cutoff >= 0.5 / step:
-        message = (
-            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "
-            "Hz: check both, or omit low_pass"
-        )
-        faults.add(where, low_pass.cutoff, message)
+        rule = f"it must be below half the sampling rate, {0.5 / step:.6g} Hz: check both, or omit low_pass"
+        faults.add(where, low_pass.cutoff, f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; {rule}")

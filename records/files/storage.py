@@ -9,7 +9,7 @@ from pathlib import Path
 from wingfit.records.dataset import Dataset
 from wingfit.records.errors import check_most, fail, shown
 from wingfit.records.files.archive import read_zip, write_zip
-from wingfit.records.files.folder import FolderFiles, read_files, write_folder
+from wingfit.records.files.folder import read_folder, write_folder
 from wingfit.records.files.netcdf import read_netcdf, write_netcdf
 from wingfit.records.limits import MAX_ARCHIVE_BYTES, MIB
 
@@ -29,9 +29,9 @@ def load_dataset(path: str | Path) -> Dataset:
     """Read the folder, zip or NetCDF file at ``path``; DatasetError lists its errors."""
     path = Path(path)
     if path.is_dir():
-        return read_files(FolderFiles(path))
+        return read_folder(path)
     if path.name == "dataset.yaml" and path.is_file():
-        return read_files(FolderFiles(path.parent))
+        return read_folder(path.parent)
     try:
         _check_size(path.stat().st_size, str(path))
         return load_archive(path.read_bytes(), path.name)
