@@ -253,17 +253,13 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
     rest = centre - high.apply(centre, 0)
     taps = -high.taps[0]
     taps[high.reach] += 1
-    expected = deviation**2 * float(taps @ _toeplitz(correlation, len(taps)) @ taps) * _centre_gain(found, body)
+    # Variance of a coordinate of the centre of mass over that of a marker, mean over axes and frames.
+    gain = float(np.mean(np.sum(_of_centre(found, body)[used, :3] ** 2, axis=2)))
+    expected = deviation**2 * float(taps @ _toeplitz(correlation, len(taps)) @ taps) * gain
     if not np.isfinite(rest).any():
         return MarkerNoise(deviation, correlation, 1.0)
     common = float(np.sqrt(np.nanmean(rest**2) / max(expected, 1e-30)))
     return MarkerNoise(deviation, correlation, max(1.0, common))
-
-
-def _centre_gain(found: Poses, body: Body) -> float:
-    """Variance of a coordinate of the centre of mass over that of a marker, mean over axes and frames."""
-    G = _of_centre(found, body)[np.isfinite(found.position[:, 0])]
-    return float(np.mean(np.sum(G[:, :3] ** 2, axis=2)))
 
 
 def _of_centre(found: Poses, body: Body) -> Array:

@@ -69,7 +69,8 @@ class PeriodicFit:
     @property
     def passed(self) -> Array:
         """[4] RMS over the beat of the noise in value and derivatives."""
-        return np.array([_rms(self.error_at(_phases(), d)) for d in range(DERIVATIVES + 1)])
+        errors = np.stack([self.error_at(_phases(), d) for d in range(DERIVATIVES + 1)])
+        return np.asarray(np.sqrt(np.mean(errors**2, axis=1)))
 
     @property
     def error(self) -> Array:
@@ -251,7 +252,3 @@ def _fall_off(k: Index, amplitude: Array, error: Array) -> tuple[float, float] |
 
 def _phases() -> Array:
     return np.arange(_GRID) / _GRID
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -167,7 +167,8 @@ def wing_motion(
     if closed is None:
         closed = float(flap.at(np.array(closest(flap)[0])))
         remarks.append("the zero of the flap angle was set where the wings are closest; give the dihedral if known")
-    flap = _lowered(flap, closed)
+    mean = np.eye(1, len(flap.coefficients))[0]
+    flap = replace(flap, coefficients=flap.coefficients - closed * mean)
     twist = fit_periodic(angles.times, angles.pitch, found.hertz, harmonics, flap.start)
     remarks += [f"wing pitch: {r}" for r in twist.remarks]
     law = pitch_law(angles.times, angles.pitch, flap) if pitch == "passive" else None
@@ -314,12 +315,6 @@ def beats_of(t_star: Array) -> Array:
     if not np.isfinite(t_star).all():
         raise ValueError("t_star has empty cells; give every row its phase")
     return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))
-
-
-def _lowered(flap: PeriodicFit, by: float) -> PeriodicFit:
-    coefficients = flap.coefficients.copy()
-    coefficients[0] -= by
-    return replace(flap, coefficients=coefficients)
 
 
 def _direction(points: Array) -> Array:

@@ -31,19 +31,15 @@ def main(words: list[str] | None = None) -> None:
 def check(host: str, port: int, node: str | None = None) -> None:
     """SystemExit, with the reason, unless the head at ``host``:``port`` counts ``node`` among its living nodes."""
     try:
-        head, own = _addresses(host, port)
+        with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
+            # IP addresses of the head and of this machine, as the two see each other.
+            head, own = connection.getpeername()[0], connection.getsockname()[0]
     except OSError as error:
         raise SystemExit(f"no Ray head answers at {host}:{port}: {error}") from error
     alive = _living_nodes(f"{head}:{port}")
     if (node or own) not in alive:
         living = ", ".join(sorted(alive)) or "none"
         raise SystemExit(f"no living node of the cluster has the address {node or own}; living: {living}")
-
-
-def _addresses(host: str, port: int) -> tuple[str, str]:
-    """IP addresses of the head and of this machine, as the two see each other."""
-    with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
-        return connection.getpeername()[0], connection.getsockname()[0]
 
 
 def _living_nodes(address: str) -> set[str]:
