@@ -273,6 +273,6 @@ def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
     if now <= 0.0:
         return None
     weights = [math.exp((t - now) / (ETA_MEMORY * now)) for t, _ in points]
-    (spread, rise), _ = np.cov(np.transpose(points), aweights=weights)
-    seconds = float((1.0 - progress) * spread / rise) if rise > 0.0 else math.inf
+    (spread, rise), _ = np.cov(np.transpose(points), aweights=weights, ddof=0).tolist()
+    seconds = (1.0 - progress) * spread / rise if rise > 0.0 else math.inf
     return seconds if seconds < ETA_LONGEST else None
