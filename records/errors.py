@@ -81,6 +81,13 @@ def fail(where: str, value: object, message: str) -> DatasetError:
     return DatasetError([Fault(where, shown(value), message)])
 
 
+def check_most(where: str, what: str, found: float, most: float, unit: str, remedy: str) -> None:
+    """DatasetError unless ``found`` is at most ``most``, for messages such as "has 5 rows; at most 4 rows are read"."""
+    if found > most:
+        number = f"{round(found, 1):.15g}"
+        raise fail(where, number, f"{what} {number} {unit}; at most {most:.9g} {unit} are read: {remedy}".lstrip())
+
+
 def shown(value: object) -> str | None:
     """``value`` as short text for a message."""
     if value is None:

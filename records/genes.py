@@ -39,18 +39,16 @@ class Gene:
         if not self.lower < self.upper:
             raise ValueError(f"gene '{self.name}': lower bound {self.lower} must be below upper bound {self.upper}")
         if self.scale == "log" and self.lower <= 0:
-            raise ValueError(
-                f"gene '{self.name}': a log-scaled gene needs a positive lower bound, got {self.lower} {self.unit}"
-            )
+            message = f"a log-scaled gene needs a positive lower bound, got {self.lower} {self.unit}"
+            raise ValueError(f"gene '{self.name}': {message}")
         self.check(self.nominal)
 
     def check(self, value: float) -> None:
         """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
         if not (math.isfinite(value) and self.lower <= value <= self.upper):
             unit = "" if self.unit == "1" else f" {self.unit}"
-            raise ValueError(
-                f"gene '{self.name}' is {value:g}{unit}; it must lie in [{self.lower:g}, {self.upper:g}]{unit}"
-            )
+            bounds = f"[{self.lower:g}, {self.upper:g}]{unit}"
+            raise ValueError(f"gene '{self.name}' is {value:g}{unit}; it must lie in {bounds}")
 
     def to_unit(self, value: ArrayLike) -> Float[Array, "*B"]:
         """Map values to [0, 1], logarithmically for a log-scaled gene."""
@@ -106,10 +104,8 @@ class Genome:
     def normalised(self) -> dict[str, float]:
         """Values by name, with every share group divided by its sum: the values that the model uses."""
         sums: dict[str, float] = {}
-        for gene, value in zip(self.genes, self.values, strict=True):
+        pairs = list(zip(self.genes, self.values, strict=True))
+        for gene, value in pairs:
             if gene.share_of:
                 sums[gene.share_of] = sums.get(gene.share_of, 0.0) + value
-        return {
-            gene.name: value / sums[gene.share_of] if gene.share_of else value
-            for gene, value in zip(self.genes, self.values, strict=True)
-        }
+        return {gene.name: value / sums[gene.share_of] if gene.share_of else value for gene, value in pairs}

@@ -47,7 +47,8 @@ def from_si(value: float, unit: Unit = SI) -> Decimal:
     exact = _LONG.divide(_LONG.subtract(Decimal(value), unit.offset), unit.factor)
     candidates = (Decimal(0), Decimal("-0"), *(Context(prec=n).plus(exact) for n in range(1, 40)))
     # Without a candidate only for temperatures next to absolute zero, which the format refuses.
-    return next((candidate for candidate in candidates if _same(to_si(candidate, unit), value)), exact)
+    bits = struct.pack("<d", value)  # unlike ==, they tell -0 from 0
+    return next((candidate for candidate in candidates if struct.pack("<d", to_si(candidate, unit)) == bits), exact)
 
 
 def number_text(value: Decimal) -> str:
@@ -59,7 +60,3 @@ def number_text(value: Decimal) -> str:
     if exponent and "." not in mantissa:
         mantissa += ".0"
     return f"{mantissa}e{exponent}" if exponent else mantissa
-
-
-def _same(a: float, b: float) -> bool:
-    return struct.pack("<d", a) == struct.pack("<d", b)

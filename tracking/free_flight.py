@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import interpolate, linalg
+from scipy.spatial.transform import Rotation
 
 from wingfit.records import Condition, LowPass, Recording
 from wingfit.records.array_types import Array, Index, Mask
@@ -108,11 +109,8 @@ def free_flight(
         remarks.append(f"{len(bridges)} frames without a pose were interpolated (gaps of at most {longest} frames)")
     smooth = [windows.apply(filled, d) for d in range(3)]
     if not np.isfinite(smooth[2]).any():
-        needed = 2 * windows.reach + 1
-        raise ValueError(
-            f"{len(times)} frames hold no {needed} in a row with a pose, which the filter needs: raise the cut-off, "
-            "record longer, or keep the markers in view"
-        )
+        message = f"{len(times)} frames hold no {2 * windows.reach + 1} in a row with a pose, which the filter needs"
+        raise ValueError(f"{message}: raise the cut-off, record longer, or keep the markers in view")
     speed = float(np.linalg.norm(np.nanmean(smooth[1][:, :3], axis=0)))
     if speed > _MAX_SPEED:
         raise ValueError(
@@ -189,16 +187,12 @@ def _even_step(times: Array) -> float:
 
 def _about(found: Poses) -> list[str]:
     """Remarks on frames without a pose and on outliers."""
-    remarks, missing = [], int(np.isnan(found.position[:, 0]).sum())
-    if missing:
-        remarks.append(
-            f"{missing} of {len(found.position)} frames have no pose: fewer than 3 markers, or markers on one line"
-        )
-    if found.rejected:
-        remarks.append(
-            f"{found.rejected} samples were excluded: they lie far from the rigid body (swapped or loose markers?)"
-        )
-    return remarks
+    frames, missing, rejected = len(found.position), int(np.isnan(found.position[:, 0]).sum()), found.rejected
+    remarks = {
+        f"{missing} of {frames} frames have no pose: fewer than 3 markers, or markers on one line": missing,
+        f"{rejected} samples were excluded: they lie far from the rigid body (swapped or loose markers?)": rejected,
+    }
+    return [remark for remark, count in remarks.items() if count]
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,16 +235,8 @@ def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
     size = np.linalg.norm(smooth[0][:, 3:], axis=1, keepdims=True)
     q, dq, ddq = (s[:, 3:] / size for s in smooth)
     w, v = q[:, :1], q[:, 1:]
-    x, y, z = v.T
-    a = w[:, 0]
-    R = np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - a * z), 2 * (x * z + a * y)], axis=-1),
-            np.stack([2 * (x * y + a * z), 1 - 2 * (x * x + z * z), 2 * (y * z - a * x)], axis=-1),
-            np.stack([2 * (x * z - a * y), 2 * (y * z + a * x), 1 - 2 * (x * x + y * y)], axis=-1),
-        ],
-        axis=-2,
-    )
+    R, known = np.full((len(q), 3, 3), np.nan), np.isfinite(w[:, 0])
+    R[known] = Rotation.from_quat(q[known], scalar_first=True).as_matrix()
     # omega = 2 conj(q) dq/dt; the derivative of conj(q) adds only to the scalar part.
     rate, turning = (2 * (w * d[:, 1:] - d[:, :1] * v - np.cross(v, d[:, 1:])) for d in (dq, ddq))
     return R, rate, turning
@@ -267,17 +253,13 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
     rest = centre - high.apply(centre, 0)
     taps = -high.taps[0]
     taps[high.reach] += 1
-    expected = deviation**2 * float(taps @ _toeplitz(correlation, len(taps)) @ taps) * _centre_gain(found, body)
+    # Variance of a coordinate of the centre of mass over that of a marker, mean over axes and frames.
+    gain = float(np.mean(np.sum(_of_centre(found, body)[used, :3] ** 2, axis=2)))
+    expected = deviation**2 * float(taps @ _toeplitz(correlation, len(taps)) @ taps) * gain
     if not np.isfinite(rest).any():
         return MarkerNoise(deviation, correlation, 1.0)
     common = float(np.sqrt(np.nanmean(rest**2) / max(expected, 1e-30)))
     return MarkerNoise(deviation, correlation, max(1.0, common))
-
-
-def _centre_gain(found: Poses, body: Body) -> float:
-    """Variance of a coordinate of the centre of mass over that of a marker, mean over axes and frames."""
-    G = _of_centre(found, body)[np.isfinite(found.position[:, 0])]
-    return float(np.mean(np.sum(G[:, :3] ** 2, axis=2)))
 
 
 def _of_centre(found: Poses, body: Body) -> Array:
@@ -316,9 +298,7 @@ def _admissible(values: Array) -> Array:
 
 def _toeplitz(correlation: Array, size: int) -> Array:
     """Correlation matrix [size, size]."""
-    padded = np.zeros(max(size, len(correlation)))
-    padded[: len(correlation)] = correlation
-    return np.asarray(linalg.toeplitz(padded[:size]))
+    return np.asarray(linalg.toeplitz(np.pad(correlation, (0, size))[:size]))
 
 
 def _deviation(
@@ -344,15 +324,13 @@ def _deviation(
     known = np.flatnonzero(np.isfinite(force[:, 0]))
     for rows in (known[start : start + _CHUNK] for start in range(0, len(known), _CHUNK)):
         frames = rows[:, None] + np.arange(-n, n + 1)
-        back = np.einsum(
-            "tji,tkjl->tkil", R[rows], turns[frames]
-        )  # from body axes of the window's frames to those of this frame
+        # From body axes of the window's frames to those of this frame.
+        back = np.einsum("tji,tkjl->tkil", R[rows], turns[frames])
         rotated = back @ G[frames][:, :, 3:]
         value, _, bend = (_spread_over(taps, rows, bridges)[..., None, None] for taps in windows.taps)
         if inertia is None:
-            moved = body.mass * bend * (back @ G[frames][:, :, :3])
-            turned = value * (cross_matrices(force[rows])[:, None] @ rotated)
-            weights = moved + turned
+            weights = body.mass * bend * (back @ G[frames][:, :, :3])
+            weights = weights + value * (cross_matrices(force[rows])[:, None] @ rotated)
         else:
             weights = bend * (inertia @ rotated)
         spread = np.einsum("tkic,kl->tlic", weights, correlation, optimize=True)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
+# Markers whose second principal extent is below this fraction of the first count as collinear: no attitude.
 _FLAT = 0.02
-"""Markers whose second principal extent is below this fraction of the first count as collinear: no attitude."""
 _OUTLIER = 8.0
 _PASSES = 3
-_WRONG_SCALE = 1.3
-"""Beyond this ratio of distances between tracks and body file, the units or the markers must differ."""
+_WRONG_SCALE = 1.3  # beyond this ratio of distances between tracks and body file, the units or the markers must differ
 _OFF_SCALE = 1.05
 _LARGEST = 10.0
 
@@ -74,19 +74,15 @@ def scale_remarks(tracks: Array, shape: Array) -> list[str]:
         which, other = ("tracks", "body file") if ratio > 1 else ("body file", "tracks")
         units = {10.0: "decimetres", 100.0: "centimetres", 1000.0: "millimetres"}
         near = [unit for factor, unit in units.items() if factor / _WRONG_SCALE < off < factor * _WRONG_SCALE]
-        cause = (
-            f"that looks like {near[0]} in the {which}" if near else f"the {which} or the {other} are in another unit"
-        )
+        unknown = f"the {which} or the {other} are in another unit"
+        cause = f"that looks like {near[0]} in the {which}" if near else unknown
         raise ValueError(
             f"distances between markers in the tracks are {ratio:.4g} times those in the body file; the ratio must "
             f"be 1 within {100 * (_WRONG_SCALE - 1):.0f} %: {cause}, or the names belong to different markers: give "
             "metres in both"
         )
-    if off > _OFF_SCALE:
-        return [
-            f"distances between markers in the tracks are {ratio:.3g} times those in the body file; check the scale"
-        ]
-    return []
+    remark = f"distances between markers in the tracks are {ratio:.3g} times those in the body file; check the scale"
+    return [remark] if off > _OFF_SCALE else []
 
 
 def _scale(tracks: Array, shape: Array) -> float:
@@ -167,20 +163,15 @@ def _outlying(found: Poses) -> Mask:
 
 def cross_matrices(v: Array) -> Array:
     """Matrices [..., 3, 3] with ``cross_matrices(a) @ b`` equal to a x b."""
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    o = np.zeros_like(x)
-    rows = [np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))]
-    return np.stack(rows, axis=-2)
+    return np.cross(np.eye(3), v[..., None, :])
 
 
 def quaternions(rotation: Array) -> Array:
     """Unit quaternions [T, 4] (w, x, y, z) of ``rotation`` [T, 3, 3], continuous in time; NaN without a pose."""
-    from scipy.spatial.transform import Rotation
-
     q = np.full((len(rotation), 4), np.nan)
     fitted = np.isfinite(rotation[:, 0, 0])
     if fitted.any():
-        found = Rotation.from_matrix(rotation[fitted]).as_quat()[:, [3, 0, 1, 2]]
+        found = Rotation.from_matrix(rotation[fitted]).as_quat(scalar_first=True)
         flips = np.cumprod(np.sign(np.append(1.0, np.sum(found[1:] * found[:-1], axis=1))))
         q[fitted] = found * flips[:, None]
     return q

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import special, stats
+from scipy import linalg, special, stats
 
 from wingfit.records.array_types import Array, Index
 from wingfit.records.blas_threads import one_blas_thread
@@ -33,8 +33,7 @@ class PeriodicFit:
         frequency: of the beat, Hz; ``start``: a time at which t* = 0, s.
         coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance``: theirs under coloured noise.
         noise: of one sample.
-        lost: [4] bound on the RMS over the beat of the harmonics beyond K, for the value and its derivatives (unit /
-            s^d);
+        lost: [4] bound on the RMS over the beat of the harmonics beyond K, for value and derivatives (unit / s^d);
             infinite if the amplitudes decrease too slowly for the derivative to be square integrable.
         scores: [K_max] RMS error of cross-validation for 1, 2, ... harmonics; empty if K was given.
         beats: number of beats with samples; ``samples`` their number.
@@ -70,7 +69,8 @@ class PeriodicFit:
     @property
     def passed(self) -> Array:
         """[4] RMS over the beat of the noise in value and derivatives."""
-        return np.array([_rms(self.error_at(_phases(), d)) for d in range(DERIVATIVES + 1)])
+        errors = np.stack([self.error_at(_phases(), d) for d in range(DERIVATIVES + 1)])
+        return np.asarray(np.sqrt(np.mean(errors**2, axis=1)))
 
     @property
     def error(self) -> Array:
@@ -127,21 +127,12 @@ def fit_periodic(
     linear = least_squares(times, basis(phase, chosen), values, wide.noise)
     covariance, remarks = _between_beats(phase, linear, group, len(beats))
     if len(beats) < 3 and not harmonics:
-        remarks += (
-            f"{len(beats)} beat(s) only: slow noise cannot be distinguished from motion; record three beats or more",
-        )
+        few = f"{len(beats)} beat(s) only: slow noise cannot be distinguished from motion; record three beats or more"
+        remarks = (*remarks, few)
     return PeriodicFit(
-        frequency,
-        start,
-        linear.coefficients,
-        covariance,
-        linear.noise,
-        _lost(wide, chosen, frequency),
-        scores,
-        len(beats),
-        len(values),
-        remarks,
-    )
+        frequency, start, linear.coefficients, covariance, linear.noise, _lost(wide, chosen, frequency), scores,
+        len(beats), len(values), remarks,
+    )  # fmt: skip
 
 
 def basis(phase: Array, harmonics: int, derivative: int = 0, frequency: float = 1.0) -> Array:
@@ -157,11 +148,8 @@ def basis(phase: Array, harmonics: int, derivative: int = 0, frequency: float = 
 
 
 def _turn(harmonics: int, phase: float) -> Array:
-    turn = np.eye(1 + 2 * harmonics)
-    for k in range(1, harmonics + 1):
-        c, s = np.cos(2 * np.pi * k * phase), np.sin(2 * np.pi * k * phase)
-        turn[2 * k - 1 : 2 * k + 1, 2 * k - 1 : 2 * k + 1] = [[c, s], [-s, c]]
-    return turn
+    angles = 2 * np.pi * phase * np.arange(1, harmonics + 1)
+    return np.asarray(linalg.block_diag(1.0, *([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles)))
 
 
 def _most_harmonics(phase: Array) -> int:
@@ -264,7 +252,3 @@ def _fall_off(k: Index, amplitude: Array, error: Array) -> tuple[float, float] |
 
 def _phases() -> Array:
     return np.arange(_GRID) / _GRID
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

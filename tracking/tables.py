@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.records.array_types import Array
-from wingfit.records.errors import Faults, decode, fail, nearest, shown
+from wingfit.records.errors import Faults, check_most, decode, fail, nearest, shown
 from wingfit.records.limits import MAX_ROWS
 
 _NAMED = 6
@@ -69,8 +69,7 @@ def read_table(raw: bytes, file: str, label: str | None = None) -> Table:
     rows = [row for row in csv.reader(io.StringIO(decode(raw, file), newline="")) if row]
     if len(rows) < 2:
         raise fail(file, len(rows), f"holds {len(rows)} lines; it needs a header and rows of numbers")
-    if len(rows) > MAX_ROWS:
-        raise fail(file, len(rows), f"has {len(rows)} rows; at most {MAX_ROWS} are read: cut the recording in parts")
+    check_most(file, "has", len(rows), MAX_ROWS, "rows", "cut the recording in parts")
     header = [name.strip() for name in rows[0]]
     if len(header) == 1:
         raise fail(f"{file}, line 1", header[0], "has one column; separate columns by commas, with decimal points")
@@ -103,7 +102,6 @@ def _number(cell: str, where: str, faults: Faults) -> float:
     except ValueError:
         value = math.inf
     if math.isinf(value):
-        faults.add(
-            where, cell, f"is {shown(cell)!r}; it must be a finite number, or an empty cell where nothing was seen"
-        )
+        message = f"is {shown(cell)!r}; it must be a finite number, or an empty cell where nothing was seen"
+        faults.add(where, cell, message)
     return value

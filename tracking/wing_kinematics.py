@@ -167,22 +167,16 @@ def wing_motion(
     if closed is None:
         closed = float(flap.at(np.array(closest(flap)[0])))
         remarks.append("the zero of the flap angle was set where the wings are closest; give the dihedral if known")
-    flap = _lowered(flap, closed)
+    mean = np.eye(1, len(flap.coefficients))[0]
+    flap = replace(flap, coefficients=flap.coefficients - closed * mean)
     twist = fit_periodic(angles.times, angles.pitch, found.hertz, harmonics, flap.start)
     remarks += [f"wing pitch: {r}" for r in twist.remarks]
     law = pitch_law(angles.times, angles.pitch, flap) if pitch == "passive" else None
     if law is not None and law.misfit > 2 * twist.noise.deviation:
-        ratio = law.misfit / twist.noise.deviation
-        remarks.append(
-            f"the misfit of Eq. 17 to the pitch is {ratio:.1f} times its noise: the law does not describe this wing"
-        )
-    motion = WingMotion(
-        FourierFlap(*flap.series),
-        law.pitch if law else FourierPitch(*twist.series),
-        root_pitch=root_pitch,
-        pitch_station=pitch_station,
-        peel_end=peel_end,
-    )
+        misfit = f"the misfit of Eq. 17 to the pitch is {law.misfit / twist.noise.deviation:.1f} times its noise"
+        remarks.append(f"{misfit}: the law does not describe this wing")
+    twisting = law.pitch if law else FourierPitch(*twist.series)
+    motion = WingMotion(FourierFlap(*flap.series), twisting, root_pitch, pitch_station, peel_end)
     fitted = replace(angles, flap=angles.flap - closed)
     return WingKinematics(motion, fitted, flap, twist, law, found, flap.start, error / found.hertz, tuple(remarks))
 
@@ -208,10 +202,9 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
         )
         raise ValueError(f"{message}: give it, or record longer")
     if step * first * _MIN_SAMPLES > 1:
-        message = (
-            f"no significant flap frequency: the strongest period, {first:.4g} Hz, has {1 / (step * first):.2g} samples"
-        )
-        raise ValueError(f"{message}; at least {_MIN_SAMPLES} are needed: give the frequency, or check the flap angle")
+        few = f"{1 / (step * first):.2g} samples; at least {_MIN_SAMPLES} are needed"
+        message = f"no significant flap frequency: the strongest period, {first:.4g} Hz, has {few}"
+        raise ValueError(f"{message}: give the frequency, or check the flap angle")
     orders = max(1, min(4, int(0.4 / (step * first)), (len(t) - 4) // 6))
     middle = float(t.mean())
 
@@ -245,10 +238,8 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
 def _refuse_still(flap: Array) -> None:
     seen = flap[np.isfinite(flap)]
     if len(seen) and np.ptp(seen) < _STILL:
-        raise ValueError(
-            f"the flap angle is {np.degrees(seen[0]):.4g} deg throughout: there is no motion; check the column, or the "
-            "markers"
-        )
+        message = f"the flap angle is {np.degrees(seen[0]):.4g} deg throughout: there is no motion"
+        raise ValueError(f"{message}; check the column, or the markers")
 
 
 def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
@@ -259,9 +250,8 @@ def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
     if share > _MIN_EXPLAINED:
         return []
     try:
-        alone = (
-            f"the frequency estimated from the flap angle is {flap_frequency(angles.times, angles.flap).hertz:.5g} Hz"
-        )
+        estimated = flap_frequency(angles.times, angles.flap).hertz
+        alone = f"the frequency estimated from the flap angle is {estimated:.5g} Hz"
     except ValueError as error:
         alone = f"no frequency can be estimated from the flap angle ({error})"
     given = f"at the flap frequency given, {flap.frequency:.5g} Hz, the motion explains {100 * max(share, 0):.0f} %"
@@ -325,12 +315,6 @@ def beats_of(t_star: Array) -> Array:
     if not np.isfinite(t_star).all():
         raise ValueError("t_star has empty cells; give every row its phase")
     return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))
-
-
-def _lowered(flap: PeriodicFit, by: float) -> PeriodicFit:
-    coefficients = flap.coefficients.copy()
-    coefficients[0] -= by
-    return replace(flap, coefficients=coefficients)
 
 
 def _direction(points: Array) -> Array:

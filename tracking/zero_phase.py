@@ -49,11 +49,8 @@ def kernels(low_pass: LowPass, rate: float) -> Kernels:
     squares) that makes them exact for cubic polynomials.
     """
     if not 0 < low_pass.cutoff <= 0.45 * rate:
-        limit = 0.45 * rate
-        raise ValueError(
-            f"cut-off {low_pass.cutoff:g} Hz; with samples at {rate:g} Hz it must be above 0 and at most {limit:g} Hz: "
-            "choose a lower cut-off or record faster"
-        )
+        rule = f"with samples at {rate:g} Hz it must be above 0 and at most {0.45 * rate:g} Hz"
+        raise ValueError(f"cut-off {low_pass.cutoff:g} Hz; {rule}: choose a lower cut-off or record faster")
     frequency = np.fft.rfftfreq(_LENGTH, 1 / rate)
     sections = signal.butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos")
     gain = np.abs(signal.sosfreqz(sections, frequency, fs=rate)[1]) ** 2

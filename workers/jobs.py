@@ -16,9 +16,11 @@ a wish survives a restart of the server because it is part of the stored job. Ca
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+
+import numpy as np
 
 MOST_STARTS = 3
 
@@ -50,18 +52,12 @@ class Wish(StrEnum):
 class Instruction(StrEnum):
     """What the caller of :func:`step` must do after it has stored the new job."""
 
-    ENQUEUE = "ENQUEUE"
-    """Put the job at the end of the queue."""
-    DEQUEUE = "DEQUEUE"
-    """Take the job out of the queue."""
-    RUN = "RUN"
-    """Start, or continue from the last stored generation."""
-    STORE = "STORE"
-    """Store the generation that came with the event; in the same transaction as the job."""
-    STOP = "STOP"
-    """The runner stops; without this instruction it continues with the next generation."""
-    PUBLISH = "PUBLISH"
-    """The state changed: notify subscribers."""
+    ENQUEUE = "ENQUEUE"  # put the job at the end of the queue
+    DEQUEUE = "DEQUEUE"  # take the job out of the queue
+    RUN = "RUN"  # start, or continue from the last stored generation
+    STORE = "STORE"  # store the generation that came with the event; in the same transaction as the job
+    STOP = "STOP"  # the runner stops; without this instruction it continues with the next generation
+    PUBLISH = "PUBLISH"  # the state changed: notify subscribers
 
 
 @dataclass(frozen=True)
@@ -169,19 +165,20 @@ class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an
 
 def allowed(job: Job | None) -> tuple[str, ...]:
     """Names of the events that ``step`` allows for ``job``, in a fixed order."""
-    return tuple(kind.__name__.lower() for kind, handle in _HANDLERS.items() if handle(job, _sample(kind)) is not None)
+    return tuple(type(event).__name__.lower() for event in _ONE_OF_EACH if _outcome(job, event) is not None)
 
 
 def step(job: Job | None, event: Event) -> Outcome:
     """The job after ``event``, and the instructions; IllegalTransition if the state does not allow the event."""
-    outcome = _HANDLERS[type(event)](job, event)
+    outcome = _outcome(job, event)
     if outcome is None:
         raise IllegalTransition(job, event)
     return outcome
 
 
-def _sample(kind: type[Event]) -> Event:
-    return kind(0.0) if kind is Generation else kind("") if kind is Fail else kind()  # type: ignore[call-arg]
+_ONE_OF_EACH: tuple[Event, ...] = (
+    Submit(), Start(), Generation(0.0), Pause(), Resume(), Cancel(), Finish(), Fail(""), Leave(), Restart(),
+)  # fmt: skip
 
 
 def _move(job: Job, state: State, *instructions: Instruction, error: str | None = None) -> Outcome:
@@ -189,80 +186,60 @@ def _move(job: Job, state: State, *instructions: Instruction, error: str | None 
     return replace(job, state=state, wish=Wish.NONE, error=error), (*instructions, Instruction.PUBLISH)
 
 
-def _submit(job: Job | None, _: Event) -> Outcome | None:
-    return (Job(), (Instruction.ENQUEUE, Instruction.PUBLISH)) if job is None else None
+def _outcome(job: Job | None, event: Event) -> Outcome | None:
+    """The job after ``event``, and the instructions; None if the state does not allow the event."""
+    if job is None:
+        return (Job(), (Instruction.ENQUEUE, Instruction.PUBLISH)) if isinstance(event, Submit) else None
+    match job.state, event:
+        case State.QUEUED, Start():
+            return _move(replace(job, starts=job.starts + 1), State.RUNNING, Instruction.RUN)
+        case State.QUEUED, Pause():
+            return _move(job, State.PAUSED, Instruction.DEQUEUE)
+        case State.QUEUED, Cancel():
+            return _move(job, State.CANCELLED, Instruction.DEQUEUE)
+        case State.QUEUED, Restart():
+            return job, (Instruction.ENQUEUE,)
+        case State.PAUSED, Resume():
+            return _move(job, State.QUEUED, Instruction.ENQUEUE)
+        case State.PAUSED, Cancel():
+            return _move(job, State.CANCELLED)
+        case State.PAUSED, Restart():
+            return job, ()
+        case State.RUNNING, _:
+            return _while_running(job, event)
+    return None
 
 
-def _start(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.state is not State.QUEUED:
-        return None
-    return _move(replace(job, starts=job.starts + 1), State.RUNNING, Instruction.RUN)
+def _while_running(job: Job, event: Event) -> Outcome | None:
+    cancelling = job.wish is Wish.CANCEL
+    match event:
+        case Generation():
+            progress, starts = max(job.progress, event.progress), min(job.starts, 1) if event.lasting else job.starts
+            job = replace(job, generations=job.generations + 1, progress=progress, starts=starts)
+            if job.wish is Wish.NONE:
+                return job, (Instruction.STORE,)
+            return _move(job, State.CANCELLED if cancelling else State.PAUSED, Instruction.STORE, Instruction.STOP)
+        case Pause() if not cancelling:
+            return replace(job, wish=Wish.PAUSE), ()
+        case Resume() if job.wish is Wish.PAUSE:
+            return replace(job, wish=Wish.NONE), ()
+        case Cancel():
+            return replace(job, wish=Wish.CANCEL), ()
+        case Finish() | Fail() if cancelling:
+            return _move(job, State.CANCELLED, Instruction.STOP)
+        case Finish():
+            return _move(replace(job, progress=1.0), State.SUCCEEDED, Instruction.STOP)
+        case Fail():
+            return _move(job, State.FAILED, Instruction.STOP, error=event.error)
+        case Leave() | Restart():
+            return _runner_lost(job, event)
+    return None
 
 
-def _generation(job: Job | None, event: Event) -> Outcome | None:
-    if job is None or job.state is not State.RUNNING or not isinstance(event, Generation):
-        return None
-    starts = min(job.starts, 1) if event.lasting else job.starts
-    job = replace(job, generations=job.generations + 1, progress=max(job.progress, event.progress), starts=starts)
-    if job.wish is Wish.NONE:
-        return job, (Instruction.STORE,)
-    state = State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED
-    return _move(job, state, Instruction.STORE, Instruction.STOP)
-
-
-def _pause(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.wish is Wish.CANCEL:
-        return None
-    if job.state is State.QUEUED:
-        return _move(job, State.PAUSED, Instruction.DEQUEUE)
-    return (replace(job, wish=Wish.PAUSE), ()) if job.state is State.RUNNING else None
-
-
-def _resume(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.wish is Wish.CANCEL:
-        return None
-    if job.state is State.PAUSED:
-        return _move(job, State.QUEUED, Instruction.ENQUEUE)
-    return (replace(job, wish=Wish.NONE), ()) if job.wish is Wish.PAUSE else None
-
-
-def _cancel(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.state.final:
-        return None
-    if job.state is State.RUNNING:
-        return replace(job, wish=Wish.CANCEL), ()
-    return _move(job, State.CANCELLED, *([Instruction.DEQUEUE] if job.state is State.QUEUED else []))
-
-
-def _finish(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.state is not State.RUNNING:
-        return None
-    if job.wish is Wish.CANCEL:
-        return _move(job, State.CANCELLED, Instruction.STOP)
-    return _move(replace(job, progress=1.0), State.SUCCEEDED, Instruction.STOP)
-
-
-def _fail(job: Job | None, event: Event) -> Outcome | None:
-    if job is None or job.state is not State.RUNNING or not isinstance(event, Fail):
-        return None
-    if job.wish is Wish.CANCEL:
-        return _move(job, State.CANCELLED, Instruction.STOP)
-    return _move(job, State.FAILED, Instruction.STOP, error=event.error)
-
-
-def _leave(job: Job | None, _: Event) -> Outcome | None:
-    if job is None or job.state is not State.RUNNING:
-        return None
-    return replace(job, starts=max(0, job.starts - 1)), ()
-
-
-def _restart(job: Job | None, event: Event) -> Outcome | None:
-    if job is None or job.state.final or not isinstance(event, Restart):
-        return None
-    if job.state is State.QUEUED:
-        return job, (Instruction.ENQUEUE,)
-    if job.state is State.PAUSED:
-        return job, ()
+def _runner_lost(job: Job, event: Leave | Restart) -> Outcome:
+    """A running job whose server has shut down, or ended without notice."""
+    if isinstance(event, Leave):
+        return replace(job, starts=max(0, job.starts - 1)), ()
     if job.wish is not Wish.NONE:
         return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED)
     if job.starts >= event.most_starts:
@@ -278,21 +255,7 @@ def _given_up(job: Job) -> str:
     )
 
 
-_HANDLERS: dict[type[Event], Callable[[Job | None, Event], Outcome | None]] = {
-    Submit: _submit,
-    Start: _start,
-    Generation: _generation,
-    Pause: _pause,
-    Resume: _resume,
-    Cancel: _cancel,
-    Finish: _finish,
-    Fail: _fail,
-    Leave: _leave,
-    Restart: _restart,
-}
-
-ETA_MEMORY = 0.2
-"""Fraction of the elapsed time after which the weight of old progress has fallen by a factor e."""
+ETA_MEMORY = 0.2  # fraction of the elapsed time after which the weight of old progress has fallen by a factor e
 ETA_LONGEST = 1e9  # s, thirty years: larger estimates are dropped
 
 
@@ -310,10 +273,6 @@ def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
     if now <= 0.0:
         return None
     weights = [math.exp((t - now) / (ETA_MEMORY * now)) for t, _ in points]
-    total = sum(weights)
-    mean_t = sum(w * t for w, (t, _) in zip(weights, points, strict=True)) / total
-    mean_p = sum(w * p for w, (_, p) in zip(weights, points, strict=True)) / total
-    spread = sum(w * (t - mean_t) ** 2 for w, (t, _) in zip(weights, points, strict=True))
-    rise = sum(w * (t - mean_t) * (p - mean_p) for w, (t, p) in zip(weights, points, strict=True))
+    (spread, rise), _ = np.cov(np.transpose(points), aweights=weights, ddof=0).tolist()
     seconds = (1.0 - progress) * spread / rise if rise > 0.0 else math.inf
     return seconds if seconds < ETA_LONGEST else None

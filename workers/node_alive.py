@@ -10,52 +10,36 @@ from __future__ import annotations
 import argparse
 import os
 import socket
-import sys
 from typing import Any
 
 TIMEOUT_SECONDS = 5
 
 
-class NodeNotAliveError(RuntimeError):
-    """The node is not a living member of the cluster; the message says why."""
-
-
-def main(words: list[str] | None = None) -> int:
+def main(words: list[str] | None = None) -> None:
     """Check one node, by default that of this machine."""
     parser = argparse.ArgumentParser(prog="python -m wingfit.workers.node_alive", description=__doc__)
     parser.add_argument("head", help="address of the cluster's head, as host:port")
-    parser.add_argument(
-        "--node", help="IP address of the node (default: the one from which this machine reaches the head)"
-    )
+    reaching = "IP address of the node (default: the one from which this machine reaches the head)"
+    parser.add_argument("--node", help=reaching)
     options = parser.parse_args(words)
     host, _, port = options.head.rpartition(":")
     if not host or not port.isdigit():
         parser.error(f"the head is {options.head!r}; write host:port, for example ray-head:6379")
-    try:
-        check(host, int(port), options.node)
-    except NodeNotAliveError as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+    check(host, int(port), options.node)
 
 
 def check(host: str, port: int, node: str | None = None) -> None:
-    """NodeNotAliveError unless the head at ``host``:``port`` counts ``node`` among its living nodes."""
+    """SystemExit, with the reason, unless the head at ``host``:``port`` counts ``node`` among its living nodes."""
     try:
-        head, own = _addresses(host, port)
+        with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
+            # IP addresses of the head and of this machine, as the two see each other.
+            head, own = connection.getpeername()[0], connection.getsockname()[0]
     except OSError as error:
-        raise NodeNotAliveError(f"no Ray head answers at {host}:{port}: {error}") from error
+        raise SystemExit(f"no Ray head answers at {host}:{port}: {error}") from error
     alive = _living_nodes(f"{head}:{port}")
     if (node or own) not in alive:
-        raise NodeNotAliveError(
-            f"no living node of the cluster has the address {node or own}; living: {', '.join(sorted(alive)) or 'none'}"
-        )
-
-
-def _addresses(host: str, port: int) -> tuple[str, str]:
-    """IP addresses of the head and of this machine, as the two see each other."""
-    with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
-        return connection.getpeername()[0], connection.getsockname()[0]
+        living = ", ".join(sorted(alive)) or "none"
+        raise SystemExit(f"no living node of the cluster has the address {node or own}; living: {living}")
 
 
 def _living_nodes(address: str) -> set[str]:
@@ -66,9 +50,9 @@ def _living_nodes(address: str) -> set[str]:
     try:
         found: dict[Any, Any] = GcsClient(address=address).get_all_node_info(timeout=TIMEOUT_SECONDS)
     except Exception as error:  # Ray's own errors share no base class
-        raise NodeNotAliveError(f"the Ray head at {address} does not list its nodes: {error}") from error
+        raise SystemExit(f"the Ray head at {address} does not list its nodes: {error}") from error
     return {node.node_manager_address for node in found.values() if node.state == GcsNodeInfo.ALIVE}
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

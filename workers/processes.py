@@ -138,7 +138,7 @@ class ProcessPoolEvaluator:
             pid = worker.pid
             worker.release()
             worker.start()
-        self._tally.count(died=not death.hung, hung=death.hung, restarts=1)
+        self._tally.replaced("hung" if death.hung else "died")
         if death.hung and death.begun:
             LOG.warning("worker process %s hung: %s took more than %.0f s; it was replaced", pid, what, limit)
         elif death.hung:
@@ -291,7 +291,7 @@ def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Ta
         return content
 
     try:
-        problem = problems.get(key, fetch)
+        problem = problems.fetched(key, fetch)
         connection.send(("begun", None))
         began = time.monotonic()
         return "done", (task.run(problem, residuals=residuals), time.monotonic() - began)

@@ -119,7 +119,7 @@ class Batches:
             self._cluster.forget()
             self._lost(batch, cause)
         except ray_errors.RayError as error:
-            self._tally.count(**{"hung" if _hung(batch, error) else "died": 1}, restarts=1)
+            self._tally.replaced("hung" if _hung(batch, error) else "died")
             self._lost(batch, error)
         else:
             for number, (misfit, seconds) in zip(batch.numbers, answers, strict=True):

@@ -11,7 +11,6 @@ import logging
 import pickle
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Literal
@@ -24,6 +23,7 @@ from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedEr
 from wingfit.workers.guardian import Guardian
 from wingfit.workers.ray_batches import Batch, Batches, Cluster
 from wingfit.workers.ray_connection import Connection, ray
+from wingfit.workers.recent import Recent
 from wingfit.workers.share import PROBLEMS_KEPT, ProblemMemory, Task, lower_priority
 from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally, never
 
@@ -44,7 +44,7 @@ class RayEvaluator:
         self._condition = threading.Condition()
         self._closed = False
         self._calls = 0
-        self._references: OrderedDict[str, Any] = OrderedDict()
+        self._references = Recent[Any](PROBLEMS_KEPT)
         # No retries by Ray, which would not report them.
         self._run_tasks = ray.remote(num_cpus=1, max_retries=0, scheduling_strategy="SPREAD")(_run_tasks)
         self._expectation, self._tally = Expectation(), Tally()
@@ -127,12 +127,7 @@ class RayEvaluator:
     def _put(self, problem: Problem) -> Any:
         """Reference to the problem in the cluster's memory, where it is stored once."""
         with self._condition:
-            if problem.key not in self._references:
-                self._references[problem.key] = ray.put(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
-                while len(self._references) > PROBLEMS_KEPT:
-                    self._references.popitem(last=False)
-            self._references.move_to_end(problem.key)
-            return self._references[problem.key]
+            return self._references.use(problem.key, lambda: ray.put(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL)))
 
     def _forget(self, problem: Problem) -> None:
         """The cluster's memory lost the problem; it is stored again when next needed."""
@@ -160,7 +155,7 @@ def _run_tasks(
         _guardian.append(Guardian())
     # The inner limit gives an error message; the outer one is for a hung worker.
     with _guardian[0].watching(2 * START_SECONDS):
-        problem = _problems.get(key, lambda: ray.get(reference[0], timeout=START_SECONDS))
+        problem = _problems.fetched(key, lambda: ray.get(reference[0], timeout=START_SECONDS))
     done: list[tuple[Misfit, float]] = []
     for task in tasks:
         began = time.monotonic()

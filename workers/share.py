@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Unit, run_unit
 from wingfit.calibration.problem import Misfit, Problem
+from wingfit.workers.recent import Recent
 
 NICENESS = 10
 PROBLEMS_KEPT = 8
@@ -66,18 +66,13 @@ class Task:
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)
 
 
-class ProblemMemory:
-    """Cache of the problems used last, by key; not thread-safe."""
+class ProblemMemory(Recent[Problem]):
+    """The problems used last, by key; not thread-safe."""
 
-    def __init__(self, kept: int = PROBLEMS_KEPT) -> None:
-        self._kept = kept
-        self._problems: OrderedDict[str, Problem] = OrderedDict()
+    def __init__(self, most: int = PROBLEMS_KEPT) -> None:
+        super().__init__(most)
 
-    def get(self, key: str, fetch: Callable[[], bytes]) -> Problem:
-        """The problem with this key; ``fetch`` returns it pickled if it is not cached."""
-        if key not in self._problems:
-            self._problems[key] = pickle.loads(fetch())  # noqa: S301  comes from the process that owns this worker
-            while len(self._problems) > self._kept:
-                self._problems.popitem(last=False)
-        self._problems.move_to_end(key)
-        return self._problems[key]
+    def fetched(self, key: str, fetch: Callable[[], bytes]) -> Problem:
+        """The problem with this key; ``fetch`` returns it pickled if it is not in memory."""
+        # The bytes come from the process that owns this worker.
+        return self.use(key, lambda: pickle.loads(fetch()))  # noqa: S301

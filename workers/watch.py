@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections import OrderedDict, deque
-from dataclasses import dataclass, replace
+from collections import Counter, deque
+from dataclasses import dataclass
 from statistics import median
+from typing import Literal
+
+from wingfit.workers.recent import Recent
 
 # Limit of a unit: FACTOR times the median of its problem plus SLACK_SECONDS. Individuals near divergence need many
 # times the beats of others, and other programs use the processors too.
@@ -30,7 +33,7 @@ class Expectation:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._seconds: OrderedDict[str, deque[float]] = OrderedDict()
+        self._seconds = Recent[deque[float]](PROBLEMS_REMEMBERED)
 
     def limit(self, key: str, attempt: int = 0) -> float:
         """Time limit (s) of a unit of the problem ``key``, doubled with each ``attempt`` at the same unit.
@@ -56,10 +59,7 @@ class Expectation:
     def done(self, key: str, seconds: float) -> None:
         """Record that a unit took ``seconds``."""
         with self._lock:
-            self._seconds.setdefault(key, deque(maxlen=UNITS_REMEMBERED)).append(seconds)
-            self._seconds.move_to_end(key)
-            while len(self._seconds) > PROBLEMS_REMEMBERED:
-                self._seconds.popitem(last=False)
+            self._seconds.use(key, lambda: deque(maxlen=UNITS_REMEMBERED)).append(seconds)
 
 
 @dataclass(frozen=True)
@@ -84,15 +84,14 @@ class Tally:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._counted = Standing(0)
+        self._counts: Counter[str] = Counter()
 
-    def count(self, *, died: int = 0, hung: int = 0, restarts: int = 0) -> None:
-        """Add to the counts."""
+    def replaced(self, loss: Literal["died", "hung"]) -> None:
+        """Count a worker that died or hung, and its replacement."""
         with self._lock:
-            was = self._counted
-            self._counted = Standing(0, was.died + died, was.hung + hung, was.restarts + restarts)
+            self._counts.update([loss, "restarts"])
 
     def standing(self, workers: int) -> Standing:
         """The counts, with the number of living ``workers``."""
         with self._lock:
-            return replace(self._counted, workers=workers)
+            return Standing(workers, **self._counts)

@@ -10,7 +10,7 @@ import numpy as np
 from wingfit.records.array_types import Array, Float
 from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
 from wingfit.records.description.fields import FourierFile
-from wingfit.records.description.vehicle_file import MotionFile
+from wingfit.records.description.vehicle_file import MotionFile, VehicleFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import StationFile, WingFile
 from wingfit.records.description.yaml_text import Path
 from wingfit.records.errors import nearest
@@ -30,11 +30,14 @@ def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
 
 def _wing(wing: WingFile) -> Iterator[Inconsistency]:
     yield from _increasing(("wing", "stations"), "y", [station.y_m for station in wing.stations])
-    yield from _unique(("wing", "rods"), [rod.name for rod in wing.rods], "name")
-    yield from _unique(("wing", "markers"), [marker.name for marker in wing.markers], "name")
-    yield from _rods(wing)
-    yield from _references(("wing", "driven_rods"), wing.driven_rods, [rod.name for rod in wing.rods], "rod")
-    markers = [marker.name for marker in wing.markers]
+    rods, markers = [rod.name for rod in wing.rods], [marker.name for marker in wing.markers]
+    yield from _unique(("wing", "rods"), rods, "name")
+    yield from _unique(("wing", "markers"), markers, "name")
+    for index, rod in enumerate(wing.rods):
+        if (rod.x_root_m, rod.y_root_m) == (rod.x_tip_m, rod.y_tip_m):
+            message = f"rod {rod.name!r} starts and ends at the same point; its root and tip must differ"
+            yield ("wing", "rods", index), rod.name, message
+    yield from _references(("wing", "driven_rods"), wing.driven_rods, rods, "rod")
     yield from _references(("wing", "reference_markers"), wing.reference_markers, markers, "marker")
     yield from _markers(wing)
 
@@ -47,17 +50,14 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
         yield ("vehicle", "stations", 0, "r_m"), places[0], message
     yield from _increasing(("vehicle", "stations"), "r", places)
     wings = WINGS[vehicle.layout] * vehicle.wing_mass_kg
-    masses: list[tuple[Path, Decimal | None]] = [(("vehicle",), vehicle.mass_kg)]
-    masses += [(("recordings", index), recording.mass_kg) for index, recording in enumerate(dataset.recordings)]
-    for path, mass in masses:
+    parts: dict[Path, VehicleFile | VehicleRecordingFile] = {("vehicle",): vehicle}
+    for path, part in (parts | {("recordings", i): r for i, r in enumerate(dataset.recordings)}).items():
+        mass = part.mass_kg
         if mass is not None and wings >= mass:
             message = f"is {mass} kg; it must be more than the mass of all wings, {wings} kg: check the units (kg)"
             yield (*path, "mass_kg"), mass, message
-    motions: list[tuple[Path, MotionFile | None]] = [(("vehicle",), vehicle.motion)]
-    motions += [(("recordings", index), recording.motion) for index, recording in enumerate(dataset.recordings)]
-    for path, motion in motions:
-        if vehicle.claps and motion is not None:
-            yield from _starts_closed(motion, (*path, "motion", "flap"))
+        if vehicle.claps and part.motion is not None:
+            yield from _starts_closed(part.motion, (*path, "motion", "flap"))
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
@@ -107,13 +107,6 @@ def _references(path: Path, names: Sequence[str], known: Sequence[str], what: st
             yield (*path, index), name, f"no {what} is called {name!r}; {nearest(name, known)}"
 
 
-def _rods(wing: WingFile) -> Iterator[Inconsistency]:
-    for index, rod in enumerate(wing.rods):
-        if (rod.x_root_m, rod.y_root_m) == (rod.x_tip_m, rod.y_tip_m):
-            message = f"rod {rod.name!r} starts and ends at the same point; its root and tip must differ"
-            yield ("wing", "rods", index), rod.name, message
-
-
 def _markers(wing: WingFile) -> Iterator[Inconsistency]:
     if list(_increasing((), "y", [station.y_m for station in wing.stations])):
         return
@@ -122,9 +115,8 @@ def _markers(wing: WingFile) -> Iterator[Inconsistency]:
         distance = distance_outside(outline, float(marker.x_m), float(marker.y_m))
         if distance > PLANFORM_MARGIN:
             message = (
-                f"marker {marker.name!r} at x = {marker.x_m} m, y = {marker.y_m} m is "
-                f"{distance * 1e3:.1f} mm outside the planform; at most {PLANFORM_MARGIN * 1e3:g} mm "
-                "are accepted: check unit (m), sign and whether x and y are swapped"
+                f"marker {marker.name!r} at x = {marker.x_m} m, y = {marker.y_m} m is {distance * 1e3:.1f} mm outside "
+                f"the planform; at most {PLANFORM_MARGIN * 1e3:g} mm are accepted: check unit (m), sign, x and y"
             )
             yield ("wing", "markers", index), marker.name, message
 

@@ -24,17 +24,12 @@ _SUFFIX = re.compile(
 )
 _KINDS = {
     "list_type": "a list",
-    "dict_type": "a mapping of keys to values",
-    "model_type": "a mapping of keys to values",
-    "model_attributes_type": "a mapping of keys to values",
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a mapping of keys to values"),
     "string_type": "text",
     "bool_type": "true or false",
 }
 _RIGS = {"wing": "a wing with tracks of markers", "vehicle": "a vehicle with forces"}
-_OTHER: dict[type[DatasetFile], tuple[type[DatasetFile], str, str]] = {
-    WingDatasetFile: (VehicleDatasetFile, "wing", "vehicle"),
-    VehicleDatasetFile: (WingDatasetFile, "vehicle", "wing"),
-}
+_ROOTS: dict[str, type[DatasetFile]] = {"wing": WingDatasetFile, "vehicle": VehicleDatasetFile}
 
 
 def check_description(document: Document) -> DatasetFile:
@@ -91,9 +86,9 @@ class _Explainer:
         if renamed is not None:
             return f"unknown key {key!r}; write {renamed[-1]!r} and give the value in that unit"
         fields = self._fields(location)
-        other, this, that = _OTHER[self.root]
+        this, that = ("wing", "vehicle") if self.root is WingDatasetFile else ("vehicle", "wing")
         parent = tuple(that if part == this else part for part in location[:-1])
-        if any(key in model.model_fields for model in _models(other, parent)):
+        if any(key in model.model_fields for model in _models(_ROOTS[that], parent)):
             return f"key {key!r} is for a {that}, this is a {this}; {nearest(key, fields)}"
         return f"unknown key {key!r}; {nearest(key, fields)}"
 
@@ -121,8 +116,7 @@ def _plain_message(error: ErrorDetails) -> str:
         version = "; a newer wingfit may read it" if error["loc"][-1] == "format_version" else ""
         return f"is {kind(value)}; it must be {context.get('expected')}{version}"
     if what == "too_short":
-        found, needed = context.get("actual_length"), context.get("min_length")
-        return f"has {found} entries, at least {needed} are needed: add some"
+        return f"has {context.get('actual_length')} entries, at least {context.get('min_length')} are needed: add some"
     if what == "too_long":
         return f"has more than {context.get('max_length')} entries, the most that are read; remove some"
     if what in _KINDS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import Annotated, Any, Literal, get_args
 
@@ -39,16 +39,16 @@ Prose = Annotated[
         portable=False,
     ),
 ]
-Angle = Annotated[Decimal, limits("-180", "180", "deg", "angle", "give degrees")]
-Chord = Annotated[Decimal, limits("0.0001", "5", "m", "chord", METRES)]
-Thickness = Annotated[Decimal, limits("0", "0.5", "m", "thickness", "give metres: 0.012, not 12", above=True)]
-Frequency = Annotated[Decimal, limits("0.01", "1000", "Hz", "beats per second")]
+Angle = Annotated[Decimal, limits("[-180, 180] deg", "angle", "give degrees")]
+Chord = Annotated[Decimal, limits("[0.0001, 5] m", "chord", METRES)]
+Thickness = Annotated[Decimal, limits("(0, 0.5] m", "thickness", "give metres: 0.012, not 12")]
+Frequency = Annotated[Decimal, limits("[0.01, 1000] Hz", "beats per second")]
 Pressure = Annotated[
-    Decimal, limits("0", "20000", "mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325")
+    Decimal, limits("[0, 20000] mbar", "static pressure", "give mbar (1 mbar = 100 Pa): 1013.25, not 101325")
 ]
-Temperature = Annotated[Decimal, limits("-100", "100", "°C", "air temperature", "give degrees Celsius: 20, not 293.15")]
+Temperature = Annotated[Decimal, limits("[-100, 100] °C", "air temperature", "give degrees Celsius: 20, not 293.15")]
 Estimates = Annotated[
-    dict[GeneName, Annotated[Decimal, limits("-1e300", "1e300", "", "estimate of a gene, SI units")]],
+    dict[GeneName, Annotated[Decimal, limits("[-1e300, 1e300]", "estimate of a gene, SI units")]],
     Field(default_factory=dict, max_length=MAX_ESTIMATES),
 ]
 
@@ -87,6 +87,11 @@ def tag_of(model: type[BaseModel]) -> str | None:
     """The value of the key ``kind`` that selects ``model`` in a union; None for a model without that key."""
     field = model.model_fields.get("kind")
     return str(get_args(field.annotation)[0]) if field else None
+
+
+def one_or_each(value: Any) -> str:
+    """Tag of a noise level in a union: one number for all channels, or a mapping with one for each."""
+    return "each" if isinstance(value, Mapping) else "one"
 
 
 def whole(value: Any) -> Any:

@@ -13,8 +13,7 @@ from pydantic_core import PydanticCustomError, core_schema
 from wingfit.records.errors import shown
 from wingfit.records.units import number_text
 
-FAULT = "wingfit"
-"""Type of the pydantic errors whose message is final."""
+FAULT = "wingfit"  # type of the pydantic errors whose message is final
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -64,9 +63,13 @@ class Limits:
         return number
 
 
-def limits(low: str, high: str, unit: str, text: str, remedy: str = "", *, above: bool = False) -> Limits:
-    """:class:`Limits` from decimal text."""
-    return Limits(Decimal(low), Decimal(high), unit, text, remedy, above)
+def limits(interval: str, text: str, remedy: str = "") -> Limits:
+    """:class:`Limits` from text such as ``"(0, 0.5] m"``; a round bracket excludes the lower limit itself."""
+    match = re.fullmatch(r"([(\[])(.+), (.+)\] ?(.*)", interval)
+    if match is None:
+        raise ValueError(f"the interval is {interval!r}; write it as '[0, 1] m' or '(0, 1] m'")
+    bracket, low, high, unit = match.groups()
+    return Limits(Decimal(low), Decimal(high), unit, text, remedy, above=bracket == "(")
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, StrictBool, Tag
 
@@ -14,18 +13,16 @@ from wingfit.records.description.quantity import limits
 from wingfit.records.limits import MAX_STATIONS
 
 _DEGREES = "give degrees"
-RightAngle = Annotated[Decimal, limits("-90", "90", "deg", "angle", _DEGREES)]
-Beats = Annotated[Decimal, limits("0", "0.5", "beats", "part of a beat", "give beats: 0.17, not 17 %", above=True)]
-Mass = Annotated[Decimal, limits("0", "100", "kg", "mass", "give kilograms: 0.0174, not 17.4", above=True)]
-Deviation = Annotated[
-    Decimal, limits("0", "100", "N", "standard deviation of the noise", "give newtons: 0.005, not 5", above=True)
-]
+RightAngle = Annotated[Decimal, limits("[-90, 90] deg", "angle", _DEGREES)]
+Beats = Annotated[Decimal, limits("(0, 0.5] beats", "part of a beat", "give beats: 0.17, not 17 %")]
+Mass = Annotated[Decimal, limits("(0, 100] kg", "mass", "give kilograms: 0.0174, not 17.4")]
+Deviation = Annotated[Decimal, limits("(0, 100] N", "standard deviation of the noise", "give newtons: 0.005, not 5")]
 
 
 class ChordFile(Strict):
     """Chord at a distance from the flapping axis."""
 
-    r_m: Annotated[Decimal, limits("0", "10", "m", "distance from the flapping axis", fields.METRES)]
+    r_m: Annotated[Decimal, limits("[0, 10] m", "distance from the flapping axis", fields.METRES)]
     chord_m: fields.Chord
 
 
@@ -36,20 +33,18 @@ class SplitCycleFile(Strict):
     """
 
     kind: Literal["split_cycle"]
-    amplitude_deg: Annotated[Decimal, limits("0", "90", "deg", "half the range of the flap angle", _DEGREES)]
+    amplitude_deg: Annotated[Decimal, limits("[0, 90] deg", "half the range of the flap angle", _DEGREES)]
     bias_deg: RightAngle
     split_rad_per_beat: Annotated[
         Decimal,
         limits(
-            "-12",
-            "2.5",
-            "rad/beat",
+            "[-12, 2.5] rad/beat",
             "delta of Eq. 20, of omega = 2 pi rad/beat",
             "opening takes pi / (2 pi - delta) of the beat, from 17 % to 83 %",
         ),
     ]
     smoothing_beats: Annotated[
-        Decimal, limits("0", "0.1", "beats", "standard deviation of the rounding", "give beats: 0.01, not 1 %")
+        Decimal, limits("[0, 0.1] beats", "standard deviation of the rounding", "give beats: 0.01, not 1 %")
     ] = Decimal("0.01")
 
 
@@ -57,10 +52,10 @@ class PassivePitchFile(Strict):
     """Wing pitch that follows the flap motion (Armanini et al. 2016, Eq. 17 and Table 5)."""
 
     kind: Literal["passive"]
-    constant_rad: Annotated[Decimal, limits("-10", "10", "rad", "C_theta,0", "give radians")]
-    flap: Annotated[Decimal, limits("-100", "100", "", "C_theta,zeta, rad per rad")]
-    flap_rate_s: Annotated[Decimal, limits("-10", "10", "s", "C_theta,zeta', rad per rad/s")]
-    flap_rate_squared_s2: Annotated[Decimal, limits("-10", "10", "s^2", "C_theta,zeta'^2, rad per (rad/s)^2")]
+    constant_rad: Annotated[Decimal, limits("[-10, 10] rad", "C_theta,0", "give radians")]
+    flap: Annotated[Decimal, limits("[-100, 100]", "C_theta,zeta, rad per rad")]
+    flap_rate_s: Annotated[Decimal, limits("[-10, 10] s", "C_theta,zeta', rad per rad/s")]
+    flap_rate_squared_s2: Annotated[Decimal, limits("[-10, 10] s^2", "C_theta,zeta'^2, rad per (rad/s)^2")]
 
 
 class MotionFile(Strict):
@@ -69,11 +64,11 @@ class MotionFile(Strict):
     flap: Annotated[SplitCycleFile | fields.FourierFile, Field(discriminator="kind")]
     pitch: Annotated[PassivePitchFile | fields.FourierFile, Field(discriminator="kind")]
     pitch_station: Annotated[
-        Decimal, limits("0", "1", "spans", "where the pitch holds", "give a fraction of the span", above=True)
+        Decimal, limits("(0, 1] spans", "where the pitch holds", "give a fraction of the span")
     ] = Decimal("0.7")
     # No default: the source says "zero at the root", although its pitch is pi/2 where the chord lies along the body.
     root_pitch_deg: Annotated[
-        Decimal, limits("-180", "180", "deg", "wing pitch at the flapping axis; 90: chord along the body", _DEGREES)
+        Decimal, limits("[-180, 180] deg", "wing pitch at the flapping axis; 90: chord along the body", _DEGREES)
     ]
     peel_end_beats: Beats = Decimal("0.17")
 
@@ -88,8 +83,7 @@ class VehicleFile(Strict):
     wing_mass_kg: Mass
     thickness_m: fields.Thickness
     pitch_axis: Annotated[
-        Decimal,
-        limits("0", "1", "chords", "axis of wing pitch behind the leading edge", "give a fraction of the chord"),
+        Decimal, limits("[0, 1] chords", "axis of wing pitch behind the leading edge", "give a fraction of the chord")
     ]
     dihedral_deg: RightAngle
     mass_kg: Mass
@@ -101,7 +95,7 @@ class VehicleFile(Strict):
 class LowPassFile(Strict):
     """The zero-phase Butterworth filter that was applied to the values."""
 
-    cutoff_hz: Annotated[Decimal, limits("0", "1000000", "Hz", "half-power frequency of one pass", above=True)]
+    cutoff_hz: Annotated[Decimal, limits("(0, 1000000] Hz", "half-power frequency of one pass")]
     order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(fields.whole)] = 4
 
 
@@ -112,11 +106,9 @@ class AxesFile(Strict):
     z: Deviation | None = None
 
 
-def _noise_kind(value: Any) -> str:
-    return "per_axis" if isinstance(value, Mapping) else "one"
-
-
-Noise = Annotated[Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("per_axis")], Discriminator(_noise_kind)]
+Noise = Annotated[
+    Annotated[Deviation, Tag("one")] | Annotated[AxesFile, Tag("each")], Discriminator(fields.one_or_each)
+]
 
 
 class VehicleRecordingFile(Strict):
@@ -125,11 +117,11 @@ class VehicleRecordingFile(Strict):
     name: fields.Name
     rig: Literal["wind_tunnel", "free_flight", "vacuum_chamber"]
     flap_frequency_hz: fields.Frequency
-    body_pitch_deg: Annotated[Decimal, limits("-90", "90", "deg", "nose up from level", _DEGREES)]
+    body_pitch_deg: Annotated[Decimal, limits("[-90, 90] deg", "nose up from level", _DEGREES)]
     pressure_mbar: fields.Pressure
     temperature_c: fields.Temperature
-    airspeed_m_s: Annotated[Decimal, limits("0", "100", "m/s", "level speed through the air")] = Decimal(0)
-    gravity_m_s2: Annotated[Decimal, limits("0", "30", "m/s^2", "downwards", "give a positive number")] = Decimal(
+    airspeed_m_s: Annotated[Decimal, limits("[0, 100] m/s", "level speed through the air")] = Decimal(0)
+    gravity_m_s2: Annotated[Decimal, limits("[0, 30] m/s^2", "downwards", "give a positive number")] = Decimal(
         "9.80665"
     )
     low_pass: LowPassFile | None = Field(None, description="the filter the values have been through; leave out if raw")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from decimal import Decimal
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -14,12 +13,10 @@ from wingfit.records.description.quantity import fault, limits
 from wingfit.records.limits import MAX_MARKERS, MAX_RODS, MAX_STATIONS
 
 Place = Annotated[
-    Decimal, limits("-10", "10", "m", "coordinate in the wing frame (x aft, y outboard, z up)", fields.METRES)
+    Decimal, limits("[-10, 10] m", "coordinate in the wing frame (x aft, y outboard, z up)", fields.METRES)
 ]
-Length = Annotated[Decimal, limits("0", "10", "m", "length", fields.METRES, above=True)]
-Deviation = Annotated[
-    Decimal, limits("0", "0.1", "m", "standard deviation of the noise", "give metres: 0.0005, not 0.5", above=True)
-]
+Length = Annotated[Decimal, limits("(0, 10] m", "length", fields.METRES)]
+Deviation = Annotated[Decimal, limits("(0, 0.1] m", "standard deviation of the noise", "give metres: 0.0005, not 0.5")]
 
 
 class StationFile(Strict):
@@ -34,9 +31,9 @@ class StationFile(Strict):
 class MaterialsFile(Strict):
     """Densities, which are not genes."""
 
-    foam_density_kg_m3: Annotated[Decimal, limits("0", "2000", "kg/m^3", "density of the foam", above=True)]
+    foam_density_kg_m3: Annotated[Decimal, limits("(0, 2000] kg/m^3", "density of the foam")]
     skin_areal_density_kg_m2: Annotated[
-        Decimal, limits("0", "10", "kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2")
+        Decimal, limits("[0, 10] kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2")
     ]
 
 
@@ -48,12 +45,10 @@ class RodFile(Strict):
     y_root_m: Place
     x_tip_m: Place
     y_tip_m: Place
-    diameter_m: Annotated[Decimal, limits("0", "0.05", "m", "diameter", "give metres: 0.002, not 2", above=True)]
-    density_kg_m3: Annotated[
-        Decimal, limits("0", "25000", "kg/m^3", "density", "give kg/m^3: 1600, not 1.6", above=True)
-    ]
+    diameter_m: Annotated[Decimal, limits("(0, 0.05] m", "diameter", "give metres: 0.002, not 2")]
+    density_kg_m3: Annotated[Decimal, limits("(0, 25000] kg/m^3", "density", "give kg/m^3: 1600, not 1.6")]
     glue_linear_density_kg_m: Annotated[
-        Decimal, limits("0", "1", "kg/m", "straw with its glue", "give kg/m: 0.002, not 2 g/m")
+        Decimal, limits("[0, 1] kg/m", "straw with its glue", "give kg/m: 0.002, not 2 g/m")
     ]
 
 
@@ -64,7 +59,7 @@ class MarkerFile(Strict):
     x_m: Place
     y_m: Place
     z_m: Place
-    mass_kg: Annotated[Decimal, limits("0", "0.1", "kg", "mass", "give kilograms: 0.0001, not 0.1 g")]
+    mass_kg: Annotated[Decimal, limits("[0, 0.1] kg", "mass", "give kilograms: 0.0001, not 0.1 g")]
 
 
 class HingeFile(Strict):
@@ -82,22 +77,18 @@ class FourBarFile(Strict):
     crank_m: Length
     coupler_m: Length
     rocker_m: Length
-    offset_deg: Annotated[Decimal, limits("-360", "360", "deg", "added to the rocker angle", "give degrees")]
+    offset_deg: Annotated[Decimal, limits("[-360, 360] deg", "added to the rocker angle", "give degrees")]
 
     @model_validator(mode="after")
     def _crank_turns(self) -> FourBarFile:
         others = sorted((self.ground_m, self.coupler_m, self.rocker_m))
         if self.crank_m >= others[0]:
-            raise fault(
-                f"crank_m is {self.crank_m} m; it must be below the shortest of the other links, "
-                f"{others[0]} m, for the crank to turn fully (Grashof): shorten it or check the links"
-            )
+            rule = f"it must be below the shortest of the other links, {others[0]} m, for the crank to turn fully"
+            raise fault(f"crank_m is {self.crank_m} m; {rule} (Grashof): shorten it or check the links")
         longest, rest = self.crank_m + others[2], others[0] + others[1]
         if longest >= rest:
-            raise fault(
-                f"shortest + longest link is {longest} m; it must be below the sum of the other two, "
-                f"{rest} m, for the crank to turn fully (Grashof): check the lengths"
-            )
+            rule = f"it must be below the sum of the other two, {rest} m, for the crank to turn fully"
+            raise fault(f"shortest + longest link is {longest} m; {rule} (Grashof): check the lengths")
         return self
 
 
@@ -116,14 +107,10 @@ class WingFile(Strict):
     estimates: fields.Estimates
 
 
-def _noise_kind(value: Any) -> str:
-    return "per_marker" if isinstance(value, Mapping) else "one"
-
-
 Noise = Annotated[
     Annotated[Deviation, Tag("one")]
-    | Annotated[dict[fields.Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("per_marker")],
-    Discriminator(_noise_kind),
+    | Annotated[dict[fields.Name, Annotated[list[Deviation], Field(min_length=3, max_length=3)]], Tag("each")],
+    Discriminator(fields.one_or_each),
 ]
 
 
@@ -133,16 +120,12 @@ class WingRecordingFile(Strict):
     name: fields.Name
     rig: Literal["vacuum_chamber", "wind_tunnel"]
     flap_frequency_hz: fields.Frequency
-    phase_lag_deg: Annotated[
-        Decimal, limits("-180", "180", "deg", "lag of the rear rod", "give degrees of drive phase")
-    ]
+    phase_lag_deg: Annotated[Decimal, limits("[-180, 180] deg", "lag of the rear rod", "give degrees of drive phase")]
     pressure_mbar: fields.Pressure
     temperature_c: fields.Temperature
-    airspeed_m_s: Annotated[Decimal, limits("0", "100", "m/s", "speed of the airstream, aft")] = Decimal(0)
-    angle_of_attack_deg: Annotated[Decimal, limits("-90", "90", "deg", "of the rig", "give degrees")] = Decimal(0)
-    gravity_m_s2: Annotated[Decimal, limits("0", "30", "m/s^2", "along -z", "give a positive number")] = Decimal(
-        "9.80665"
-    )
+    airspeed_m_s: Annotated[Decimal, limits("[0, 100] m/s", "speed of the airstream, aft")] = Decimal(0)
+    angle_of_attack_deg: Annotated[Decimal, limits("[-90, 90] deg", "of the rig", "give degrees")] = Decimal(0)
+    gravity_m_s2: Annotated[Decimal, limits("[0, 30] m/s^2", "along -z", "give a positive number")] = Decimal("9.80665")
     standard_deviation_m: Noise | None = Field(
         None, description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown"
     )

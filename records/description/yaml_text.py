@@ -14,7 +14,7 @@ from typing import Any
 
 import yaml
 
-from wingfit.records.errors import DatasetError, decode, fail
+from wingfit.records.errors import DatasetError, check_most, decode, fail
 from wingfit.records.limits import MAX_DEPTH, MAX_DESCRIPTION_BYTES, MAX_ITEMS, MIB
 from wingfit.records.units import number_text
 
@@ -59,9 +59,7 @@ def dotted(path: Path) -> str:
 
 def read_yaml(raw: bytes, file: str) -> Document:
     """Parse ``raw``; DatasetError when it is not the plain YAML this format uses."""
-    if len(raw) > MAX_DESCRIPTION_BYTES:
-        message = f"is {len(raw) / MIB:.1f} MiB; at most {MAX_DESCRIPTION_BYTES // MIB} MiB are read: put it in CSV"
-        raise fail(file, len(raw), message)
+    check_most(file, "is", len(raw) / MIB, MAX_DESCRIPTION_BYTES / MIB, "MiB", "put samples in CSV")
     text = decode(raw, file)
     try:
         return _Builder(file, yaml.parse(text, Loader=_LOADER)).document()

@@ -10,56 +10,35 @@ import zlib
 from collections.abc import Sequence
 
 from wingfit.records.dataset import Dataset
-from wingfit.records.errors import Faults, fail
+from wingfit.records.errors import Faults, check_most, fail
 from wingfit.records.files.folder import DESCRIPTION, contents, read_files
 from wingfit.records.limits import MAX_COMPRESSION_RATIO, MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB, RATIO_FREE_BYTES
 
-_BROKEN = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    RuntimeError,
-    ValueError,
-    OverflowError,
-    IndexError,
-)
+# NotImplementedError is a RuntimeError.
+_BROKEN = (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, OverflowError, IndexError)
 _METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}
 _JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\._)")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-class ZipFiles:
-    """Files in a zip; names are relative to the top-level folder if there is only one."""
-
-    def __init__(self, data: bytes, label: str) -> None:
-        self.label = label
-        try:
-            self._zip = zipfile.ZipFile(io.BytesIO(data))
-        except _BROKEN as error:
-            raise fail(label, None, f"not a readable zip: {error}; it may be cut off: zip and upload again") from None
-        entries = self._zip.infolist()
-        _check_entries(entries, len(data), label)
-        files = [entry for entry in entries if not entry.is_dir() and not _JUNK.search(entry.filename)]
-        prefix = _prefix([entry.filename for entry in files])
-        self._entries = {entry.filename.removeprefix(prefix): entry for entry in files}
-
-    def names(self) -> list[str]:
-        """Names of all files."""
-        return list(self._entries)
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError if the archive is damaged."""
-        try:
-            return self._zip.read(self._entries[name])
-        except _BROKEN as error:
-            raise fail(f"{self.label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
-
-
 def read_zip(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a zip."""
-    return read_files(ZipFiles(data, label))
+    """Read a dataset from the bytes of a zip; names are relative to the top-level folder if there is only one."""
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(data))
+    except _BROKEN as error:
+        raise fail(label, None, f"not a readable zip: {error}; it may be cut off: zip and upload again") from None
+    _check_entries(archive.infolist(), len(data), label)
+    files = [entry for entry in archive.infolist() if not entry.is_dir() and not _JUNK.search(entry.filename)]
+    prefix = _prefix([entry.filename for entry in files])
+    entries = {entry.filename.removeprefix(prefix): entry for entry in files}
+
+    def read(name: str) -> bytes:
+        try:
+            return archive.read(entries[name])
+        except _BROKEN as error:
+            raise fail(f"{label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
+
+    return read_files(label, list(entries), read)
 
 
 def write_zip(dataset: Dataset) -> bytes:
@@ -75,19 +54,12 @@ def write_zip(dataset: Dataset) -> bytes:
 
 
 def _check_entries(entries: Sequence[zipfile.ZipInfo], packed: int, label: str) -> None:
-    if len(entries) > MAX_ENTRIES:
-        message = f"has {len(entries)} entries; at most {MAX_ENTRIES} are read: is this the right file?"
-        raise fail(label, len(entries), message)
+    check_most(label, "has", len(entries), MAX_ENTRIES, "entries", "is this the right file?")
     expanded = sum(entry.file_size for entry in entries)
-    if expanded > MAX_EXPANDED_BYTES:
-        message = f"unpacks to {expanded / MIB:.0f} MiB; at most {MAX_EXPANDED_BYTES // MIB} MiB are read: split it"
-        raise fail(label, expanded, message)
-    if expanded > RATIO_FREE_BYTES and expanded > MAX_COMPRESSION_RATIO * packed:
-        message = (
-            f"unpacks to {expanded / packed:.0f} times its size; at most {MAX_COMPRESSION_RATIO} times are "
-            "read: zip with less compression, or upload NetCDF"
-        )
-        raise fail(label, expanded, message)
+    check_most(label, "unpacks to", expanded / MIB, MAX_EXPANDED_BYTES / MIB, "MiB", "split it")
+    if expanded > RATIO_FREE_BYTES:
+        remedy = "zip with less compression, or upload NetCDF"
+        check_most(label, "unpacks to", expanded / packed, MAX_COMPRESSION_RATIO, "times its size", remedy)
     faults, seen = Faults(), set[str]()
     for entry in entries:
         problem = _entry_problem(entry) or ("appears twice in the zip; keep one" if entry.filename in seen else None)

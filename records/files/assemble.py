@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import attrgetter
 
 import numpy as np
 
@@ -16,7 +18,6 @@ from wingfit.records.files.plausibility import check_numbers
 from wingfit.records.files.table import Samples, too_much
 from wingfit.records.limits import FORMAT_VERSION, MAX_VALUES
 from wingfit.records.vehicle import Vehicle
-from wingfit.records.wing import Wing
 
 ReadSamples = Callable[[str, int], Samples]
 At = Callable[[str, Samples, int], str]
@@ -42,13 +43,7 @@ def assemble(
             continue
         room -= samples.values.size + samples.times.size
         recording = to_recording(entry, samples, document, ("recordings", index), faults)
-        check_numbers(
-            recording,
-            rig,
-            where(entry.name),
-            lambda row, name=entry.name, samples=samples: at(name, samples, row),  # type: ignore[misc]
-            faults,
-        )
+        check_numbers(recording, rig, where(entry.name), partial(at, entry.name, samples), faults)
         recordings.append(recording)
         if faults.full:
             break
@@ -69,14 +64,8 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
     for recording in dataset.recordings:
         where = f"recording {recording.name!r}"
         if dataset.kind == "tracks":
-            _check_markers(recording, dataset.wing, where, faults)
-        check_numbers(
-            recording,
-            dataset.rig,
-            where,
-            lambda row, where=where: f"{where}, frame {row}",  # type: ignore[misc]
-            faults,
-        )
+            check_markers(recording.markers, [marker.name for marker in dataset.wing.markers], where, faults)
+        check_numbers(recording, dataset.rig, where, f"{where}, frame {{}}".format, faults)
         numbers += recording.values.size + recording.times.size
     if numbers > MAX_VALUES:
         faults.extend(too_much(f"dataset {dataset.name!r}"))
@@ -99,14 +88,9 @@ def describe(dataset: Dataset) -> dict[str, object]:
 def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
     """Add a fault for every attribute that files of this kind of dataset cannot store."""
     where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
-    lost: list[tuple[str, object]] = [
-        ("markers", recording.markers),
-        ("condition.phase_lag", recording.condition.phase_lag),
-    ]
-    if not kept:
-        lost = [(name, getattr(recording, name)) for name in ("forces", "low_pass", "motion", "mass")]
-    for name, value in lost:
-        if value:
+    lost = ("markers", "condition.phase_lag") if kept else ("forces", "low_pass", "motion", "mass")
+    for name in lost:
+        if value := attrgetter(name)(recording):
             what = "a vehicle with forces" if kept else "a wing with tracks"
             faults.add(f"{where}: {name}", value, f"has no place in a dataset of {what}: remove it")
     orders = [AXES[:1], AXES[1:], AXES]
@@ -124,15 +108,14 @@ def _check_shapes(recording: Recording, faults: Faults) -> None:
             continue
         if np.shape(array) != shape or np.asarray(array).dtype != np.float64:
             found = f"{np.asarray(array).dtype} {list(np.shape(array))}"
-            faults.add(
-                f"{where}: {name}", found, f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
-            )
+            message = f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
+            faults.add(f"{where}: {name}", found, message)
 
 
-def _check_markers(recording: Recording, wing: Wing, where: str, faults: Faults) -> None:
-    known = [marker.name for marker in wing.markers]
-    for index, name in enumerate(recording.markers):
+def check_markers(markers: Sequence[str], known: Sequence[str], where: str, faults: Faults) -> None:
+    """Add a fault for every one of ``markers`` that is not ``known`` on the wing, or is named twice."""
+    for index, name in enumerate(markers):
         if name not in known:
             faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")
-        if name in recording.markers[:index]:
+        if name in markers[:index]:
             faults.add(where, name, f"marker {name!r} appears twice; keep one")

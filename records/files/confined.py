@@ -110,13 +110,8 @@ def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> byt
 
 def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Limits) -> int:
     """Run the child on the standard ``streams``; its exit status, or minus the signal that ended it."""
-    command = [
-        sys.executable,
-        "-P",
-        "-m",
-        "wingfit.records.files.confined",
-        json.dumps({"label": label, "limits": asdict(limits)}),
-    ]
+    options = json.dumps({"label": label, "limits": asdict(limits)})
+    command = [sys.executable, "-P", "-m", "wingfit.records.files.confined", options]
     # Only the necessary part of the server's environment, which may contain secrets.
     environment = {name: os.environ[name] for name in ENVIRONMENT if name in os.environ} | {
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
@@ -144,18 +139,14 @@ def _failure(status: int, label: str, limits: Limits) -> Exception:
         return ReaderError("the process that reads NetCDF files cannot start; see the log of the server")
     if status == -signal.SIGKILL:
         return ReaderError("the system ended the process that read the file, probably for want of memory; try later")
-    return fail(label, None, _why(status, limits))
-
-
-def _why(status: int, limits: Limits) -> str:
-    if status == -signal.SIGXCPU:
-        return f"takes more than {limits.processor_s} s of processor time to read; {REWRITE}, or write larger chunks"
-    if status == -signal.SIGALRM:
-        return f"was not read within {limits.wall_s} s; {REWRITE}, or try again when the server is less busy"
-    if status == -signal.SIGXFSZ:
-        return f"takes more than {limits.output_mib} MiB unpacked; split the dataset"
     what = f"signal {-status}" if status < 0 else f"exit status {status}"
-    return f"the HDF5 library fails on it ({what}); {REWRITE}"
+    processor = f"takes more than {limits.processor_s} s of processor time to read"
+    causes = {
+        -signal.SIGXCPU: f"{processor}; {REWRITE}, or write larger chunks",
+        -signal.SIGALRM: f"was not read within {limits.wall_s} s; {REWRITE}, or try again when the server is less busy",
+        -signal.SIGXFSZ: f"takes more than {limits.output_mib} MiB unpacked; split the dataset",
+    }
+    return fail(label, None, causes.get(status, f"the HDF5 library fails on it ({what}); {REWRITE}"))
 
 
 def _faults(answer: bytes, label: str) -> DatasetError:
@@ -192,10 +183,8 @@ def main(arguments: Sequence[str]) -> None:
     except DatasetError as error:
         _refuse([[fault.where, fault.value, fault.message] for fault in error.errors], error.count)
     except MemoryError:
-        message = (
-            f"takes more than {limits.memory_mib} MiB of memory to read; write smaller chunks, or split the dataset"
-        )
-        _refuse([[label, None, message]], 1)
+        remedy = "write smaller chunks, or split the dataset"
+        _refuse([[label, None, f"takes more than {limits.memory_mib} MiB of memory to read; {remedy}"]], 1)
     except OSError as error:  # of the output: those of the file are faults
         traceback.print_exc()
         sys.exit(error.errno if error.errno in DISK_FULL else READ_FAILED)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
-from wingfit.records.dataset import Dataset, Recording
+from wingfit.records.dataset import Dataset
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
-from wingfit.records.errors import DatasetError, Faults, fail
+from wingfit.records.errors import DatasetError, Faults, check_most, fail
 from wingfit.records.files.assemble import assemble, checked_description
 from wingfit.records.files.forces import read_forces
 from wingfit.records.files.table import Samples, write_table
@@ -20,82 +20,53 @@ DESCRIPTION = "dataset.yaml"
 RECORDINGS = "recordings"
 
 
-class Files(Protocol):
-    """A folder or archive."""
+def read_folder(path: Path) -> Dataset:
+    """Read the dataset in a folder; DatasetError lists its errors."""
+    top = [file.name for file in path.iterdir() if file.is_file()]
+    names = top + [f"{RECORDINGS}/{file.name}" for file in (path / RECORDINGS).glob("*") if file.is_file()]
+    check_most(str(path), "holds", len(names), MAX_ENTRIES, "files", "is this the right folder?")
 
-    @property
-    def label(self) -> str:
-        """Its name in messages."""
-        ...
-
-    def names(self) -> list[str]:
-        """Names of all files, folders separated by '/'."""
-        ...
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file."""
-        ...
-
-
-class FolderFiles:
-    """Files in a folder."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.label = str(path)
-
-    def names(self) -> list[str]:
-        """Files that may belong to a dataset: those of the folder and of ``recordings``."""
-        top = [path.name for path in self.path.iterdir() if path.is_file()]
-        inner = [f"{RECORDINGS}/{p.name}" for p in (self.path / RECORDINGS).glob("*") if p.is_file()]
-        names = top + inner
-        if len(names) > MAX_ENTRIES:
-            message = f"holds {len(names)} files; at most {MAX_ENTRIES} are read: is this the right folder?"
-            raise fail(self.label, len(names), message)
-        return names
-
-    def read(self, name: str) -> bytes:
-        """Contents of a file; DatasetError if it is too large or not readable."""
-        path = self.path / name
+    def read(name: str) -> bytes:
         try:
-            size = path.stat().st_size
-            if size > MAX_EXPANDED_BYTES:
-                message = f"is {size / MIB:.0f} MiB; at most {MAX_EXPANDED_BYTES // MIB} MiB are read: split it"
-                raise fail(name, size, message)
-            return path.read_bytes()
+            check_most(name, "is", (path / name).stat().st_size / MIB, MAX_EXPANDED_BYTES / MIB, "MiB", "split it")
+            return (path / name).read_bytes()
         except OSError as error:
             raise fail(name, None, f"cannot be read: {error.strerror}; check its permissions") from None
 
+    return read_files(str(path), names, read)
 
-def read_files(files: Files) -> Dataset:
-    """Read a dataset; DatasetError lists its errors."""
-    names = files.names()
+
+def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> Dataset:
+    """Read a dataset from files called ``names``, folders separated by "/"; DatasetError lists its errors.
+
+    ``label`` is the name of the folder or archive in messages.
+    """
     if DESCRIPTION not in names:
-        raise fail(files.label, None, _no_description(names))
-    document = read_yaml(files.read(DESCRIPTION), DESCRIPTION)
+        raise fail(label, None, _no_description(names))
+    document = read_yaml(contents_of(DESCRIPTION), DESCRIPTION)
     markers = document.names("wing", "markers")
     listed = document.names("recordings")
 
     def read(name: str, room: int) -> Samples:
         file = sample_file(name)
         if file not in names:
-            raise fail(document.where(_place(listed, name)), name, _no_samples(file, names))
+            place = ("recordings", listed.index(name), "name") if name in listed else ("recordings",)
+            raise fail(document.where(place), name, _no_samples(file, names))
         if model_of(document.data) is VehicleDatasetFile:
-            return read_forces(files.read(file), file, room)
-        return read_tracks(files.read(file), file, markers, room)
+            return read_forces(contents_of(file), file, room)
+        return read_tracks(contents_of(file), file, markers, room)
 
-    def at(name: str, samples: Samples, row: int) -> str:
-        return f"{sample_file(name)}, line {samples.lines[row]}"
-
-    faults = Faults()
-    dataset = None
+    faults, dataset = Faults(), None
     try:
-        dataset = assemble(document, read, sample_file, at)
+        dataset = assemble(
+            document, read, sample_file, lambda name, s, row: f"{sample_file(name)}, line {s.lines[row]}"
+        )
     except DatasetError as error:
         faults.extend(error)
     for name in sorted(names):
-        if name.startswith(f"{RECORDINGS}/") and name.lower().endswith(".csv") and _stem(name) not in listed:
-            message = f"is not listed in {DESCRIPTION}; add '- name: {_stem(name)}' to recordings, or remove it"
+        stem = name.rpartition("/")[2][: -len(".csv")]
+        if name.startswith(f"{RECORDINGS}/") and name.lower().endswith(".csv") and stem not in listed:
+            message = f"is not listed in {DESCRIPTION}; add '- name: {stem}' to recordings, or remove it"
             faults.add(name, name, message)
     faults.raise_any()
     assert dataset is not None  # noqa: S101 - otherwise there was a fault
@@ -106,13 +77,9 @@ def contents(dataset: Dataset) -> dict[str, bytes]:
     """Contents of the files of ``dataset`` by name, sorted; DatasetError if it violates the format."""
     files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
     for recording in sorted(dataset.recordings, key=lambda r: r.name):
-        files[sample_file(recording.name)] = _table(recording).encode()
+        columns = [f"{channel}_{'n' if recording.forces else 'm'}" for channel in recording.channels]
+        files[sample_file(recording.name)] = write_table(columns, recording.times, recording.values).encode()
     return files
-
-
-def _table(recording: Recording) -> str:
-    unit = "n" if recording.kind == "forces" else "m"
-    return write_table([f"{channel}_{unit}" for channel in recording.channels], recording.times, recording.values)
 
 
 def write_folder(dataset: Dataset, path: Path) -> None:
@@ -128,14 +95,6 @@ def write_folder(dataset: Dataset, path: Path) -> None:
 def sample_file(name: str) -> str:
     """Name of the file with the samples of a recording."""
     return f"{RECORDINGS}/{name}.csv"
-
-
-def _stem(name: str) -> str:
-    return name.rpartition("/")[2][: -len(".csv")]
-
-
-def _place(listed: list[str], name: str) -> tuple[str | int, ...]:
-    return ("recordings", listed.index(name), "name") if name in listed else ("recordings",)
 
 
 def _no_description(names: list[str]) -> str:

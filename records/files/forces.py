@@ -13,16 +13,11 @@ from wingfit.records.limits import MAX_VALUES
 AXES: tuple[ForceAxis, ...] = ("x", "z")
 _COLUMNS = {f"force_{axis}_n": axis for axis in AXES}
 _FORCE = re.compile(r"(?:forces?|f)?_?(?P<axis>[xyz])(?:_?(?P<unit>n|mn|un|kn|gf?|kgf?|lbf|newtons?))?", re.IGNORECASE)
+_GRAM, _KILOGRAM = "1 gram-force = 0.00980665 N", "1 kilogram-force = 9.80665 N"
 _IN_NEWTONS = {
-    "mn": "1 mN = 0.001 N",
-    "un": "1 uN = 1e-6 N",
-    "kn": "1 kN = 1000 N",
-    "g": "1 gram-force = 0.00980665 N",
-    "gf": "1 gram-force = 0.00980665 N",
-    "kg": "1 kilogram-force = 9.80665 N",
-    "kgf": "1 kilogram-force = 9.80665 N",
-    "lbf": "1 lbf = 4.44822 N",
-}
+    "mn": "1 mN = 0.001 N", "un": "1 uN = 1e-6 N", "kn": "1 kN = 1000 N", "lbf": "1 lbf = 4.44822 N",
+    "g": _GRAM, "gf": _GRAM, "kg": _KILOGRAM, "kgf": _KILOGRAM,
+}  # fmt: skip
 _WIND_AXES = re.compile(r"(?:lift|drag|thrust)(?:_?[a-z]+)?", re.IGNORECASE)
 
 

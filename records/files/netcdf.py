@@ -27,8 +27,8 @@ from wingfit.records.array_types import Array
 from wingfit.records.dataset import Dataset, Recording
 from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
-from wingfit.records.errors import DatasetError, fail, nearest, shown
-from wingfit.records.files.assemble import assemble, checked_description
+from wingfit.records.errors import DatasetError, Faults, check_most, fail, shown
+from wingfit.records.files.assemble import assemble, check_markers, checked_description
 from wingfit.records.files.folder import RECORDINGS
 from wingfit.records.files.forces import AXES
 from wingfit.records.files.parsed import Parsed
@@ -64,19 +64,18 @@ def write_netcdf(dataset: Dataset) -> bytes:
 
 
 def _write_recording(group: Any, recording: Recording) -> None:
-    frames, markers = len(recording.times), recording.markers
-    axes: tuple[str, ...]
+    labels: tuple[str, ...]
+    dimensions: tuple[str, ...]
     if recording.kind == "forces":
-        group.dimensions = {"time": frames, "axis": len(recording.forces)}
-        of, names = "axis", np.array(recording.forces, dtype=object)
-        name, unit, axes, data = "force_n", "N", ("time", "axis"), recording.values
+        dimensions, labels, name, unit, data = ("time", "axis"), recording.forces, "force_n", "N", recording.values
     else:
-        group.dimensions = {"time": frames, "marker": len(markers), "axis": 3}
-        of, names = "marker", np.array(markers, dtype=object)
-        name, unit, axes, data = "position_m", "m", ("time", "marker", "axis"), recording.positions
-    group.create_variable(of, (of,), dtype=h5py.string_dtype(), data=names)
+        dimensions, labels = ("time", "marker", "axis"), recording.markers
+        name, unit, data = "position_m", "m", recording.positions
+    group.dimensions = dict(zip(dimensions, data.shape, strict=True))
+    of = dimensions[1]
+    group.create_variable(of, (of,), dtype=h5py.string_dtype(), data=np.array(labels, dtype=object))
     group.create_variable("time_s", ("time",), data=recording.times).attrs["units"] = "s"
-    values = group.create_variable(name, axes, data=data, fillvalue=np.nan, compression="gzip", shuffle=True)
+    values = group.create_variable(name, dimensions, data=data, fillvalue=np.nan, compression="gzip", shuffle=True)
     values.attrs["units"] = unit
 
 
@@ -92,6 +91,10 @@ def parse_netcdf(
 
     ``storage``: refuse chunks, filters and fixed-length texts by which a small file needs much memory.
     """
+
+    def place(name: str) -> str:
+        return f"{label}: {RECORDINGS}/{name}"
+
     with _damage(label), h5py.File(opened, "r") as file:
         text, samples = _attribute(file, "dataset_yaml", label), dict[str, Samples]()
         document = read_yaml(text, f"{label}: dataset_yaml")
@@ -100,29 +103,19 @@ def parse_netcdf(
         unlisted = sorted(set(listed) - set(document.names("recordings")))
         if unlisted:
             message = "this group is not listed in dataset_yaml; add it under recordings, or remove the group"
-            raise fail(f"{label}: {RECORDINGS}/{unlisted[0]}", unlisted[0], message)
+            raise fail(place(unlisted[0]), unlisted[0], message)
 
         def read(name: str, room: int) -> Samples:
-            where = f"{label}: {RECORDINGS}/{name}"
+            where = place(name)
             with _damage(where):
                 group = _group(listed, name, where)
                 forces = model_of(document.data) is VehicleDatasetFile
                 limit = Limit(room, most, storage)
-                samples[name] = _forces(group, where, limit) if forces else _tracks(group, where, markers, limit)
+                samples[name] = _samples(group, where, None if forces else markers, limit)
                 return samples[name]
 
-        dataset = assemble(
-            document,
-            read,
-            lambda name: f"{label}: {RECORDINGS}/{name}",
-            lambda name, _, row: _at(label, name, row),
-            most,
-        )
+        dataset = assemble(document, read, place, lambda name, _, row: f"{place(name)}, time index {row}", most)
     return dataset, Parsed(text, samples)
-
-
-def _at(label: str, name: str, row: int) -> str:
-    return f"{label}: {RECORDINGS}/{name}, time index {row}"
 
 
 @contextmanager
@@ -141,10 +134,8 @@ def _attribute(file: Any, name: str, label: str) -> bytes:
     if name not in file.attrs:
         message = f"attribute {name!r} is missing; it must hold the text of dataset.yaml (docs/formats.md)"
         raise fail(label, None, message)
-    size = file.attrs.get_id(name).dtype.itemsize
-    if size > MAX_DESCRIPTION_BYTES:
-        message = f"attribute {name!r} takes {size / MIB:.0f} MiB; at most {MAX_DESCRIPTION_BYTES // MIB} MiB are read"
-        raise fail(label, size, message)
+    size = file.attrs.get_id(name).dtype.itemsize / MIB
+    check_most(label, f"attribute {name!r} takes", size, MAX_DESCRIPTION_BYTES / MIB, "MiB", "put samples in groups")
     value = file.attrs[name]
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
@@ -179,41 +170,29 @@ def _variable(group: Any, name: str, where: str) -> Any:
     return variable
 
 
-def _tracks(group: Any, where: str, known: list[str], limit: Limit) -> Samples:
-    times, positions = _variable(group, "time_s", where), _variable(group, "position_m", where)
-    names = _variable(group, "marker", where)
-    frames, count = times.shape[0] if len(times.shape) == 1 else -1, names.size
-    if positions.shape != (frames, count, 3) or names.shape != (count,):
-        message = (
-            f"shapes time_s {list(times.shape)}, marker {list(names.shape)}, position_m "
-            f"{list(positions.shape)} do not fit; they must be [T], [M] and [T, M, 3]"
-        )
-        raise fail(where, list(positions.shape), message)
-    if count > limits.MAX_MARKERS:
-        raise fail(where, count, f"{count} markers; at most {limits.MAX_MARKERS} are read: remove some")
-    _check_size(times, positions, where, limit)
-    markers = _names(names, "marker", where, limit)
-    _check_names(markers, known, where)
-    values = _numbers(positions).reshape(frames, 3 * count)
-    return Samples(_numbers(times), values, np.arange(frames), markers=markers)
-
-
-def _forces(group: Any, where: str, limit: Limit) -> Samples:
-    times, forces, names = (_variable(group, name, where) for name in ("time_s", "force_n", "axis"))
+def _samples(group: Any, where: str, known: list[str] | None, limit: Limit) -> Samples:
+    """The samples in a group: tracks of ``known`` markers, or forces if that is None."""
+    labels, name, inner = ("axis", "force_n", ()) if known is None else ("marker", "position_m", (3,))
+    times, values, names = (_variable(group, each, where) for each in ("time_s", name, labels))
     frames = times.shape[0] if len(times.shape) == 1 else -1
-    if names.shape not in {(1,), (2,)} or forces.shape != (frames, *names.shape):
-        message = (
-            f"shapes time_s {list(times.shape)}, axis {list(names.shape)}, force_n {list(forces.shape)} do not fit; "
-            "they must be [T], [C] and [T, C], with 1 or 2 axes"
-        )
-        raise fail(where, list(forces.shape), message)
-    _check_size(times, forces, where, limit)
-    found = _names(names, "axis", where, limit)
+    if len(names.shape) != 1 or values.shape != (frames, *names.shape, *inner):
+        shapes = f"time_s {list(times.shape)}, {labels} {list(names.shape)}, {name} {list(values.shape)}"
+        fitting = "[T], [C] and [T, C]" if known is None else "[T], [M] and [T, M, 3]"
+        raise fail(where, list(values.shape), f"shapes {shapes} do not fit; they must be {fitting}")
+    check_most(where, "", names.size, limits.MAX_MARKERS, f"entries of {labels}", "remove some")
+    _check_size(times, values, where, limit)
+    found = _names(names, labels, where, limit)
+    instants, numbers = np.arange(frames), _numbers(values)
+    if known is not None:
+        faults = Faults()
+        check_markers(found, known, where, faults)
+        faults.raise_any()
+        return Samples(_numbers(times), numbers.reshape(frames, 3 * len(found)), instants, markers=found)
     axes = tuple(axis for axis in AXES if axis in found)
-    if len(axes) != len(found):
-        raise fail(where, ", ".join(found), f"axis is {', '.join(found)}; it must hold x, z, or both")
-    values = np.ascontiguousarray(_numbers(forces)[:, [found.index(axis) for axis in axes]])
-    return Samples(_numbers(times), values, np.arange(frames), forces=axes)
+    if not axes or len(axes) != len(found):
+        raise fail(where, ", ".join(found), f"axis is {', '.join(found) or 'empty'}; it must hold x, z, or both")
+    ordered = np.ascontiguousarray(numbers[:, [found.index(axis) for axis in axes]])
+    return Samples(_numbers(times), ordered, instants, forces=axes)
 
 
 def _numbers(variable: Any) -> Array:
@@ -228,8 +207,7 @@ def _numbers(variable: Any) -> Array:
 
 def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
     """Check the declared sizes before memory is allocated for them."""
-    if times.size > limits.MAX_ROWS:
-        raise fail(where, times.size, f"{times.size} times; at most {limits.MAX_ROWS} are read: cut it")
+    check_most(where, "", times.size, limits.MAX_ROWS, "times", "cut the recording in parts")
     if times.size + values.size > limit.left:
         raise too_much(where, limit.most)
     for variable in (times, values):
@@ -242,36 +220,20 @@ def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
 
 def _check_storage(variable: Any, where: str) -> None:
     """Refuse chunks and filters by which a small file needs much memory."""
-    chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize
-    if chunk > MAX_CHUNK_BYTES:
-        message = (
-            f"a chunk of {variable.name} takes {chunk / MIB:.0f} MiB; at most {MAX_CHUNK_BYTES // MIB} MiB are read"
-        )
-        raise fail(where, chunk, f"{message}: write smaller chunks")
+    chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize / MIB
+    check_most(where, f"a chunk of {variable.name} takes", chunk, MAX_CHUNK_BYTES / MIB, "MiB", "write smaller chunks")
     pipeline = variable.id.get_create_plist()
     filters = [pipeline.get_filter(index)[0] for index in range(pipeline.get_nfilters())]
     if set(filters) - FILTERS or len(set(filters)) < len(filters):
-        message = (
-            f"{variable.name} is packed by the HDF5 filters {filters}; pack it by deflate alone, once, or not at all"
-        )
-        raise fail(where, str(filters), message)
+        remedy = "pack it by deflate alone, once, or not at all"
+        raise fail(where, str(filters), f"{variable.name} is packed by the HDF5 filters {filters}; {remedy}")
 
 
 def _names(variable: Any, name: str, where: str, limit: Limit) -> tuple[str, ...]:
     if h5py.check_string_dtype(variable.dtype) is None:
         raise fail(where, str(variable.dtype), f"{name} is of type {variable.dtype}; it must hold text")
-    if limit.storage and variable.dtype.itemsize > limits.MAX_NAME_BYTES:
-        size = variable.dtype.itemsize
-        message = f"each {name} takes {size} bytes; at most {limits.MAX_NAME_BYTES} are read: shorten the type"
-        raise fail(where, str(variable.dtype), message)
     if limit.storage:
+        size = variable.dtype.itemsize
+        check_most(where, f"each {name} takes", size, limits.MAX_NAME_BYTES, "bytes", "shorten the type")
         _check_storage(variable, where)
     return tuple(str(text) for text in variable.asstr()[:])
-
-
-def _check_names(markers: tuple[str, ...], known: list[str], where: str) -> None:
-    for index, name in enumerate(markers):
-        if name not in known:
-            raise fail(where, name, f"no marker is called {name!r} in dataset_yaml; {nearest(name, known)}")
-        if name in markers[:index]:
-            raise fail(where, name, f"marker {name!r} appears twice; keep one")

@@ -49,8 +49,7 @@ class Parsed:
 def pack(parsed: Parsed, into: IO[bytes]) -> None:
     """Write ``parsed`` piece by piece; the same contents give the same bytes."""
     layout = {
-        name: {"instants": len(one.times), "markers": one.markers, "forces": one.forces}
-        for name, one in parsed.samples.items()
+        n: {"instants": len(s.times), "markers": s.markers, "forces": s.forces} for n, s in parsed.samples.items()
     }
     with zipfile.ZipFile(into, "w", zipfile.ZIP_DEFLATED, compresslevel=DEFLATE_LEVEL) as archive:
         for name, text in ((DESCRIPTION, parsed.description), (LAYOUT, json.dumps(layout).encode())):

@@ -23,15 +23,11 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
-        faults.add(
-            where,
-            frames,
-            f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it",
-        )
-    if isinstance(rig, Wing) and not 1 <= len(recording.markers) <= limits.MAX_MARKERS:
-        faults.add(
-            where, len(recording.markers), f"{len(recording.markers)} markers; it must be 1 to {limits.MAX_MARKERS}"
-        )
+        message = f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it"
+        faults.add(where, frames, message)
+    markers = len(recording.markers)
+    if isinstance(rig, Wing) and not 1 <= markers <= limits.MAX_MARKERS:
+        faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
     increasing = _check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:_SHOWN]:
@@ -74,13 +70,11 @@ def _check_positions(
     limit = limits.IMPLAUSIBLE_SPANS * wing.span
     if distance > limit:
         far = distance / wing.span
-        unit = (
-            "millimetres" if far > 100 else "centimetres" if far > 10 else "feet, or a frame whose origin is elsewhere,"
-        )
+        elsewhere = "feet, or a frame whose origin is elsewhere,"
+        unit = "millimetres" if far > 100 else "centimetres" if far > 10 else elsewhere
         message = (
-            f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span "
-            f"(limit {limit:.4g} m); that looks like {unit} in columns named _m: "
-            "convert to metres, in the wing frame"
+            f"positions are typically {distance:.4g} m from the hinge, of a wing with {wing.span:.4g} m span (limit "
+            f"{limit:.4g} m); that looks like {unit} in columns named _m: convert to metres, in the wing frame"
         )
         faults.add(where, f"{distance:.4g}", message)
         return
@@ -121,8 +115,7 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
         which = " and ".join(sizes) + (" are" if len(sizes) > 1 else " is")
         faults.add(where, 0.0, f"{which} zero throughout; check the channel, or leave the recording out")
         return
-    mass = vehicle.mass if recording.mass is None else recording.mass
-    weight = mass * STANDARD_GRAVITY
+    weight = STANDARD_GRAVITY * (vehicle.mass if recording.mass is None else recording.mass)
     largest, force = max(sizes.items(), key=lambda item: item[1])
     low, high = limits.NEGLIGIBLE_WEIGHTS * weight, limits.IMPLAUSIBLE_WEIGHTS * weight
     if not low <= force <= high:
@@ -179,8 +172,5 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
         )
         faults.add(where, low_pass.cutoff, message)
     if low_pass is not None and low_pass.cutoff >= 0.5 / step:
-        message = (
-            f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; it must be below half the sampling rate, {0.5 / step:.6g} "
-            "Hz: check both, or omit low_pass"
-        )
-        faults.add(where, low_pass.cutoff, message)
+        rule = f"it must be below half the sampling rate, {0.5 / step:.6g} Hz: check both, or omit low_pass"
+        faults.add(where, low_pass.cutoff, f"low_pass.cutoff_hz is {low_pass.cutoff:g} Hz; {rule}")

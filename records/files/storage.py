@@ -7,9 +7,9 @@ import tempfile
 from pathlib import Path
 
 from wingfit.records.dataset import Dataset
-from wingfit.records.errors import fail, shown
+from wingfit.records.errors import check_most, fail, shown
 from wingfit.records.files.archive import read_zip, write_zip
-from wingfit.records.files.folder import FolderFiles, read_files, write_folder
+from wingfit.records.files.folder import read_folder, write_folder
 from wingfit.records.files.netcdf import read_netcdf, write_netcdf
 from wingfit.records.limits import MAX_ARCHIVE_BYTES, MIB
 
@@ -29,12 +29,11 @@ def load_dataset(path: str | Path) -> Dataset:
     """Read the folder, zip or NetCDF file at ``path``; DatasetError lists its errors."""
     path = Path(path)
     if path.is_dir():
-        return read_files(FolderFiles(path))
+        return read_folder(path)
     if path.name == "dataset.yaml" and path.is_file():
-        return read_files(FolderFiles(path.parent))
+        return read_folder(path.parent)
     try:
-        size = path.stat().st_size
-        _check_size(size, str(path))
+        _check_size(path.stat().st_size, str(path))
         return load_archive(path.read_bytes(), path.name)
     except OSError as error:
         raise fail(str(path), None, f"cannot be read: {error.strerror}; check the path") from None
@@ -86,9 +85,7 @@ def save_dataset(dataset: Dataset, path: str | Path) -> None:
 
 
 def _check_size(size: int, label: str) -> None:
-    if size > MAX_ARCHIVE_BYTES:
-        message = f"is {size / MIB:.0f} MiB; at most {MAX_ARCHIVE_BYTES // MIB} MiB are read: split the dataset"
-        raise fail(label, size, message)
+    check_most(label, "is", size / MIB, MAX_ARCHIVE_BYTES / MIB, "MiB", "split the dataset")
 
 
 def _replace(path: Path, data: bytes) -> None:

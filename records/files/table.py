@@ -84,24 +84,20 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
 
 def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str | None]) -> dict[str, int]:
     """Index of each column by name; ``problem(name)`` returns the fault of a column other than ``time_s``, or None."""
-    _check_separator(header, where)
+    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
+        if len(header) == 1 and separator in header[0]:
+            message = f"the columns are separated by {word}; separate by commas, with decimal points"
+            raise fail(where, header[0], message)
     columns, faults = dict[str, int](), Faults()
     for index, name in enumerate(header):
-        message = _column_problem(name, columns) or (problem(name) if name != "time_s" else None)
-        if message:
-            faults.add(f"{where}, column {index + 1}", name, message)
+        wrong = _column_problem(name, columns) or (problem(name) if name != "time_s" else None)
+        if wrong:
+            faults.add(f"{where}, column {index + 1}", name, wrong)
         columns.setdefault(name, index)
     faults.raise_any()
     if "time_s" not in columns:
         raise fail(where, header[0], "column 'time_s' is missing; add it first, with times in seconds")
     return columns
-
-
-def _check_separator(header: Sequence[str], where: str) -> None:
-    for separator, word in ((";", "semicolons"), ("\t", "tabs")):
-        if len(header) == 1 and separator in header[0]:
-            message = f"the columns are separated by {word}; separate by commas, with decimal points"
-            raise fail(where, header[0], message)
 
 
 def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
@@ -118,7 +114,7 @@ def _rows(
     reader: Iterable[list[str]], header: Sequence[str], file: str, room: int, gap: str | None
 ) -> tuple[Array, Index]:
     """Read all rows as numbers [T, columns], and their lines; ``gap`` is None if the text has no letters."""
-    convert: Callable[[list[str]], list[float]] = _fast if gap is None else _strict
+    convert = _fast if gap is None else _strict
     numbers, lines, width, faults = array("d"), array("q"), len(header), Faults()
     line = getattr(reader, "line_num", 1)
     for row in reader:
@@ -135,13 +131,16 @@ def _rows(
             lines.append(line)
         if faults.full:
             break
-        _check_size(len(lines), len(numbers), file, room)
+        if len(lines) > MAX_ROWS:
+            message = f"has more than {MAX_ROWS} rows, the most that are read; cut the recording in parts"
+            raise fail(file, len(lines), message)
+        if len(numbers) > room:
+            raise too_much(file)
     faults.raise_any()
     matrix = np.frombuffer(numbers, dtype=np.float64).reshape(-1, width)
     for index, column in np.argwhere(np.isinf(matrix))[:10]:
-        faults.add(
-            f"{file}, line {lines[index]}, column {header[column]!r}", None, "is too large for a number; check its unit"
-        )
+        place = f"{file}, line {lines[index]}, column {header[column]!r}"
+        faults.add(place, None, "is too large for a number; check its unit")
     faults.raise_any()
     return matrix, np.array(lines, dtype=np.int64)
 
@@ -186,13 +185,6 @@ def _not_a_number(text: str, gap: str) -> str:
 def _ragged(row: list[str], width: int) -> str:
     cause = "the line is cut off, or commas are missing" if len(row) < width else "decimal commas, or a comma too many"
     return f"has {len(row)} cells where the header has {width}; {cause}"
-
-
-def _check_size(rows: int, numbers: int, file: str, room: int) -> None:
-    if rows > MAX_ROWS:
-        raise fail(file, rows, f"has more than {MAX_ROWS} rows, the most that are read; cut the recording in parts")
-    if numbers > room:
-        raise too_much(file)
 
 
 def too_much(where: str, most: int = MAX_VALUES) -> DatasetError:

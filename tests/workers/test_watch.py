@@ -168,8 +168,9 @@ def test_the_most_recent_problems_are_remembered(monkeypatch: pytest.MonkeyPatch
 
 def test_counts_add_up() -> None:
     tally = Tally()
-    tally.count(died=1, restarts=1)
-    tally.count(hung=2, restarts=2)
+    tally.replaced("died")
+    tally.replaced("hung")
+    tally.replaced("hung")
     assert tally.standing(4) == Standing(4, 1, 2, 3)
 
 
