@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
 
 from wingfit.report.markup import Markup, tag
-from wingfit.report.style import style_sheet
 
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
@@ -18,7 +19,7 @@ def document(title: str, *body: object) -> str:
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
         tag("title", title),
-        tag("style", Markup(style_sheet())),
+        tag("style", _style_sheet()),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, tag('body', *body), lang='en')}\n"
 
@@ -54,3 +55,8 @@ def folded(summary: str, *parts: object) -> Markup:
 
 def _side(column: int, first: int) -> str | None:
     return "number" if column >= first else None
+
+
+@cache
+def _style_sheet() -> Markup:
+    return Markup(Path(__file__).with_name("style.css").read_text(encoding="utf-8"))

@@ -1,7 +1,7 @@
 """SVG charts: axes with round numbers, marks, colour levels, legends.
 
 Drawings are about 360 units wide, so that text keeps its size on a phone, where each fills the width. Colours are CSS
-classes, defined in :mod:`wingfit.report.style` for light and dark.
+classes, defined in style.css for light and dark.
 """
 
 from __future__ import annotations
