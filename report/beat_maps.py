@@ -26,8 +26,8 @@ from wingfit.report.svg import (
     LEVELS,
     SIDES,
     Axis,
-    area,
     axis,
+    band,
     cells,
     colour_bar,
     curve,
@@ -35,14 +35,17 @@ from wingfit.report.svg import (
     legend,
     level,
     line,
+    places,
     side,
     text,
+    turned_text,
     x_axis,
     y_axis,
 )
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT
+ACROSS = Axis(0, 1, LEFT, RIGHT)
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 NINETY = reach()
@@ -141,23 +144,17 @@ def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: 
 def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
     rows = {stage: [v * scale.factor for v in getattr(given, stage)[0]] for stage in stages(finding)}
     noise = given.noise * scale.factor
-    across, up = (
-        Axis(0, 1, LEFT, RIGHT),
-        axis([noise, *(v for row in rows.values() for v in row)], BOTTOM, TOP, zero=True),
-    )
-    return drawing(
-        WIDTH,
-        BOTTOM + 34,
-        _misfit_caption(finding, given, scale),
-        text(LEFT, 14, "Misfit over the beat", class_="title"),
-        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
-        y_axis(up, LEFT, RIGHT, f"misfit, {scale.unit}"),
-        line(LEFT, up.at(noise), RIGHT, up.at(noise), "noise"),
-        *(
-            curve([(across.at(p), up.at(v)) for p, v in zip(given.phase, row, strict=True)], f"curve {stage}")
-            for stage, row in rows.items()
-        ),
-    )
+    up = axis([noise, *(v for row in rows.values() for v in row)], BOTTOM, TOP, zero=True)
+    parts = [curve(places(ACROSS, given.phase, up, row), f"curve {stage}") for stage, row in rows.items()]
+    parts.insert(0, line(LEFT, up.at(noise), RIGHT, up.at(noise), "noise"))
+    label = _misfit_caption(finding, given, scale)
+    return _curves(label, "Misfit over the beat", up, f"misfit, {scale.unit}", *parts)
+
+
+def _curves(label: str, title: str, up: Axis, y_label: str, *parts: object) -> Markup:
+    """Curves over the beat, with their axes."""
+    axes = x_axis(ACROSS, TOP, BOTTOM, PHASE, BEATS), y_axis(up, LEFT, RIGHT, y_label)
+    return drawing(WIDTH, BOTTOM + 34, label, text(LEFT, 14, title, class_="title"), *axes, *parts)
 
 
 def _load_caption(load: MissingLoad, scale: Scale) -> str:
@@ -196,20 +193,15 @@ def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
     values, errors = ([v * scale.factor for v in table[0]] for table in (load.values, load.errors))
     low = [v - NINETY * e for v, e in zip(values, errors, strict=True)]
     high = [v + NINETY * e for v, e in zip(values, errors, strict=True)]
-    across, up = Axis(0, 1, LEFT, RIGHT), axis([*low, *high], BOTTOM, TOP, zero=True)
-    places = [across.at(p) for p in load.phase]
-    ends = [*zip(places, low, strict=True), *reversed(list(zip(places, high, strict=True)))]
-    title = _name(load, 42)
-    return drawing(
-        WIDTH,
-        BOTTOM + 34,
+    up, title = axis([*low, *high], BOTTOM, TOP, zero=True), _name(load, 42)
+    return _curves(
         f"Missing {_kind(load)} over the beat, {title}",
-        text(LEFT, 14, title, class_="title"),
-        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
-        y_axis(up, LEFT, RIGHT, f"missing {_kind(load)}, {scale.unit}"),
-        area([(x, up.at(v)) for x, v in ends], "band"),
+        title,
+        up,
+        f"missing {_kind(load)}, {scale.unit}",
+        band(places(ACROSS, load.phase, up, low), places(ACROSS, load.phase, up, high)),
         line(LEFT, up.at(0), RIGHT, up.at(0), "axis"),
-        curve([(x, up.at(v)) for x, v in zip(places, values, strict=True)], "curve after"),
+        curve(places(ACROSS, load.phase, up, values), "curve after"),
     )
 
 
@@ -217,28 +209,21 @@ def _grid(
     title: str, bands: Numbers, classes: list[list[str | None]], over: list[list[str | None]] | None = None
 ) -> Markup:
     """Cells over phase (to the right) and span (tip on top), with axes."""
-    across, down = Axis(0, 1, LEFT, RIGHT), Axis(0, 1, TOP, BOTTOM)
+    down = Axis(0, 1, TOP, BOTTOM)
     tall = HEIGHT / len(bands)
     labels: list[Markup] = []
     every = math.ceil(13 / tall)
-    for k, band in enumerate(reversed(bands)):
+    for k, span in enumerate(reversed(bands)):
         if k % every == 0:
             y = TOP + (k + 0.5) * tall
-            labels.append(text(LEFT - 4, y + 3.5, number(round(100 * band), 3), anchor="end", class_="tick"))
-    turned = tag(
-        "text",
-        "span, % (tip on top)",
-        transform=f"translate(14,{(TOP + BOTTOM) / 2:g}) rotate(-90)",
-        text_anchor="middle",
-        class_="label",
-    )
+            labels.append(text(LEFT - 4, y + 3.5, number(round(100 * span), 3), anchor="end", class_="tick"))
     return joined(
         text(LEFT, 14, title, class_="title"),
-        cells(classes[::-1], across, down),
-        cells(over[::-1], across, down) if over else None,
-        x_axis(across, BOTTOM, BOTTOM + 3, PHASE, BEATS),
+        cells(classes[::-1], ACROSS, down),
+        cells(over[::-1], ACROSS, down) if over else None,
+        x_axis(ACROSS, BOTTOM, BOTTOM + 3, PHASE, BEATS),
         *labels,
-        turned,
+        turned_text(14, (TOP + BOTTOM) / 2, "span, % (tip on top)"),
     )
 
 

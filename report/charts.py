@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from wingfit.report.layout import document, figure, panels
 from wingfit.report.markup import Markup, tag
-from wingfit.report.svg import SERIES, Axis, area, axis, curve, dots, drawing, legend, x_axis, y_axis
+from wingfit.report.svg import SERIES, Axis, axis, band, curve, dots, drawing, legend, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
 Values = Sequence[float] | npt.NDArray[np.float64]
@@ -72,7 +72,7 @@ def _figure(chart: Chart) -> Markup:
 def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]:
     if one.band:
         low, high = ([(across.at(x), up.at(y)) for x, y in _pairs(one.x, edge)] for edge in one.band)
-        return [area([*low, *reversed(high)], "band")]
+        return [band(low, high)]
     if one.dots:
         return [dots([(across.at(x), up.at(y)) for x, y in _finite(one)], "points")]
     pieces: list[list[tuple[float, float]]] = [[]]

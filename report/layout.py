@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from string import Template
+from typing import TypeVar
 
-from wingfit.report.markup import Markup, tag
+from wingfit.report.markup import Markup, escaped, joined, tag
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+T = TypeVar("T")
 
 
 def document(title: str, *body: object) -> str:
     """One HTML file with no script that loads nothing, for screen, phone and paper."""
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", title),
-        tag("style", _style_sheet()),
+    page, style = (
+        Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("document.html", "style.css")
     )
-    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', *body), lang='en')}\n"
+    return Template(page).substitute(title=escaped(title), style=style, body=joined(*body))
 
 
 def section(heading: str, *parts: object) -> Markup:
@@ -48,6 +44,11 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int
     return tag("div", tag("table", tag("thead", top), tag("tbody", *body)), class_="scroll", tabindex="0")
 
 
+def table_of(items: Iterable[T], columns: Mapping[str, Callable[[T], object]], *, numbers: int = 0) -> Markup:
+    """A table of a row for each of ``items``; ``columns``: of each heading, the function that gives the cell."""
+    return table([*columns], [[cell(item) for cell in columns.values()] for item in items], numbers=numbers)
+
+
 def folded(summary: str, *parts: object) -> Markup:
     """Details that open on a click, and are open on paper."""
     return tag("details", tag("summary", summary), *parts)
@@ -55,8 +56,3 @@ def folded(summary: str, *parts: object) -> Markup:
 
 def _side(column: int, first: int) -> str | None:
     return "number" if column >= first else None
-
-
-@cache
-def _style_sheet() -> Markup:
-    return Markup(Path(__file__).with_name("style.css").read_text(encoding="utf-8"))

@@ -108,7 +108,7 @@ def _powers(exponents: tuple[Exponent, ...], subject: str) -> Markup | None:
         y = 44.0 * k + 40
         span = f"{number(e.low)} to {with_unit(number(e.high), e.unit)}"
         parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="value"))
-        parts.append(whisker(along, y, (e.power.low, e.power.high), e.power.value, "after"))
+        parts.append(whisker(along, y, e.power, "after"))
     caption = _scaling(exponents, subject)
     return figure(
         caption,

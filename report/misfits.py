@@ -10,7 +10,7 @@ from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, Recordi
 from wingfit.report.layout import figure, folded, panels, table
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import Scale, bounds, change, channel_scale, condition, number, shortened, stages
-from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, text, whisker, x_axis, y_axis
+from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, places, text, whisker, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 ROW, MOST_ROWS, MOST_OVERLAYS = 38.0, 18, 12
@@ -37,7 +37,7 @@ def proof(finding: Finding) -> Markup | None:
         value = f"{number(interval.value)} ({_range(interval)})"
         parts.append(text(LEFT, y - 10, f"{name}: {value}" if len(rows) > 1 else value, class_="value"))
         parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
-        parts.append(whisker(along, y + 1, (interval.low, interval.high), interval.value, name))
+        parts.append(whisker(along, y + 1, interval, name))
     return figure(
         _proof_caption(finding, given),
         panels(drawing(WIDTH, 120, _proof_caption(finding, given), *parts)),
@@ -63,16 +63,12 @@ def recordings(finding: Finding) -> Markup | None:
     scale = channel_scale(finding)
     along = _along([v * scale.factor for r in finding.recordings for v in _values(r)])
     drawings: list[Markup] = []
-    for held_out, name in ((True, "held out"), (False, "fitted")):
+    for held_out, name in ((True, "Held out"), (False, "Fitted")):
         group = [r for r in finding.recordings if r.held_out == held_out]
         chunks = [group[k : k + MOST_ROWS] for k in range(0, len(group), MOST_ROWS)]
-        for k, chunk in enumerate(chunks):
-            title = (
-                f"{name.capitalize()} ({len(group)})"
-                if len(chunks) == 1
-                else f"{name.capitalize()} ({k + 1} of {len(chunks)})"
-            )
-            drawings.append(_recordings(finding, title, chunk, along, scale))
+        for k, chunk in enumerate(chunks, 1):
+            part = f"{k} of {len(chunks)}" if len(chunks) > 1 else len(group)
+            drawings.append(_recordings(finding, f"{name} ({part})", chunk, along, scale))
     return joined(
         figure(
             _recordings_caption(finding),
@@ -130,9 +126,7 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
         floor = along.at(row.floor * scale.factor)
         parts.append(line(floor, y + 15, floor, y + 35, "floor"))
         for at, name in zip((y + 21, y + 29), stages(finding), strict=False):
-            interval: Interval = getattr(row, name)
-            ends = tuple(None if v is None else v * scale.factor for v in (interval.low, interval.high))
-            parts.append(whisker(along, at, (ends[0], ends[1]), interval.value * scale.factor, name))
+            parts.append(whisker(along, at, getattr(row, name), name, scale.factor))
     label = f"{title}: misfit by recording"
     return drawing(WIDTH, bottom + 30, label, text(LEFT, 14, title, class_="title"), *parts)
 
@@ -149,11 +143,10 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
     recorded = [v * scale.factor for v in overlay.recorded]
     residuals = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
     across = Axis(0, 1, left, right)
-    places = [across.at(p) for p in overlay.phase]
     up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
     rest = axis([v for values in residuals.values() for v in values], 226, 160, zero=True)
     title = shortened(overlay.channel, 28)
-    below = f"{shortened(overlay.recording, 30)}, {'held out' if overlay.held_out else 'fitted'}"
+    below = f"{shortened(overlay.recording, 30)}, {_use(overlay)}"
     return drawing(
         300,
         258,
@@ -164,9 +157,9 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
         y_axis(up, left, right, scale.unit),
         y_axis(rest, left, right, f"residual, {scale.unit}", count=3),
         line(left, rest.at(0), right, rest.at(0), "axis"),
-        dots([(x, up.at(v)) for x, v in zip(places, recorded, strict=True)], "samples"),
+        dots(places(across, overlay.phase, up, recorded), "samples"),
         *(
-            curve([(x, on.at(v)) for x, v in zip(places, values[name], strict=True)], f"curve {name}")
+            curve(places(across, overlay.phase, on, values[name]), f"curve {name}")
             for on, values in ((up, simulated), (rest, residuals))
             for name in simulated
         ),
@@ -178,18 +171,15 @@ def _table(finding: Finding, scale: Scale) -> Markup:
         return f"{number(interval.value * scale.factor)} ({bounds(interval, scale)})"
 
     rows = [
-        (
-            r.name,
-            "held out" if r.held_out else "fitted",
-            condition(r),
-            *(cell(getattr(r, stage)) for stage in stages(finding)),
-            number(r.floor * scale.factor),
-        )
+        (r.name, _use(r), condition(r), *(cell(getattr(r, s)) for s in stages(finding)), number(r.floor * scale.factor))
         for r in finding.recordings
     ]
-    columns = [f"{stage}, {scale.unit}" for stage in stages(finding)]
-    head = ("recording", "use", "condition", *columns, f"floor, {scale.unit}")
-    return table(head, rows, numbers=len(columns) + 1)
+    columns = [f"{name}, {scale.unit}" for name in (*stages(finding), "floor")]
+    return table(("recording", "use", "condition", *columns), rows, numbers=len(columns))
+
+
+def _use(recording: RecordingMisfit | Overlay) -> str:
+    return "held out" if recording.held_out else "fitted"
 
 
 def _along(values: Sequence[float]) -> Axis:

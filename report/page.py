@@ -5,7 +5,7 @@ from __future__ import annotations
 from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
 from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
 from wingfit.report.layout import document, figure, panels, section
-from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
     Scale,
     added_effects,
@@ -26,7 +26,7 @@ _VALIDATION = "Is the fit better on held-out recordings?"
 def html(finding: Finding) -> str:
     """The report as one HTML file, without scripts or anything to load."""
     title = f"{headline(finding)} ({finding.dataset})"
-    return document(title, _hatch(), tag("main", *_parts(finding)))
+    return document(title, tag("main", *_parts(finding)))
 
 
 def headline(finding: Finding) -> str:
@@ -158,25 +158,3 @@ def _made(finding: Finding) -> Markup:
     spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
     lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else None, versions or None]
     return tag("footer", *(tag("p", words, class_="quiet") for words in lines if words))
-
-
-def _hatch() -> Markup:
-    """Hatch patterns: of map cells that are not significant, and of bars that are linear estimates."""
-    pattern = tag(
-        "pattern",
-        tag("rect", width=6, height=6, class_="veil"),
-        tag("path", d="M0 6L6 0", class_="hatch"),
-        id="hatch",
-        width=6,
-        height=6,
-        patternUnits="userSpaceOnUse",
-    )
-    stripes = tag(
-        "pattern",
-        tag("path", d="M1.5 0V8", class_="guess-line"),
-        id="guess",
-        width=5,
-        height=8,
-        patternUnits="userSpaceOnUse",
-    )
-    return joined(tag("svg", tag("defs", pattern, stripes), class_="defs", aria_hidden="true"))

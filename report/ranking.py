@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from wingfit.diagnosis.finding import Finding, Hypothesis
-from wingfit.report.layout import figure, folded, table
+from wingfit.report.layout import figure, folded, table_of
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import best_of, channel_scale, listed, number, percent, title_of, titles
 from wingfit.report.svg import bar
@@ -51,6 +53,7 @@ def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
     scale = channel_scale(finding)
     evidence = hypothesis.evidence / top if top > 0 else 0.0
     sure = hypothesis.refitted or not hypothesis.effects
+    estimate = "" if sure else " (linear estimate, not refitted)"
     bars = [
         _bar("probability", hypothesis.probability, percent(hypothesis.probability), "strong"),
         _bar("explained", hypothesis.explained, percent(hypothesis.explained), "plain" if sure else "guess"),
@@ -61,11 +64,7 @@ def _row(hypothesis: Hypothesis, finding: Finding, top: float) -> Markup:
     about = [
         tag("h3", hypothesis.title, _family(hypothesis)),
         tag("p", hypothesis.signature) if hypothesis.signature else None,
-        tag(
-            "p",
-            f"Residual {scale.text(hypothesis.misfit)}{'' if sure else ' (linear estimate, not refitted)'}.",
-            class_="quiet",
-        ),
+        tag("p", f"Residual {scale.text(hypothesis.misfit)}{estimate}.", class_="quiet"),
         tag("p", hypothesis.source, class_="quiet") if hypothesis.source else None,
     ]
     return tag("li", tag("div", *about), tag("div", *bars, class_="bars"), class_="named" if named else None)
@@ -89,21 +88,17 @@ def _bar(name: str, part: float, value: str, class_: str) -> Markup:
 
 def _table(hypotheses: list[Hypothesis], finding: Finding) -> Markup:
     scale = channel_scale(finding)
-    rows = [
-        (
-            h.title,
-            h.family,
-            percent(h.probability),
-            f"{number(h.score)} ({h.freedom})",
-            percent(h.explained),
-            "" if h.predicted is None else percent(h.predicted),
-            _signed(h.evidence),
-            scale.text(h.misfit),
-        )
-        for h in hypotheses
-    ]
-    head = ("hypothesis", "family", "probability", "score (genes)", "explained", "predicted", "evidence", "residual")
-    return table(head, rows, numbers=6)
+    columns: dict[str, Callable[[Hypothesis], str]] = {
+        "hypothesis": lambda h: h.title,
+        "family": lambda h: h.family,
+        "probability": lambda h: percent(h.probability),
+        "score (genes)": lambda h: f"{number(h.score)} ({h.freedom})",
+        "explained": lambda h: percent(h.explained),
+        "predicted": lambda h: "" if h.predicted is None else percent(h.predicted),
+        "evidence": lambda h: _signed(h.evidence),
+        "residual": lambda h: scale.text(h.misfit),
+    }
+    return table_of(hypotheses, columns, numbers=6)
 
 
 def _alike(finding: Finding) -> Markup | None:

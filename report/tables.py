@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from wingfit.diagnosis.finding import Advice, Finding, FreeLaw, GeneValue, Interval
 from wingfit.report.layout import folded, section, table
 from wingfit.report.markup import Markup, joined, tag
@@ -18,16 +20,15 @@ from wingfit.report.number_format import (
 )
 
 MOST_GENES = 12
-_ADVICE = (
-    "rank",
-    "flapping, Hz",
-    "lag, °",
-    "pressure, mbar",
-    "airspeed, m/s",
-    "angle of attack, °",
-    "separation, sigma",
-    "probability of a decision",
-)
+_ADVICE: dict[str, Callable[[Advice], str]] = {
+    "flapping, Hz": lambda a: number(a.flap_frequency_hz),
+    "lag, °": lambda a: number(a.phase_lag_deg),
+    "pressure, mbar": lambda a: number(a.pressure_mbar, 4),
+    "airspeed, m/s": lambda a: number(a.airspeed),
+    "angle of attack, °": lambda a: number(a.angle_of_attack_deg),
+    "separation, sigma": lambda a: number(a.separation, 2),
+    "probability of a decision": lambda a: percent(a.resolves),
+}
 
 
 def genes(finding: Finding) -> Markup | None:
@@ -50,14 +51,11 @@ def law(given: FreeLaw | None) -> Markup | None:
     """The free-form law of a residual that no effect of the library explains."""
     if given is None:
         return None
-    rows = [
-        (term.feature, number(term.coefficient.value), _bounds(term.coefficient, term.unit), term.unit)
-        for term in given.terms
-    ]
+    rows = [(t.feature, number(t.coefficient.value), _bounds(t.coefficient, t.unit), t.unit) for t in given.terms]
     return section(
         "Free-form law of the residual",
         tag("p", given.words),
-        table(("term", "coefficient", "90 % interval", "unit"), rows, numbers=0) if rows else None,
+        table(("term", "coefficient", "90 % interval", "unit"), rows) if rows else None,
         tag("p", f"It explains {percent(given.explained)} of the misfit beyond the noise (cross-validated)."),
     )
 
@@ -69,12 +67,12 @@ def advice(finding: Finding) -> Markup | None:
     known = titles(finding)
     best = finding.advice[0]
     between = ", ".join(title_of(name, known) for name in best.between)
-    rows = [_advice(k, a) for k, a in enumerate(finding.advice, 1)]
+    rows = [[rank, *(cell(a) for cell in _ADVICE.values())] for rank, a in enumerate(finding.advice, 1)]
     return section(
         "Next recording",
         tag("p", tag("strong", best.words)),
         tag("p", f"It distinguishes: {between}.", class_="quiet") if between else None,
-        table(_ADVICE, rows, numbers=7),
+        table(["rank", *_ADVICE], rows, numbers=7),
     )
 
 
@@ -129,17 +127,4 @@ def _holds(interval: Interval, value: float) -> bool:
 
 
 def _bounds(interval: Interval, unit: str) -> str:
-    return bounds(interval, scale_for((), unit)) if unit != "rad" else bounds(interval, scale_for((), "1"))
-
-
-def _advice(rank: int, a: Advice) -> tuple[object, ...]:
-    return (
-        rank,
-        number(a.flap_frequency_hz),
-        number(a.phase_lag_deg),
-        number(a.pressure_mbar, 4),
-        number(a.airspeed),
-        number(a.angle_of_attack_deg),
-        number(a.separation, 2),
-        percent(a.resolves),
-    )
+    return bounds(interval, scale_for((), "1" if unit == "rad" else unit))

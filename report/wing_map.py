@@ -229,8 +229,8 @@ def _axes(finding: Finding, scale: Scale) -> Markup:
         if "after" in stages(finding):
             parts.append(line(along.at(m.before * scale.factor), y, along.at(m.after * scale.factor), y, "leader"))
         for stage in stages(finding):
-            value = getattr(m, stage) * scale.factor
-            parts.append(whisker(along, y, (value, value), value, stage))
+            value = getattr(m, stage)
+            parts.append(whisker(along, y, Interval(value, value, value), stage, scale.factor))
     left = len(finding.markers) - len(shown)
     return figure(
         caption(finding, scale),
