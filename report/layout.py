@@ -14,10 +14,13 @@ T = TypeVar("T")
 
 def document(title: str, *body: object) -> str:
     """One HTML file with no script that loads nothing, for screen, phone and paper."""
-    page, style = (
-        Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("document.html", "style.css")
-    )
-    return Template(page).substitute(title=escaped(title), style=style, body=joined(*body))
+    page = Template(content("document.html"))
+    return page.substitute(title=escaped(title), style=content("style.css"), body=joined(*body))
+
+
+def content(name: str) -> Markup:
+    """A file of this folder, as markup."""
+    return Markup(Path(__file__).with_name(name).read_text(encoding="utf-8"))
 
 
 def section(heading: str, *parts: object) -> Markup:

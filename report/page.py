@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
 from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
-from wingfit.report.layout import document, figure, panels, section
+from wingfit.report.layout import content, document, figure, panels, section
 from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
     Scale,
@@ -26,7 +26,7 @@ _VALIDATION = "Is the fit better on held-out recordings?"
 def html(finding: Finding) -> str:
     """The report as one HTML file, without scripts or anything to load."""
     title = f"{headline(finding)} ({finding.dataset})"
-    return document(title, tag("main", *_parts(finding)))
+    return document(title, content("hatching.svg"), tag("main", *_parts(finding)))
 
 
 def headline(finding: Finding) -> str:
