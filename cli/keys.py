@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import emit, moment, note, say, table
+from wingfit.cli.base.output import Columns, emit, moment, note, records, say
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.key_client import Key, NewKey
 
@@ -81,19 +81,21 @@ def _created(key: NewKey) -> None:
 
 
 def _list(keys: list[Key]) -> None:
-    rows = [
-        [
-            *(key["id"], key["name"], key["owner"], ", ".join(key["scopes"])),
-            *(moment(key["created_at"]), moment(key["revoked_at"])),
-        ]
-        for key in keys
-    ]
-    table(["id", "name", "owner", "scopes", "created", "revoked"], rows, "no keys")
+    columns: Columns[Key] = {
+        "id": "id",
+        "name": "name",
+        "owner": "owner",
+        "scopes": lambda key: ", ".join(key["scopes"]),
+        "created": lambda key: moment(key["created_at"]),
+        "revoked": lambda key: moment(key["revoked_at"]),
+    }
+    records(keys, columns, "no keys")
 
 
 def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
     """Create a key in the data folder of a server that is not running."""
     from wingfit.service.auth import keys  # imported late: other commands start faster
+    from wingfit.service.auth.key_schemas import KeyOut
     from wingfit.service.storage.database import Database, DataFolderError
 
     try:
@@ -106,12 +108,4 @@ def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
             row, secret = keys.make(session, name, owner, scopes)  # type: ignore[arg-type]  # checked above
     finally:
         database.close()
-    return {
-        "id": row.id,
-        "name": row.name,
-        "owner": row.owner,
-        "scopes": row.scopes,
-        "created_at": row.created_at,
-        "revoked_at": row.revoked_at,
-        "secret": secret,
-    }
+    return cast("NewKey", KeyOut.of(row).model_dump() | {"secret": secret})

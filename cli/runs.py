@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base import options as o
-from wingfit.cli.base.files import check_file, write_text
+from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import duration, emit, moment, note, percent, say, table
 from wingfit.cli.base.rounding import with_unit
 from wingfit.cli.forces.runs import forces, predict
@@ -167,7 +167,7 @@ def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
 def genome(
     run_id: o.JobId,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Also write {name: value} as JSON, for 'simulate --genome'.")
+        Path | None, new_file("Also write {name: value} as JSON, for 'simulate --genome'.", "--output", "-o")
     ] = None,
     url: o.Url = DEFAULT_URL,
     as_json: o.AsJson = False,
@@ -176,7 +176,6 @@ def genome(
 
     Example: wingfit runs genome ID -o best.json
     """
-    check_file(output, "--output")
     with Client(url) as client:
         answer = client.genome(run_id)
     if output:
