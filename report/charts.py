@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.report.layout import document, figure, panels
+from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
 from wingfit.report.svg import SERIES, Axis, axis, band, curve, dots, drawing, legend, x_axis, y_axis
 
@@ -43,7 +43,8 @@ class Chart:
 def chart_page(title: str, charts: Sequence[Chart]) -> str:
     """One HTML file with all ``charts`` that have values: no script, nothing loaded."""
     figures = [_figure(chart) for chart in charts if any(map(_finite, chart.curves))]
-    return document(title, tag("main", tag("h1", title), panels(*figures, size="wide")))
+    body = tag("main", tag("h1", title), panels(*figures, size="wide"))
+    return render("document.html", title=title, body=body)
 
 
 def _figure(chart: Chart) -> Markup:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from statistics import median
 
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
-from wingfit.report.layout import figure, folded, panels, table
-from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.layout import figure, panels
+from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import Scale, bounds, change, channel_scale, condition, number, shortened, stages
 from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, places, text, whisker, x_axis, y_axis
 
@@ -69,14 +69,11 @@ def recordings(finding: Finding) -> Markup | None:
         for k, chunk in enumerate(chunks, 1):
             part = f"{k} of {len(chunks)}" if len(chunks) > 1 else len(group)
             drawings.append(_recordings(finding, f"{name} ({part})", chunk, along, scale))
-    return joined(
-        figure(
-            _recordings_caption(finding),
-            panels(*drawings),
-            legend(*stages(finding).items(), ("floor", "floor")),
-            note="Root mean square of one channel, with 90 % intervals.",
-        ),
-        folded("As a table", _table(finding, scale)),
+    return figure(
+        _recordings_caption(finding),
+        panels(*drawings),
+        legend(*stages(finding).items(), ("floor", "floor")),
+        note="Root mean square of one channel, with 90 % intervals.",
     )
 
 
@@ -166,16 +163,18 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
     )
 
 
-def _table(finding: Finding, scale: Scale) -> Markup:
+def table(finding: Finding) -> tuple[list[str], list[list[str]]]:
+    """Headings of the misfits in a table of the recordings, and its rows."""
+    scale = channel_scale(finding)
+
     def cell(interval: Interval) -> str:
         return f"{number(interval.value * scale.factor)} ({bounds(interval, scale)})"
 
     rows = [
-        (r.name, _use(r), condition(r), *(cell(getattr(r, s)) for s in stages(finding)), number(r.floor * scale.factor))
+        [r.name, _use(r), condition(r), *(cell(getattr(r, s)) for s in stages(finding)), number(r.floor * scale.factor)]
         for r in finding.recordings
     ]
-    columns = [f"{name}, {scale.unit}" for name in (*stages(finding), "floor")]
-    return table(("recording", "use", "condition", *columns), rows, numbers=len(columns))
+    return [f"{name}, {scale.unit}" for name in (*stages(finding), "floor")], rows
 
 
 def _use(recording: RecordingMisfit | Overlay) -> str:

@@ -53,6 +53,11 @@ def number(value: float, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def signed(value: float) -> str:
+    """A number with its sign, + too."""
+    return f"+{number(value)}" if value > 0 else number(value)
+
+
 def share(part: float) -> str:
     """A fraction as a whole percentage."""
     return with_unit(number(float(round(100 * part))), "%")
@@ -104,14 +109,10 @@ def shortened(text: str, letters: int) -> str:
     return f"{text[: letters - tail - 1]}…{text[len(text) - tail :]}"
 
 
-def titles(finding: Finding) -> dict[str, str]:
-    """Titles of the effects, from the hypotheses of one effect."""
-    return {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
-
-
-def title_of(name: str, known: dict[str, str]) -> str:
-    """Title of the effect ``name``, or the name as words."""
-    return known.get(name) or name.replace("_", " ").capitalize()
+def titles_of(names: Iterable[str], finding: Finding) -> list[str]:
+    """Titles of effects, from the hypotheses of one effect; else their names as words."""
+    known = {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
+    return [known.get(name) or name.replace("_", " ").capitalize() for name in names]
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:

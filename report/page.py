@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
-from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
-from wingfit.report.layout import content, document, figure, panels, section
+from wingfit.report import beat_maps, location, misfits, number_format, ranking, svg, tables, wing_map
+from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
     Scale,
@@ -15,24 +15,34 @@ from wingfit.report.number_format import (
     number,
     percent,
     stages,
-    title_of,
-    titles,
+    titles_of,
 )
-from wingfit.report.svg import Axis, bar, drawing, text, x_axis
-
-_VALIDATION = "Is the fit better on held-out recordings?"
+from wingfit.report.svg import Axis, drawing, text, x_axis
 
 
 def html(finding: Finding) -> str:
     """The report as one HTML file, without scripts or anything to load."""
-    title = f"{headline(finding)} ({finding.dataset})"
-    return document(title, content("hatching.svg"), tag("main", *_parts(finding)))
+    return render(
+        "finding.html",
+        title=f"{headline(finding)} ({finding.dataset})",
+        headline=headline(finding),
+        finding=finding,
+        verdicts=[*VERDICTS, *(name for name in finding.probabilities if name not in VERDICTS)],
+        tiles=_tiles(finding),
+        floors=_floors(finding),
+        made=_made(finding),
+        scale=channel_scale(finding),
+        n=number_format,
+        **{
+            part.__name__.rpartition(".")[2]: part
+            for part in (beat_maps, location, misfits, ranking, svg, tables, wing_map)
+        },
+    )
 
 
 def headline(finding: Finding) -> str:
     """The verdict in one line."""
-    known = titles(finding)
-    named = [title_of(name, known) for name in finding.named]
+    named = titles_of(finding.named, finding)
     if finding.verdict == "adequate":
         return "The model is adequate: these recordings show no missing physics"
     if finding.verdict == "named":
@@ -48,55 +58,8 @@ def headline(finding: Finding) -> str:
     return f"Measurement fault: {' + '.join(named)}" if named else "Measurement fault"
 
 
-def _parts(finding: Finding) -> list[object]:
-    return [
-        *_verdict(finding),
-        _section(
-            _VALIDATION if finding.put_in else "How well the model fits",
-            misfits.proof(finding),
-            misfits.recordings(finding),
-        ),
-        _section(
-            "Location on the wing and in the beat",
-            location.place(finding),
-            wing_map.wing_map(finding),
-            beat_maps.misfit_maps(finding),
-        ),
-        _section(f"The missing {beat_maps.missing_kind(finding)}", beat_maps.missing_loads(finding)),
-        _section("Hypotheses considered", ranking.ranking(finding)),
-        tables.law(finding.law),
-        _section("Recorded and simulated", misfits.overlays(finding)),
-        tables.genes(finding),
-        tables.advice(finding),
-        _section("Lower limit of the misfit", _floors(finding)),
-        tables.sources(finding),
-        tables.remarks(finding),
-        _made(finding),
-    ]
-
-
-def _section(heading: str, *parts: Markup | None) -> Markup | None:
-    shown = [part for part in parts if part is not None]
-    return section(heading, *shown) if shown else None
-
-
-def _verdict(finding: Finding) -> list[object]:
-    rows = []
-    for name in (*VERDICTS, *(k for k in finding.probabilities if k not in VERDICTS)):
-        part = finding.probabilities.get(name, 0.0)
-        chosen = " chosen" if name == finding.verdict else ""
-        shown = bar(part, "strong" if chosen else "pale")
-        rows += [tag("span", name, class_=f"name{chosen}"), shown, tag("span", percent(part), class_=f"value{chosen}")]
-    return [
-        tag("p", f"Diagnosis of {finding.dataset} · verdict: {finding.verdict}", class_="over"),
-        tag("h1", headline(finding)),
-        tag("p", finding.summary),
-        tag("div", *rows, class_="bars verdicts", role="group", aria_label="Probability of every verdict"),
-        _tiles(finding),
-    ]
-
-
-def _tiles(finding: Finding) -> Markup:
+def _tiles(finding: Finding) -> list[tuple[str, str, str]]:
+    """Of each of the main numbers its name, its value and its meaning."""
     scale = channel_scale(finding)
     tiles = [
         ("Strength d", number(finding.strength), "residual of the refitted nominal model / noise"),
@@ -110,8 +73,7 @@ def _tiles(finding: Finding) -> Markup:
     if best is not None and finding.verdict != "adequate":
         by = best.title if finding.put_in else f"{best.title}, the closest"
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {by}"))
-    shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
-    return tag("dl", *shown, class_="tiles")
+    return tiles
 
 
 def _floors(finding: Finding) -> Markup:
@@ -148,7 +110,8 @@ def _floors_caption(finding: Finding, floors: Floors, scale: Scale) -> str:
     )
 
 
-def _made(finding: Finding) -> Markup:
+def _made(finding: Finding) -> list[str]:
+    """Lines on the model, the computation and the versions."""
     versions = ", ".join(f"{name} {version}" for name, version in finding.versions.items())
     minutes = (
         f"{number(finding.seconds / 60, 2)} minutes"
@@ -156,5 +119,5 @@ def _made(finding: Finding) -> Markup:
         else f"{number(finding.seconds, 2)} seconds"
     )
     spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
-    lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else None, versions or None]
-    return tag("footer", *(tag("p", words, class_="quiet") for words in lines if words))
+    lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else "", versions]
+    return [words for words in lines if words]
