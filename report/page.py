@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
+from wingfit.diagnosis.finding import VERDICTS, Finding
 from wingfit.report import beat_maps, location, misfits, number_format, ranking, svg, tables, wing_map
 from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
-    Scale,
     added_effects,
     best_of,
     channel_scale,
@@ -43,19 +42,16 @@ def html(finding: Finding) -> str:
 def headline(finding: Finding) -> str:
     """The verdict in one line."""
     named = titles_of(finding.named, finding)
-    if finding.verdict == "adequate":
-        return "The model is adequate: these recordings show no missing physics"
-    if finding.verdict == "named":
-        return f"Missing physics: {' + '.join(named)}" if named else "Missing physics: a known effect"
-    if finding.verdict == "ambiguous":
-        return (
-            f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
-            if named
-            else "Several hypotheses fit equally well"
-        )
-    if finding.verdict == "unnamed":
-        return "Missing physics that no effect of the library explains"
-    return f"Measurement fault: {' + '.join(named)}" if named else "Measurement fault"
+    together = " + ".join(named)
+    if finding.verdict == "ambiguous" and named:
+        return f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
+    return {
+        "adequate": "The model is adequate: these recordings show no missing physics",
+        "named": f"Missing physics: {together or 'a known effect'}",
+        "ambiguous": "Several hypotheses fit equally well",
+        "unnamed": "Missing physics that no effect of the library explains",
+        "measurement fault": f"Measurement fault: {together}" if named else "Measurement fault",
+    }[finding.verdict]
 
 
 def _tiles(finding: Finding) -> list[tuple[str, str, str]]:
@@ -97,27 +93,20 @@ def _floors(finding: Finding) -> Markup:
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="value"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
     note = f"The finer model: {floors.finer}." if floors.division is not None else None
-    return figure(
-        _floors_caption(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note
-    )
-
-
-def _floors_caption(finding: Finding, floors: Floors, scale: Scale) -> str:
     residual = scale.text(finding.strength * floors.noise)
-    return (
+    caption = (
         f"The expected misfit of a correct model is {scale.text(floors.total)}; the residual of the nominal model, "
         f"refitted, is {residual} (strength d = {number(finding.strength)})"
     )
+    return figure(caption, panels(drawing(360, bottom + 30, "Floors", *parts)), note=note)
 
 
 def _made(finding: Finding) -> list[str]:
     """Lines on the model, the computation and the versions."""
     versions = ", ".join(f"{name} {version}" for name, version in finding.versions.items())
-    minutes = (
-        f"{number(finding.seconds / 60, 2)} minutes"
-        if finding.seconds >= 60
-        else f"{number(finding.seconds, 2)} seconds"
-    )
-    spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
+    size, unit = (60, "minutes") if finding.seconds >= 60 else (1, "seconds")
+    spent = f"{number(finding.seconds / size, 2)} {unit}"
+    if finding.evaluations:
+        spent += f", {finding.evaluations} evaluations"
     lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else "", versions]
     return [words for words in lines if words]

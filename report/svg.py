@@ -16,9 +16,11 @@ from wingfit.diagnosis.finding import Interval
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
 
-LEVELS = 12  # colours of a map from zero to the maximum, classes l0 to l11
+LEVELS = 12  # colours of a map from zero to the maximum
 SERIES = 6  # colours of curves, classes s0 to s5
-SIDES = 6  # colours of a map on either side of zero, classes d0 to d12
+SIDES = 6  # colours of a map on either side of zero
+LEVEL_CLASSES = [f"l{k}" for k in range(LEVELS)]
+SIDE_CLASSES = [f"d{k}" for k in range(2 * SIDES + 1)]
 Points = Sequence[tuple[float, float]]
 
 
