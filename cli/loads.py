@@ -69,10 +69,14 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
         ),
     ]
     if "solved" in outputs:
-        solved = outputs["solved"]
-        error = number(solved["estimated_error_mm"], 2)
-        rows.append(("solved with", f"{solved['steps_per_beat']} steps per beat, estimated error {error} mm"))
+        rows.append(("solved with", accuracy(outputs["solved"])))
     return [list(row) for row in rows]
+
+
+def accuracy(numerics: a.Numerics | a.Solved) -> str:
+    """Time steps and estimated error of a simulation."""
+    error = number(numerics["estimated_error_mm"], 2)
+    return f"{numerics['steps_per_beat']} steps per beat, estimated error {error} mm"
 
 
 def columns(outputs: a.Outputs) -> Iterator[Column]:

@@ -143,24 +143,15 @@ def watch(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) 
     check_ended_well(RUNS, run)
 
 
-@app.command()
-def pause(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
-    """Stop a run after its current generation; it can be resumed.
-
-    Example: wingfit runs pause ID
-    """
-    with Client(url) as client:
-        say(state_of(RUNS, client.pause(run_id)))
+def _control(name: str, text: str, act: Callable[[Client, str], a.Run]) -> None:
+    @app.command(name, help=f"{text}\n\nExample: wingfit runs {name} ID")
+    def control(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
+        with Client(url) as client:
+            say(state_of(RUNS, act(client, run_id)))
 
 
-@app.command()
-def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
-    """Continue a paused run, with the same numbers as without the pause.
-
-    Example: wingfit runs resume ID
-    """
-    with Client(url) as client:
-        say(state_of(RUNS, client.resume(run_id)))
+_control("pause", "Stop a run after its current generation; it can be resumed.", Client.pause)
+_control("resume", "Continue a paused run, with the same numbers as without the pause.", Client.resume)
 
 
 @app.command()

@@ -10,9 +10,9 @@ import typer
 
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_csv
-from wingfit.cli.base.output import emit, mm, number, progress, say, table
+from wingfit.cli.base.output import emit, mm, progress, say, table
 from wingfit.cli.forces.results import force_simulation, write_forces
-from wingfit.cli.loads import summary, write_loads, write_plot
+from wingfit.cli.loads import accuracy, summary, write_loads, write_plot
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
 
@@ -112,13 +112,7 @@ def _show(answer: a.Simulation | a.Loads, recording: str) -> None:
         table(["over one beat", "value"], summary(answer["outputs"]))
     if tracks:
         say(f"recording {recording}: mean distance {mm(tracks['mean_distance_mm'])} mm per marker")
-        say(solved(tracks["numerics"]))
-
-
-def solved(numerics: a.Numerics) -> str:
-    """Time steps and estimated error of a simulation, in one line."""
-    error = number(numerics["estimated_error_mm"], 2)
-    return f"solved with {numerics['steps_per_beat']} steps per beat, estimated error {error} mm"
+        say(f"solved with {accuracy(tracks['numerics'])}")
 
 
 def marker_distances(tracks: a.Comparison) -> dict[str, float | None]:

@@ -34,7 +34,6 @@ BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 NINETY = reach()
 MOST_ROWS, MOST_COLUMNS = 32, 64
 MOST_LOADS, MOST_FOLDED = 6, 30  # recordings whose missing load is drawn, and drawn at least in folded details
-Pool = Callable[..., Any]
 Classes = Sequence[Sequence[str | None]]
 
 
@@ -221,7 +220,7 @@ def _peak(load: MissingLoad) -> tuple[int, int, float]:
     return i, j, float(ratios[i, j])
 
 
-def _pooled(values: npt.ArrayLike, pool: Pool = np.mean) -> list[Any]:
+def _pooled(values: npt.ArrayLike, pool: Callable[..., Any] = np.mean) -> list[Any]:
     """``values`` with at most MOST_ROWS rows and MOST_COLUMNS columns: neighbours are pooled."""
     pooled = np.asarray(values, dtype=np.float64)
     for k, most in zip(range(pooled.ndim), (MOST_ROWS, MOST_COLUMNS), strict=False):

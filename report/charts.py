@@ -87,10 +87,8 @@ def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]
 
 def _y_axis(chart: Chart) -> Axis:
     values = [y for one in chart.curves for edge in (one.band or (one.y,)) for _, y in _pairs(one.x, edge)]
-    if not chart.logarithmic:
-        return axis(values, BOTTOM, TOP)
-    highest = max(values)
-    if highest <= 0:
+    highest = max(values, default=0.0)
+    if not chart.logarithmic or highest <= 0:
         return axis(values, BOTTOM, TOP)
     return Axis(highest / 10**DECADES, 2 * highest, BOTTOM, TOP, logarithmic=True)
 

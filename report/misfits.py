@@ -34,7 +34,7 @@ def proof(finding: Finding) -> Markup | None:
     parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings / floor")]
     for k, (name, interval) in enumerate(rows):
         y = 34.0 + 38 * k
-        value = f"{number(interval.value)} ({_range(interval)})"
+        value = f"{number(interval.value)} (90 %: {bounds(interval, Scale(1.0, ''))})"
         parts.append(text(LEFT, y - 10, f"{name}: {value}" if len(rows) > 1 else value, class_="value"))
         parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
         parts.append(whisker(along, y + 1, interval, name))
@@ -109,7 +109,10 @@ def overlays(finding: Finding) -> Markup | None:
 
 def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
     """The typical distance between simulation and recording in one sentence."""
-    before, after = (median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
+    before, after = (
+        median([math.dist(o.recorded, getattr(o, name)) / len(o.phase) ** 0.5 for o in shown])
+        for name in ("before", "after")
+    )
     values = change(finding, scale.text(before), scale.text(after))
     return f"Median distance between simulated and recorded beats: {values}"
 
@@ -193,11 +196,3 @@ def _along(values: Sequence[float]) -> Axis:
 def _values(row: RecordingMisfit) -> list[float]:
     ends = [v for i in (row.before, row.after) for v in (i.value, i.low, i.high)]
     return [v for v in (*ends, row.floor) if v is not None]
-
-
-def _range(interval: Interval) -> str:
-    return f"90 %: {bounds(interval, Scale(1.0, ''))}"
-
-
-def _distance(one: Sequence[float], other: Sequence[float]) -> float:
-    return math.sqrt(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) / len(one))
