@@ -114,13 +114,9 @@ def _misfit_caption(finding: Finding, given: PhaseMap, scale: Scale) -> str:
 def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: Scale) -> Markup:
     bands = _pooled(given.bands)
     classes = [[f"l{svg.level(v, most)}" for v in row] for row in _pooled(values, _rms)]
-    bar = svg.colour_bar(
-        svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
-        BOTTOM + 52,
-        svg.LEVEL_CLASSES,
-        f"misfit, {scale.unit}",
-        (given.noise * scale.factor, "noise"),
-    )
+    along = svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT)
+    mark = (given.noise * scale.factor, "noise")
+    bar = svg.colour_bar(along, BOTTOM + 52, svg.LEVEL_CLASSES, f"misfit, {scale.unit}", mark)
     return svg.drawing(WIDTH, BOTTOM + 94, f"{title}: misfit over span and phase", _grid(title, bands, classes), bar)
 
 
@@ -162,12 +158,8 @@ def _load_map(load: MissingLoad, scale: Scale) -> Markup:
         ["faint" if abs(v) < NINETY * e else None for v, e in zip(row, errs, strict=True)]
         for row, errs in zip(values, errors, strict=True)
     ]
-    bar = svg.colour_bar(
-        svg.Axis(-most * scale.factor, most * scale.factor, LEFT, RIGHT),
-        BOTTOM + 44,
-        svg.SIDE_CLASSES,
-        f"missing load, {scale.unit}",
-    )
+    along = svg.Axis(-most * scale.factor, most * scale.factor, LEFT, RIGHT)
+    bar = svg.colour_bar(along, BOTTOM + 44, svg.SIDE_CLASSES, f"missing load, {scale.unit}")
     title = _name(load, 42)
     return svg.drawing(WIDTH, BOTTOM + 86, f"Missing load, {title}", _grid(title, stations, classes, faint), bar)
 

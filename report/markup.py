@@ -45,6 +45,4 @@ def _name(attribute: str) -> str:
 
 
 def _value(value: object) -> str:
-    if isinstance(value, float):
-        return f"{round(value, 2) + 0.0:g}"
-    return escape(_CONTROL.sub("\ufffd", str(value)))
+    return f"{round(value, 2) + 0.0:g}" if isinstance(value, float) else escape(_CONTROL.sub("\ufffd", str(value)))

@@ -122,18 +122,15 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
     parts: list[Markup] = [x_axis(along, 22, bottom, f"misfit, {scale.unit}")]
     for k, row in enumerate(rows):
         y = 24 + ROW * k
-        parts.append(tag("text", tag("title", row.name), _label(row, 48), x=LEFT, y=y + 11, class_="value"))
+        about = condition(row)
+        label = f"{shortened(row.name, max(14, 48 - len(about)))} \u2002 {about}"
+        parts.append(tag("text", tag("title", row.name), label, x=LEFT, y=y + 11, class_="value"))
         floor = along.at(row.floor * scale.factor)
         parts.append(line(floor, y + 15, floor, y + 35, "floor"))
         for at, name in zip((y + 21, y + 29), stages(finding), strict=False):
             parts.append(whisker(along, at, getattr(row, name), name, scale.factor))
     label = f"{title}: misfit by recording"
     return drawing(WIDTH, bottom + 30, label, text(LEFT, 14, title, class_="title"), *parts)
-
-
-def _label(row: RecordingMisfit, letters: int) -> str:
-    about = condition(row)
-    return f"{shortened(row.name, max(14, letters - len(about)))} \u2002 {about}"
 
 
 def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:

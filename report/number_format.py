@@ -49,8 +49,7 @@ def number(value: float, digits: int = 3) -> str:
     if not -4 <= power < 5:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{_trimmed(mantissa)}e{int(exponent)}".replace("-", "−")
-    text = _trimmed(f"{value:.{max(0, digits - 1 - power)}f}")
-    return text.replace("-", "−")
+    return _trimmed(f"{value:.{max(0, digits - 1 - power)}f}").replace("-", "−")
 
 
 def signed(value: float) -> str:

@@ -29,8 +29,7 @@ def caption(finding: Finding) -> str:
     parts = [f"{best.title} explains {percent(best.explained)} of the misfit beyond the noise"]
     if best.predicted is not None:
         parts.append(f"and predicts {percent(best.predicted)} of it in recordings left out of the fit")
-    overlapping = set(best.effects)
-    rivals = [h for h in finding.hypotheses if h.effects and not overlapping & set(h.effects)]
+    rivals = [h for h in finding.hypotheses if h.effects and not set(best.effects) & set(h.effects)]
     rival = max(rivals, key=lambda h: h.explained, default=None)
     if rival is not None:
         parts.append(f"; without it, at most {percent(rival.explained)} ({rival.title})")

@@ -32,14 +32,11 @@ def interval_of(term: Term) -> str:
 
 def sources(finding: Finding) -> list[tuple[str, str]]:
     """Titles of the named effects, and the sources of their laws."""
-    found = {
-        h.effects[0]: h.source
-        for h in finding.hypotheses
-        if len(h.effects) == 1 and h.effects[0] in finding.named and h.source
-    }
-    for h in finding.hypotheses:
-        if h.source and set(h.effects) <= set(finding.named) and not set(h.effects) <= set(found):
-            found.update({name: h.source for name in h.effects if name not in found})
+    found: dict[str, str] = {}
+    for h in sorted(finding.hypotheses, key=lambda h: len(h.effects) > 1):  # its own source rather than a common one
+        if h.source and set(h.effects) <= set(finding.named):
+            for name in h.effects:
+                found.setdefault(name, h.source)
     return list(zip(titles_of(found, finding), found.values(), strict=True))
 
 

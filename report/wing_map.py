@@ -90,12 +90,8 @@ class _Plan:
         worst, at = self.placed[k], self.points[k]
         anchor = "end" if at[0] > WIDTH / 2 else "start"
         words = f"largest: {shortened(worst.name, 22)}, {scale.text(values[k])}"
-        bar = svg.colour_bar(
-            svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
-            self.bottom + 24,
-            svg.LEVEL_CLASSES,
-            f"misfit beyond the noise, {scale.unit}",
-        )
+        along = svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT)
+        label = f"misfit beyond the noise, {scale.unit}"
         return svg.drawing(
             WIDTH,
             self.bottom + 66,
@@ -107,7 +103,7 @@ class _Plan:
             tag("circle", cx=at[0], cy=at[1], r=self.radius + 2.5, class_="ring") if values[k] > 0 else None,
             svg.text(at[0], self.bottom + 12, words, anchor=anchor, class_="value") if values[k] > 0 else None,
             svg.line(at[0], at[1] + self.radius + 2.5, at[0], self.bottom + 2, "leader") if values[k] > 0 else None,
-            bar,
+            svg.colour_bar(along, self.bottom + 24, svg.LEVEL_CLASSES, label),
         )
 
     def place(self, finding: Finding) -> Markup | None:
