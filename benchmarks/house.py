@@ -22,7 +22,19 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
-PARTS = ("records", "tracking", "sim", "inference", "calibration", "diagnosis", "report", "workers", "service", "client", "cli")
+PARTS = (
+    "records",
+    "tracking",
+    "sim",
+    "inference",
+    "calibration",
+    "diagnosis",
+    "report",
+    "workers",
+    "service",
+    "client",
+    "cli",
+)
 PRODUCT = (*PARTS, "wingfit")
 CODE = (*PRODUCT, "benchmarks", "docs", "examples", "tests")
 SOURCES = (".py", ".js", ".css", ".html")

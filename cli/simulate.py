@@ -112,7 +112,12 @@ def _show(answer: a.Simulation | a.Loads, recording: str) -> None:
         table(["over one beat", "value"], summary(answer["outputs"]))
     if tracks:
         say(f"recording {recording}: mean distance {mm(tracks['mean_distance_mm'])} mm per marker")
-        say(f"solved with {accuracy(tracks['numerics'])}")
+        say(solved(tracks["numerics"]))
+
+
+def solved(numerics: a.Numerics) -> str:
+    """Time steps and estimated error of a simulation, in one line."""
+    return f"solved with {accuracy(numerics)}"
 
 
 def marker_distances(tracks: a.Comparison) -> dict[str, float | None]:

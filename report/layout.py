@@ -27,8 +27,7 @@ def render(template: str, **values: Any) -> str:
 
 def figure(caption: str, *parts: object, note: object = None) -> Markup:
     """A figure whose caption states its result; ``note`` explains the drawing."""
-    below = None if note is None else tag("p", note, class_="note")
-    return tag("figure", tag("figcaption", caption), *parts, below)
+    return tag("figure", tag("figcaption", caption), *parts, None if note is None else tag("p", note, class_="note"))
 
 
 def panels(*drawings: object, size: str = "") -> Markup:
