@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -25,12 +27,10 @@ def campaign(
 
     Example: wingfit campaign my-campaign --division 11 --small --seed 7
     """
-    _refuse_existing(out)
     from wingfit.sim.virtual_rigs.campaign import write_campaign  # imported late: other commands start faster
 
-    with refused("no campaign written"), progress("simulating the campaign") as report:
+    with _writing(out), progress("simulating the campaign") as report:
         write_campaign(out, division=division, small=small, seed=seed, progress=report)
-    _written(out)
 
 
 def balance(
@@ -43,19 +43,18 @@ def balance(
 
     Example: wingfit balance my-balance --seed 7
     """
-    _refuse_existing(out)
     from wingfit.sim.virtual_rigs.balance import write_campaign  # as above
 
-    with refused("no campaign written"):
+    with _writing(out):
         write_campaign(out, seed)
-    _written(out)
 
 
-def _refuse_existing(out: Path) -> None:
+@contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    """Refuse an existing file or folder; turn errors into messages; name the next step."""
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
-
-
-def _written(out: Path) -> None:
+    with refused("no campaign written"):
+        yield
     say(f"campaign written to {out}")
     say(f"next: wingfit datasets upload {shlex.quote(str(out))}")

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import emit, moment, number, progress, say, size, table
+from wingfit.cli.base.output import Columns, emit, moment, number, progress, records, say, size
 from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
@@ -86,7 +86,7 @@ def check(path: Source) -> None:
 
     Example: wingfit datasets check my-campaign/
     """
-    from wingfit.records import load_dataset  # imported late: other commands start faster
+    from wingfit.records import Recording, load_dataset  # imported late: other commands start faster
 
     try:
         dataset = load_dataset(path)
@@ -96,25 +96,25 @@ def check(path: Source) -> None:
         raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
     what = "wing" if dataset.kind == "tracks" else "vehicle"
     say(f"{path} is valid: '{dataset.name}', {what} '{dataset.rig.name}'")
-    rows = [
-        [
-            r.name,
-            r.rig,
-            "held out" if r.name in dataset.held_out else "fitted",
-            len(r.times),
-            f"{100 * float((~r.valid).mean()) if r.valid.size else 0:.1f} %",
-        ]
-        for r in dataset.recordings
-    ]
-    table(["recording", "rig", "use", ">frames", ">missing"], rows)
+    columns: Columns[Recording] = {
+        "recording": lambda r: r.name,
+        "rig": lambda r: r.rig,
+        "use": lambda r: _use(held_out=r.name in dataset.held_out),
+        ">frames": lambda r: len(r.times),
+        ">missing": lambda r: f"{100 * float((~r.valid).mean()) if r.valid.size else 0:.1f} %",
+    }
+    records(dataset.recordings, columns)
 
 
 def _list(datasets: list[a.Dataset]) -> None:
-    rows = [
-        [d["id"], d["name"], len(d["recordings"]), size(d["size_bytes"]), moment(d["created_at"])] for d in datasets
-    ]
-    empty = "no datasets; upload one: wingfit datasets upload FOLDER"
-    table(["id", "name", ">recordings", ">size", "uploaded"], rows, empty)
+    columns: Columns[a.Dataset] = {
+        "id": "id",
+        "name": "name",
+        ">recordings": lambda d: len(d["recordings"]),
+        ">size": lambda d: size(d["size_bytes"]),
+        "uploaded": lambda d: moment(d["created_at"]),
+    }
+    records(datasets, columns, "no datasets; upload one: wingfit datasets upload FOLDER")
 
 
 def _uploaded(dataset: a.Dataset) -> None:
@@ -128,19 +128,19 @@ def _show(dataset: a.Dataset) -> None:
     if dataset["description"]:
         say(dataset["description"])
     angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
-    columns = ["recording", "rig", "use", ">frames", ">missing", ">flap", f">{angle}", ">pressure", ">airspeed"]
-    table(columns, [_row(r) for r in dataset["recordings"]])
+    columns: Columns[a.RecordingInfo] = {
+        "recording": "name",
+        "rig": "rig",
+        "use": lambda r: _use(held_out=r["held_out"]),
+        ">frames": "frames",
+        ">missing": lambda r: f"{r['missing_percent']:.1f} %",
+        ">flap": lambda r: number(r["flap_frequency_hz"], unit="Hz"),
+        f">{angle}": lambda r: number(r["angle_of_attack_deg"] if r["channels"] else r["phase_lag_deg"], unit="deg"),
+        ">pressure": lambda r: number(r["pressure_mbar"], unit="mbar"),
+        ">airspeed": lambda r: number(r["airspeed_m_s"], unit="m/s"),
+    }
+    records(dataset["recordings"], columns)
 
 
-def _row(r: a.RecordingInfo) -> list[object]:
-    return [
-        r["name"],
-        r["rig"],
-        "held out" if r["held_out"] else "fitted",
-        r["frames"],
-        f"{r['missing_percent']:.1f} %",
-        number(r["flap_frequency_hz"], unit="Hz"),
-        number(r["angle_of_attack_deg"] if r["channels"] else r["phase_lag_deg"], unit="deg"),
-        number(r["pressure_mbar"], unit="mbar"),
-        number(r["airspeed_m_s"], unit="m/s"),
-    ]
+def _use(*, held_out: bool) -> str:
+    return "held out" if held_out else "fitted"

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from wingfit.cli.base import options as o
-from wingfit.cli.base.files import check_file, write_text
+from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import emit, note, progress
 from wingfit.cli.findings import print_finding
 from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow
@@ -16,7 +16,7 @@ from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.service.limits import MOST_WORKERS
 
-ReportFile = Annotated[Path | None, typer.Option("--report", help="Save the report, one HTML file: FILE.html.")]
+ReportFile = Annotated[Path | None, new_file("Save the report, one HTML file: FILE.html.", "--report")]
 FindingJson = Annotated[bool, typer.Option("--json", help="Print the finding as JSON.")]
 
 
@@ -82,7 +82,6 @@ def diagnose(
 
     Example: wingfit diagnose examples/robird --division 11 --report robird.html
     """
-    check_file(report, "--report", (".html",))
     settings: dict[str, Any] = {
         "run_id": run,
         "division": division,
@@ -125,7 +124,6 @@ def watch(
 
     Example: wingfit diagnoses watch ID --report finding.html
     """
-    check_file(report, "--report", (".html",))
     with Client(url) as client:
         _print_when_done(client, diagnosis_id, report, as_json=as_json)
 

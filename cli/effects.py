@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import emit, interval, number, say, table
+from wingfit.cli.base.output import Columns, emit, interval, number, records, say, table
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.client.effect_answers import Effect, EffectParameter
 
@@ -31,13 +31,14 @@ def effects(
 
 
 def _list(effects: list[Effect]) -> None:
-    columns = ["effect", "family", "rig", "genes", "signature"]
-    rows = [[e["name"], e["family"], " ".join(e["applies_to"]), _genes(e), e["signature"]] for e in effects]
-    table(columns, rows)
-
-
-def _genes(effect: Effect) -> str:
-    return " ".join(parameter["name"].partition(".")[2] for parameter in effect["parameters"])
+    columns: Columns[Effect] = {
+        "effect": "name",
+        "family": "family",
+        "rig": lambda e: " ".join(e["applies_to"]),
+        "genes": lambda e: " ".join(parameter["name"].partition(".")[2] for parameter in e["parameters"]),
+        "signature": "signature",
+    }
+    records(effects, columns)
 
 
 def _describe(effect: Effect) -> None:
@@ -54,21 +55,19 @@ def _describe(effect: Effect) -> None:
     ]
     table(["", ""], rows)
     say("")
-    columns = ["gene", ">typical", "bounds", "unit", "description"]
-    table(columns, [_row(parameter) for parameter in effect["parameters"]])
+    columns: Columns[EffectParameter] = {
+        "gene": "name",
+        ">typical": lambda one: number(one["typical"], 3),
+        "bounds": lambda one: interval(one["lower"], one["upper"]),
+        "unit": lambda one: one["unit"] if one["relative_to"] is None else f"x {one['relative_to']}",
+        "description": lambda one: f"{one['description']} ({_role(one)})",
+    }
+    records(effect["parameters"], columns)
     for of, unit in dict.fromkeys((p["relative_to"], p["unit"]) for p in effect["parameters"] if p["relative_to"]):
         say(f"'x {of}': multiples of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
     say("the effect is off where all genes marked 'size' are zero")
     say(f"estimate its genes: wingfit runs submit ID --with {effect['name']}")
 
 
-def _row(one: EffectParameter) -> list[str]:
-    unit = one["unit"] if one["relative_to"] is None else f"x {one['relative_to']}"
-    role = "size" if one["is_size"] else "place" if one["is_location"] else "shape"
-    return [
-        one["name"],
-        number(one["typical"], 3),
-        interval(one["lower"], one["upper"]),
-        unit,
-        f"{one['description']} ({role})",
-    ]
+def _role(one: EffectParameter) -> str:
+    return "size" if one["is_size"] else "place" if one["is_location"] else "shape"

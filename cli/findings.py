@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.cli.base.output import interval, percent, remarks, say, table
+from wingfit.cli.base.output import Columns, interval, percent, records, remarks, say
 from wingfit.cli.base.rounding import Unit, force_unit
 from wingfit.service.units import MM
 
@@ -39,40 +39,33 @@ def _ranking(finding: Json) -> None:
     hypotheses = finding["hypotheses"]
     misfits = [one["misfit"] for one in hypotheses]
     unit = Unit("mm", MM) if finding["unit"] == "m" else force_unit(misfits)
-    rows = [
-        [
-            " + ".join(one["effects"]) or NOMINAL,
-            _probability(one["probability"]),
-            f"{one['evidence'] + 0.0:.1f}",
-            percent(one["explained"]),
-            percent(one["predicted"]),
-            unit.show(one["misfit"]),
-            one["refitted"],
-        ]
-        for one in hypotheses[:SHOWN]
-    ]
-    columns = [">probability", ">ln evidence", ">explained", ">predicted", f">residual {unit.name}", "refitted"]
-    table(["hypothesis", *columns], rows, "no hypothesis was compared")
+    columns: Columns[Json] = {
+        "hypothesis": lambda one: " + ".join(one["effects"]) or NOMINAL,
+        ">probability": lambda one: _probability(one["probability"]),
+        ">ln evidence": lambda one: f"{one['evidence'] + 0.0:.1f}",
+        ">explained": lambda one: percent(one["explained"]),
+        ">predicted": lambda one: percent(one["predicted"]),
+        f">residual {unit.name}": lambda one: unit.show(one["misfit"]),
+        "refitted": "refitted",
+    }
+    records(hypotheses[:SHOWN], columns, "no hypothesis was compared")
     if len(hypotheses) > SHOWN:
         say(f"{len(hypotheses) - SHOWN} less probable hypotheses are not shown; --json and the report list all")
 
 
 def _genes(finding: Json) -> None:
     """Print the genes of the named effects with their 90 % intervals."""
-    rows = [
-        [
-            gene["name"],
-            gene["value"]["value"],
-            gene["unit"],
-            interval(gene["value"]["low"], gene["value"]["high"]),
-            gene["description"],
-        ]
-        for gene in finding["genes"]
-        if gene["name"].partition(".")[0] in finding["named"]
-    ]
-    if rows:
+    columns: Columns[Json] = {
+        "gene": "name",
+        ">value": lambda gene: gene["value"]["value"],
+        "unit": "unit",
+        "90 % interval": lambda gene: interval(gene["value"]["low"], gene["value"]["high"]),
+        "description": "description",
+    }
+    genes = [gene for gene in finding["genes"] if gene["name"].partition(".")[0] in finding["named"]]
+    if genes:
         say("")
-        table(["gene", ">value", "unit", "90 % interval", "description"], rows)
+        records(genes, columns)
 
 
 def _probability(part: float) -> str:

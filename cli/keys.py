@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import emit, moment, note, say, table
+from wingfit.cli.base.output import Columns, emit, moment, note, records, say
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.key_answers import Key, NewKey
 
@@ -81,14 +81,15 @@ def _created(key: NewKey) -> None:
 
 
 def _list(keys: list[Key]) -> None:
-    rows = [
-        [
-            *(key["id"], key["name"], key["owner"], ", ".join(key["scopes"])),
-            *(moment(key["created_at"]), moment(key["revoked_at"])),
-        ]
-        for key in keys
-    ]
-    table(["id", "name", "owner", "scopes", "created", "revoked"], rows, "no keys")
+    columns: Columns[Key] = {
+        "id": "id",
+        "name": "name",
+        "owner": "owner",
+        "scopes": lambda key: ", ".join(key["scopes"]),
+        "created": lambda key: moment(key["created_at"]),
+        "revoked": lambda key: moment(key["revoked_at"]),
+    }
+    records(keys, columns, "no keys")
 
 
 def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
@@ -106,12 +107,5 @@ def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
             row, secret = keys.make(session, name, owner, scopes)  # type: ignore[arg-type]  # checked above
     finally:
         database.close()
-    return {
-        "id": row.id,
-        "name": row.name,
-        "owner": row.owner,
-        "scopes": row.scopes,
-        "created_at": row.created_at,
-        "revoked_at": row.revoked_at,
-        "secret": secret,
-    }
+    names = ("id", "name", "owner", "scopes", "created_at", "revoked_at")
+    return cast("NewKey", {name: getattr(row, name) for name in names} | {"secret": secret})

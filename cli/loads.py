@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 from wingfit.cli.base.files import write_csv, write_text
 from wingfit.cli.base.output import number
 from wingfit.client import load_answers as a
+from wingfit.client.answers import Numerics
 
 AXES = "xyz"
 SECTIONS_SHOWN = 6  # of the bending moment: more curves cannot be distinguished
@@ -77,10 +78,14 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
         ),
     ]
     if "numerics" in outputs:
-        solved = outputs["numerics"]
-        error = number(solved["estimated_error_mm"], 2)
-        rows.append(("solved with", f"{solved['steps_per_beat']} steps per beat, estimated error {error} mm"))
+        rows.append(("solved with", accuracy(outputs["numerics"])))
     return [list(row) for row in rows]
+
+
+def accuracy(numerics: Numerics | a.OutputNumerics) -> str:
+    """Time steps and estimated error of a simulation."""
+    error = number(numerics["estimated_error_mm"], 2)
+    return f"{numerics['steps_per_beat']} steps per beat, estimated error {error} mm"
 
 
 def columns(outputs: a.Outputs) -> Iterator[Column]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from wingfit.cli.base.output import interval, mm, number, remarks, say, table
+from wingfit.cli.base.output import Columns, interval, mm, number, records, remarks, say, table
 from wingfit.cli.forces.results import force_result
 from wingfit.client import answers as a
 
@@ -23,22 +23,16 @@ def print_result(answer: Any) -> None:
 
 def genes(items: list[a.GeneInfo]) -> None:
     """Print genes: nominal and estimated value, bounds, error, and whether the data identify them."""
-    columns = ["gene", ">nominal", ">best", "unit", "bounds", ">standard error", "identifiable"]
-    table(
-        columns,
-        [
-            [
-                gene["name"],
-                gene["nominal"],
-                gene["best"],
-                gene["unit"],
-                interval(gene["lower"], gene["upper"]),
-                _error(gene),
-                identifiable(gene),
-            ]
-            for gene in items
-        ],
-    )
+    columns: Columns[a.GeneInfo] = {
+        "gene": "name",
+        ">nominal": "nominal",
+        ">best": "best",
+        "unit": "unit",
+        "bounds": lambda gene: interval(gene["lower"], gene["upper"]),
+        ">standard error": _error,
+        "identifiable": identifiable,
+    }
+    records(items, columns)
 
 
 def misfits(answer: a.Result) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base import options as o
-from wingfit.cli.base.files import check_file, write_text
+from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import duration, emit, moment, note, percent, say, table
 from wingfit.cli.base.rounding import with_unit
 from wingfit.cli.forces.runs import forces, predict
@@ -143,31 +143,22 @@ def watch(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) 
     check_ended_well(RUNS, run)
 
 
-@app.command()
-def pause(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
-    """Stop a run after its current generation; it can be resumed.
-
-    Example: wingfit runs pause ID
-    """
-    with Client(url) as client:
-        say(state_of(RUNS, client.pause(run_id)))
+def _control(name: str, text: str, act: Callable[[Client, str], a.Run]) -> None:
+    @app.command(name, help=f"{text}\n\nExample: wingfit runs {name} ID")
+    def control(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
+        with Client(url) as client:
+            say(state_of(RUNS, act(client, run_id)))
 
 
-@app.command()
-def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
-    """Continue a paused run, with the same numbers as without the pause.
-
-    Example: wingfit runs resume ID
-    """
-    with Client(url) as client:
-        say(state_of(RUNS, client.resume(run_id)))
+_control("pause", "Stop a run after its current generation; it can be resumed.", Client.pause)
+_control("resume", "Continue a paused run, with the same numbers as without the pause.", Client.resume)
 
 
 @app.command()
 def genome(
     run_id: o.JobId,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Also write {name: value} as JSON, for 'simulate --genome'.")
+        Path | None, new_file("Also write {name: value} as JSON, for 'simulate --genome'.", "--output", "-o")
     ] = None,
     url: o.Url = DEFAULT_URL,
     as_json: o.AsJson = False,
@@ -176,7 +167,6 @@ def genome(
 
     Example: wingfit runs genome ID -o best.json
     """
-    check_file(output, "--output")
     with Client(url) as client:
         answer = client.genome(run_id)
     if output:

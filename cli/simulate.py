@@ -9,10 +9,10 @@ from typing import Annotated, Any, cast
 import typer
 
 from wingfit.cli.base import options as o
-from wingfit.cli.base.files import check_file, write_csv
-from wingfit.cli.base.output import emit, mm, number, progress, say, table
+from wingfit.cli.base.files import new_file, write_csv
+from wingfit.cli.base.output import emit, mm, progress, say, table
 from wingfit.cli.forces.results import force_simulation, write_forces
-from wingfit.cli.loads import summary, write_loads, write_plot
+from wingfit.cli.loads import accuracy, summary, write_loads, write_plot
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.client.load_answers import Loads
@@ -27,18 +27,18 @@ def simulate(
         typer.Option(help="FILE.json or NAME=VALUE; repeatable. Other genes have their nominal values."),
     ] = None,
     accuracy_mm: o.Accuracy = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the tracks or forces as CSV.")] = None,
+    output: Annotated[Path | None, new_file("Write the tracks or forces as CSV.", "--output", "-o")] = None,
     loads: Annotated[
         Path | None,
-        typer.Option(
+        new_file(
+            "Write loads, powers and energies over the beat: FILE.csv (a row per instant) or FILE.json.",
             "--loads",
             "--outputs",
-            help="Write loads, powers and energies over the beat: FILE.csv (a row per instant) or FILE.json.",
         ),
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(help="Plot motor torque, powers, lift, bending moments and energies, or forces: FILE.html."),
+        new_file("Plot motor torque, powers, lift, bending moments and energies, or forces: FILE.html.", "--plot"),
     ] = None,
     at: Annotated[
         list[str] | None,
@@ -62,9 +62,6 @@ def simulate(
 
     Example: wingfit simulate --dataset ID --genome best.json --genome E_f=6e6 --loads loads.csv --plot loads.html
     """
-    check_file(loads, "--loads", (".csv", ".json"))
-    check_file(plot, "--plot", (".html",))
-    check_file(output, "--output")
     if at and output:
         raise typer.BadParameter(
             "no tracks were recorded under another condition; leave out --output", param_hint="--at"
@@ -121,8 +118,7 @@ def _show(answer: a.Simulation | Loads, recording: str) -> None:
 
 def solved(numerics: a.Numerics) -> str:
     """Time steps and estimated error of a simulation, in one line."""
-    error = number(numerics["estimated_error_mm"], 2)
-    return f"solved with {numerics['steps_per_beat']} steps per beat, estimated error {error} mm"
+    return f"solved with {accuracy(numerics)}"
 
 
 def marker_distances(tracks: a.Comparison) -> dict[str, float | None]:

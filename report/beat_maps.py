@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from itertools import pairwise
-from statistics import fmean
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
-from wingfit.diagnosis.finding import Finding, MissingLoad, Numbers, PhaseMap, Table
+from wingfit.diagnosis.finding import Finding, MissingLoad, PhaseMap, Table
+from wingfit.report import svg
 from wingfit.report.layout import figure, folded, panels
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import (
@@ -22,33 +25,16 @@ from wingfit.report.number_format import (
     shortened,
     stages,
 )
-from wingfit.report.svg import (
-    LEVELS,
-    SIDES,
-    Axis,
-    area,
-    axis,
-    cells,
-    colour_bar,
-    curve,
-    drawing,
-    legend,
-    level,
-    line,
-    side,
-    text,
-    x_axis,
-    y_axis,
-)
 
 WIDTH, LEFT, RIGHT, TOP, HEIGHT = 360.0, 52.0, 348.0, 26.0, 150.0
 BOTTOM = TOP + HEIGHT
+ACROSS = svg.Axis(0, 1, LEFT, RIGHT)
 PHASE = "phase of the beat"
 BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 NINETY = standard_errors()
 MOST_ROWS, MOST_COLUMNS = 32, 64
 MOST_LOADS, MOST_FOLDED = 6, 30  # recordings whose missing load is drawn, and drawn at least in folded details
-Pool = Callable[[Sequence[float]], float]
+Classes = Sequence[Sequence[str | None]]
 
 
 def misfit_maps(finding: Finding) -> Markup | None:
@@ -59,7 +45,7 @@ def misfit_maps(finding: Finding) -> Markup | None:
     scale = channel_scale(finding)
     if len(given.bands) == 1:
         lines = [(f"{stage}-line", name) for stage, name in stages(finding).items()]
-        key = legend(*lines, ("noise-line", "expected from noise alone"))
+        key = svg.legend(*lines, ("noise-line", "expected from noise alone"))
         return figure(_misfit_caption(finding, given, scale), panels(_misfit_curves(finding, given, scale)), key)
     most = max(max(map(max, given.before)), max(map(max, given.after)), given.noise)
     drawings = panels(
@@ -93,7 +79,7 @@ def missing_loads(finding: Finding) -> Markup | None:
     shown, more = loads[:MOST_LOADS], loads[MOST_LOADS:MOST_FOLDED]
     single = all(len(load.stations) == 1 for load in shown)
     note = None if single else "Positive along the flap normal. Each map has its own scale."
-    key = legend(("band", "90 % interval") if single else ("hatched", "not significant (90 %)"))
+    key = svg.legend(("band", "90 % interval") if single else ("hatched", "not significant (90 %)"))
     hidden = len(loads) - len(shown) - len(more)
     return joined(
         figure(_load_caption(shown[0], _load_scale(shown)), _load_panels(shown), key, note=note),
@@ -126,38 +112,28 @@ def _misfit_caption(finding: Finding, given: PhaseMap, scale: Scale) -> str:
 
 
 def _misfit_map(title: str, given: PhaseMap, values: Table, most: float, scale: Scale) -> Markup:
-    bands = _pooled([given.bands], MOST_ROWS, fmean)[0]
-    classes: list[list[str | None]] = [[f"l{level(v, most)}" for v in row] for row in _small(values, _rms)]
-    bar = colour_bar(
-        Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
-        BOTTOM + 52,
-        [f"l{k}" for k in range(LEVELS)],
-        f"misfit, {scale.unit}",
-        (given.noise * scale.factor, "noise"),
-    )
-    return drawing(WIDTH, BOTTOM + 94, f"{title}: misfit over span and phase", _grid(title, bands, classes), bar)
+    bands = _pooled(given.bands)
+    classes = [[f"l{svg.level(v, most)}" for v in row] for row in _pooled(values, _rms)]
+    along = svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT)
+    mark = (given.noise * scale.factor, "noise")
+    bar = svg.colour_bar(along, BOTTOM + 52, svg.LEVEL_CLASSES, f"misfit, {scale.unit}", mark)
+    return svg.drawing(WIDTH, BOTTOM + 94, f"{title}: misfit over span and phase", _grid(title, bands, classes), bar)
 
 
 def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
     rows = {stage: [v * scale.factor for v in getattr(given, stage)[0]] for stage in stages(finding)}
     noise = given.noise * scale.factor
-    across, up = (
-        Axis(0, 1, LEFT, RIGHT),
-        axis([noise, *(v for row in rows.values() for v in row)], BOTTOM, TOP, zero=True),
-    )
-    return drawing(
-        WIDTH,
-        BOTTOM + 34,
-        _misfit_caption(finding, given, scale),
-        text(LEFT, 14, "Misfit over the beat", class_="title"),
-        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
-        y_axis(up, LEFT, RIGHT, f"misfit, {scale.unit}"),
-        line(LEFT, up.at(noise), RIGHT, up.at(noise), "noise"),
-        *(
-            curve([(across.at(p), up.at(v)) for p, v in zip(given.phase, row, strict=True)], f"curve {stage}")
-            for stage, row in rows.items()
-        ),
-    )
+    up = svg.axis([noise, *(v for row in rows.values() for v in row)], BOTTOM, TOP, zero=True)
+    parts = [svg.curve(svg.places(ACROSS, given.phase, up, row), f"curve {stage}") for stage, row in rows.items()]
+    parts.insert(0, svg.line(LEFT, up.at(noise), RIGHT, up.at(noise), "noise"))
+    label = _misfit_caption(finding, given, scale)
+    return _curves(label, "Misfit over the beat", up, f"misfit, {scale.unit}", *parts)
+
+
+def _curves(label: str, title: str, up: svg.Axis, y_label: str, *parts: object) -> Markup:
+    """Curves over the beat, with their axes."""
+    axes = svg.x_axis(ACROSS, TOP, BOTTOM, PHASE, BEATS), svg.y_axis(up, LEFT, RIGHT, y_label)
+    return svg.drawing(WIDTH, BOTTOM + 34, label, svg.text(LEFT, 14, title, class_="title"), *axes, *parts)
 
 
 def _load_caption(load: MissingLoad, scale: Scale) -> str:
@@ -174,107 +150,78 @@ def _load_caption(load: MissingLoad, scale: Scale) -> str:
 
 
 def _load_map(load: MissingLoad, scale: Scale) -> Markup:
-    stations = _pooled([load.stations], MOST_ROWS, fmean)[0]
-    values, errors = _small(load.values, fmean), _small(load.errors, _rms)
+    stations = _pooled(load.stations)
+    values, errors = _pooled(load.values), _pooled(load.errors, _rms)
     most = max(abs(v) for row in values for v in row) or 1.0
-    classes: list[list[str | None]] = [[f"d{side(v, most)}" for v in row] for row in values]
-    faint: list[list[str | None]] = [
+    classes = [[f"d{svg.side(v, most)}" for v in row] for row in values]
+    faint = [
         ["faint" if abs(v) < NINETY * e else None for v, e in zip(row, errs, strict=True)]
         for row, errs in zip(values, errors, strict=True)
     ]
-    bar = colour_bar(
-        Axis(-most * scale.factor, most * scale.factor, LEFT, RIGHT),
-        BOTTOM + 44,
-        [f"d{k}" for k in range(2 * SIDES + 1)],
-        f"missing load, {scale.unit}",
-    )
+    along = svg.Axis(-most * scale.factor, most * scale.factor, LEFT, RIGHT)
+    bar = svg.colour_bar(along, BOTTOM + 44, svg.SIDE_CLASSES, f"missing load, {scale.unit}")
     title = _name(load, 42)
-    return drawing(WIDTH, BOTTOM + 86, f"Missing load, {title}", _grid(title, stations, classes, faint), bar)
+    return svg.drawing(WIDTH, BOTTOM + 86, f"Missing load, {title}", _grid(title, stations, classes, faint), bar)
 
 
 def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
-    values, errors = ([v * scale.factor for v in table[0]] for table in (load.values, load.errors))
-    low = [v - NINETY * e for v, e in zip(values, errors, strict=True)]
-    high = [v + NINETY * e for v, e in zip(values, errors, strict=True)]
-    across, up = Axis(0, 1, LEFT, RIGHT), axis([*low, *high], BOTTOM, TOP, zero=True)
-    places = [across.at(p) for p in load.phase]
-    ends = [*zip(places, low, strict=True), *reversed(list(zip(places, high, strict=True)))]
-    title = _name(load, 42)
-    return drawing(
-        WIDTH,
-        BOTTOM + 34,
+    values, errors = (np.array(table[0]) * scale.factor for table in (load.values, load.errors))
+    low, high = values - NINETY * errors, values + NINETY * errors
+    up, title = svg.axis([*low, *high], BOTTOM, TOP, zero=True), _name(load, 42)
+    return _curves(
         f"Missing {_kind(load)} over the beat, {title}",
-        text(LEFT, 14, title, class_="title"),
-        x_axis(across, TOP, BOTTOM, PHASE, BEATS),
-        y_axis(up, LEFT, RIGHT, f"missing {_kind(load)}, {scale.unit}"),
-        area([(x, up.at(v)) for x, v in ends], "band"),
-        line(LEFT, up.at(0), RIGHT, up.at(0), "axis"),
-        curve([(x, up.at(v)) for x, v in zip(places, values, strict=True)], "curve after"),
+        title,
+        up,
+        f"missing {_kind(load)}, {scale.unit}",
+        svg.band(svg.places(ACROSS, load.phase, up, low), svg.places(ACROSS, load.phase, up, high)),
+        svg.line(LEFT, up.at(0), RIGHT, up.at(0), "axis"),
+        svg.curve(svg.places(ACROSS, load.phase, up, values), "curve after"),
     )
 
 
-def _grid(
-    title: str, bands: Numbers, classes: list[list[str | None]], over: list[list[str | None]] | None = None
-) -> Markup:
+def _grid(title: str, bands: Sequence[float], classes: Classes, over: Classes | None = None) -> Markup:
     """Cells over phase (to the right) and span (tip on top), with axes."""
-    across, down = Axis(0, 1, LEFT, RIGHT), Axis(0, 1, TOP, BOTTOM)
+    down = svg.Axis(0, 1, TOP, BOTTOM)
     tall = HEIGHT / len(bands)
-    labels: list[Markup] = []
     every = math.ceil(13 / tall)
-    for k, band in enumerate(reversed(bands)):
-        if k % every == 0:
-            y = TOP + (k + 0.5) * tall
-            labels.append(text(LEFT - 4, y + 3.5, number(round(100 * band), 3), anchor="end", class_="tick"))
-    turned = tag(
-        "text",
-        "span, % (tip on top)",
-        transform=f"translate(14,{(TOP + BOTTOM) / 2:g}) rotate(-90)",
-        text_anchor="middle",
-        class_="label",
-    )
+    labels = [
+        svg.text(LEFT - 4, TOP + (k + 0.5) * tall + 3.5, number(round(100 * span), 3), anchor="end", class_="tick")
+        for k, span in list(enumerate(reversed(bands)))[::every]
+    ]
     return joined(
-        text(LEFT, 14, title, class_="title"),
-        cells(classes[::-1], across, down),
-        cells(over[::-1], across, down) if over else None,
-        x_axis(across, BOTTOM, BOTTOM + 3, PHASE, BEATS),
+        svg.text(LEFT, 14, title, class_="title"),
+        svg.cells(classes[::-1], ACROSS, down),
+        svg.cells(over[::-1], ACROSS, down) if over else None,
+        svg.x_axis(ACROSS, BOTTOM, BOTTOM + 3, PHASE, BEATS),
         *labels,
-        turned,
+        svg.turned_text(14, (TOP + BOTTOM) / 2, "span, % (tip on top)"),
     )
 
 
-def _largest(table: Table) -> tuple[int, int]:
-    places = [(i, j) for i, row in enumerate(table) for j in range(len(row))]
-    return max(places, key=lambda place: table[place[0]][place[1]])
+def _largest(table: npt.ArrayLike) -> tuple[int, int]:
+    """Row and column of the largest value."""
+    i, j = np.unravel_index(np.argmax(table), np.shape(table))
+    return int(i), int(j)
 
 
 def _peak(load: MissingLoad) -> tuple[int, int, float]:
     """Row and column where the load is largest in standard errors, and that ratio."""
-    ratios = tuple(
-        tuple(abs(v) / e if e > 0 else 0.0 for v, e in zip(row, errs, strict=True))
-        for row, errs in zip(load.values, load.errors, strict=True)
-    )
+    values, errors = np.abs(load.values), np.array(load.errors)
+    ratios = np.divide(values, errors, out=np.zeros_like(values), where=errors > 0)
     i, j = _largest(ratios)
-    return i, j, ratios[i][j]
+    return i, j, float(ratios[i, j])
 
 
-def _pooled(table: Sequence[Sequence[float]], most: int, pool: Pool) -> list[tuple[float, ...]]:
-    """``table`` with at most ``most`` columns: neighbours are pooled."""
-    columns = len(table[0])
-    if columns <= most:
-        return [tuple(row) for row in table]
-    ends = [round(k * columns / most) for k in range(most + 1)]
-    return [tuple(pool(row[a:b]) for a, b in pairwise(ends)) for row in table]
+def _pooled(values: npt.ArrayLike, pool: Callable[..., Any] = np.mean) -> list[Any]:
+    """``values`` with at most MOST_ROWS rows and MOST_COLUMNS columns: neighbours are pooled."""
+    pooled = np.asarray(values, dtype=np.float64)
+    for k, most in zip(range(pooled.ndim), (MOST_ROWS, MOST_COLUMNS), strict=False):
+        size = pooled.shape[k]
+        if size > most:
+            parts = np.split(pooled, [round(j * size / most) for j in range(1, most)], axis=k)
+            pooled = np.stack([pool(part, axis=k) for part in parts], axis=k)
+    return list(pooled.tolist())
 
 
-def _small(table: Sequence[Sequence[float]], pool: Pool) -> list[tuple[float, ...]]:
-    """``table`` with at most MOST_ROWS rows and MOST_COLUMNS columns."""
-    rows = _turned(_pooled(_turned(table), MOST_ROWS, pool))
-    return _pooled(rows, MOST_COLUMNS, pool)
-
-
-def _turned(table: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    return [tuple(column) for column in zip(*table, strict=True)]
-
-
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(sum(v * v for v in values) / len(values))
+def _rms(values: npt.NDArray[np.float64], axis: int) -> Any:
+    return np.sqrt(np.mean(values**2, axis=axis))

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.report.layout import document, figure, panels
+from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
-from wingfit.report.svg import SERIES, Axis, area, axis, curve, dots, drawing, legend, x_axis, y_axis
+from wingfit.report.svg import SERIES, Axis, axis, band, curve, dots, drawing, legend, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
 Values = Sequence[float] | npt.NDArray[np.float64]
@@ -43,7 +43,8 @@ class Chart:
 def chart_page(title: str, charts: Sequence[Chart]) -> str:
     """One HTML file with all ``charts`` that have values: no script, nothing loaded."""
     figures = [_figure(chart) for chart in charts if any(map(_finite, chart.curves))]
-    return document(title, tag("main", tag("h1", title), panels(*figures, size="wide")))
+    body = tag("main", tag("h1", title), panels(*figures, size="wide"))
+    return render("document.html", title=title, body=body)
 
 
 def _figure(chart: Chart) -> Markup:
@@ -72,7 +73,7 @@ def _figure(chart: Chart) -> Markup:
 def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]:
     if one.band:
         low, high = ([(across.at(x), up.at(y)) for x, y in _pairs(one.x, edge)] for edge in one.band)
-        return [area([*low, *reversed(high)], "band")]
+        return [band(low, high)]
     if one.dots:
         return [dots([(across.at(x), up.at(y)) for x, y in _finite(one)], "points")]
     pieces: list[list[tuple[float, float]]] = [[]]
@@ -86,10 +87,8 @@ def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]
 
 def _y_axis(chart: Chart) -> Axis:
     values = [y for one in chart.curves for edge in (one.band or (one.y,)) for _, y in _pairs(one.x, edge)]
-    if not chart.logarithmic:
-        return axis(values, BOTTOM, TOP)
-    highest = max(values)
-    if highest <= 0:
+    highest = max(values, default=0.0)
+    if not chart.logarithmic or highest <= 0:
         return axis(values, BOTTOM, TOP)
     return Axis(highest / 10**DECADES, 2 * highest, BOTTOM, TOP, logarithmic=True)
 

@@ -1,37 +1,33 @@
-"""Blocks of a page: the document itself, sections, figures, tables."""
+"""Blocks of a page: the document itself, figures, details. Templates (Jinja) are in templates/."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
-from wingfit.report.markup import Markup, tag
-from wingfit.report.style import style_sheet
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+from wingfit.report.markup import Markup, joined, tag
 
-
-def document(title: str, *body: object) -> str:
-    """One HTML file with no script that loads nothing, for screen, phone and paper."""
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("title", title),
-        tag("style", Markup(style_sheet())),
-    )
-    return f"<!DOCTYPE html>\n{tag('html', head, tag('body', *body), lang='en')}\n"
+# A part that is None is left out; text is escaped by ``joined``, which also replaces control characters.
+_TEMPLATES = Environment(
+    loader=FileSystemLoader(Path(__file__).with_name("templates")),
+    autoescape=True,
+    finalize=joined,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
 
 
-def section(heading: str, *parts: object) -> Markup:
-    """A section with a heading."""
-    return tag("section", tag("h2", heading), *parts)
+def render(template: str, **values: Any) -> str:
+    """A template, filled in: one HTML file with no script that loads nothing, for screen, phone and paper."""
+    return _TEMPLATES.get_template(template).render(**values)
 
 
 def figure(caption: str, *parts: object, note: object = None) -> Markup:
     """A figure whose caption states its result; ``note`` explains the drawing."""
-    below = None if note is None else tag("p", note, class_="note")
-    return tag("figure", tag("figcaption", caption), *parts, below)
+    return tag("figure", tag("figcaption", caption), *parts, None if note is None else tag("p", note, class_="note"))
 
 
 def panels(*drawings: object, size: str = "") -> Markup:
@@ -39,18 +35,6 @@ def panels(*drawings: object, size: str = "") -> Markup:
     return tag("div", *drawings, class_=f"panels {size}".strip())
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[object]], *, numbers: int = 0) -> Markup:
-    """A table that scrolls where it is too wide; the last ``numbers`` columns are right-aligned."""
-    first = len(head) - numbers
-    top = tag("tr", *(tag("th", name, scope="col", class_=_side(k, first)) for k, name in enumerate(head)))
-    body = [tag("tr", *(tag("td", cell, class_=_side(k, first)) for k, cell in enumerate(row))) for row in rows]
-    return tag("div", tag("table", tag("thead", top), tag("tbody", *body)), class_="scroll", tabindex="0")
-
-
 def folded(summary: str, *parts: object) -> Markup:
     """Details that open on a click, and are open on paper."""
     return tag("details", tag("summary", summary), *parts)
-
-
-def _side(column: int, first: int) -> str | None:
-    return "number" if column >= first else None

@@ -44,7 +44,9 @@ def _strips(where: Where) -> Markup | None:
         turns = interval is where.phase
         centre = with_unit(number(interval.value * factor), unit)
         at = along.at(interval.value % 1 if turns else interval.value)
-        extent = f"{name}: {centre}{_within(interval, factor, unit)}"
+        extent = f"{name}: {centre}"
+        if interval.low is not None or interval.high is not None:
+            extent += f", 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
         parts += [
             text(LEFT, y - 6, extent, class_="value"),
             tag("rect", x=LEFT, y=y, width=RIGHT - LEFT, height=12.0, class_="trough"),
@@ -58,12 +60,6 @@ def _strips(where: Where) -> Markup | None:
         ]
     title = f"Location, mainly along {where.axis}" if where.axis else "Location"
     return drawing(WIDTH, 22 + 54.0 * len(rows) + 4, title, text(LEFT, 14, title, class_="title"), *parts)
-
-
-def _within(interval: Interval, factor: float, unit: str) -> str:
-    if interval.low is None and interval.high is None:
-        return ""
-    return f", 90 % within {with_unit(bounds(interval, Scale(factor, unit)), unit)}"
 
 
 def _harmonics(where: Where, subject: str) -> Markup | None:
@@ -108,7 +104,7 @@ def _powers(exponents: tuple[Exponent, ...], subject: str) -> Markup | None:
         y = 44.0 * k + 40
         span = f"{number(e.low)} to {with_unit(number(e.high), e.unit)}"
         parts.append(text(LEFT, y - 12, f"{e.variable}: {number(e.power.value, 2)} ({span})", class_="value"))
-        parts.append(whisker(along, y, (e.power.low, e.power.high), e.power.value, "after"))
+        parts.append(whisker(along, y, e.power, "after"))
     caption = _scaling(exponents, subject)
     return figure(
         caption,

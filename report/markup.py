@@ -10,14 +10,17 @@ _EMPTY = frozenset({"meta", "br", "line", "rect", "circle", "path"})
 
 
 class Markup(str):
-    """Text that is already markup."""
+    """Text that is already markup, which Jinja does not escape either."""
 
     __slots__ = ()
 
+    def __html__(self) -> str:
+        return self
+
 
 def escaped(value: object) -> Markup:
-    """``value`` as markup: unchanged if it is Markup, else its text, escaped."""
-    return value if isinstance(value, Markup) else Markup(escape(_CONTROL.sub("\ufffd", str(value))))
+    """``value`` as markup: unchanged if it is markup, also of a Jinja macro; else its text, escaped."""
+    return Markup(value if hasattr(value, "__html__") else escape(_CONTROL.sub("\ufffd", str(value))))
 
 
 def tag(element: str, *children: object, **attributes: object) -> Markup:
@@ -42,6 +45,4 @@ def _name(attribute: str) -> str:
 
 
 def _value(value: object) -> str:
-    if isinstance(value, float):
-        return f"{round(value, 2) + 0.0:g}"
-    return escape(_CONTROL.sub("\ufffd", str(value)))
+    return f"{round(value, 2) + 0.0:g}" if isinstance(value, float) else escape(_CONTROL.sub("\ufffd", str(value)))

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from statistics import median
 
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
-from wingfit.report.layout import figure, folded, panels, table
-from wingfit.report.markup import Markup, joined, tag
+from wingfit.report.layout import figure, panels
+from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import Scale, bounds, change, channel_scale, condition, number, shortened, stages
-from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, text, whisker, x_axis, y_axis
+from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, places, text, whisker, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
 ROW, MOST_ROWS, MOST_OVERLAYS = 38.0, 18, 12
@@ -34,10 +34,10 @@ def proof(finding: Finding) -> Markup | None:
     parts: list[Markup | None] = [x_axis(along, 8, 88, "misfit on held-out recordings / floor")]
     for k, (name, interval) in enumerate(rows):
         y = 34.0 + 38 * k
-        value = f"{number(interval.value)} ({_range(interval)})"
+        value = f"{number(interval.value)} (90 %: {bounds(interval, Scale(1.0, ''))})"
         parts.append(text(LEFT, y - 10, f"{name}: {value}" if len(rows) > 1 else value, class_="value"))
         parts.append(line(along.at(1.0), y - 6, along.at(1.0), y + 8, "floor"))
-        parts.append(whisker(along, y + 1, (interval.low, interval.high), interval.value, name))
+        parts.append(whisker(along, y + 1, interval, name))
     return figure(
         _proof_caption(finding, given),
         panels(drawing(WIDTH, 120, _proof_caption(finding, given), *parts)),
@@ -63,24 +63,17 @@ def recordings(finding: Finding) -> Markup | None:
     scale = channel_scale(finding)
     along = _along([v * scale.factor for r in finding.recordings for v in _values(r)])
     drawings: list[Markup] = []
-    for held_out, name in ((True, "held out"), (False, "fitted")):
+    for held_out, name in ((True, "Held out"), (False, "Fitted")):
         group = [r for r in finding.recordings if r.held_out == held_out]
         chunks = [group[k : k + MOST_ROWS] for k in range(0, len(group), MOST_ROWS)]
-        for k, chunk in enumerate(chunks):
-            title = (
-                f"{name.capitalize()} ({len(group)})"
-                if len(chunks) == 1
-                else f"{name.capitalize()} ({k + 1} of {len(chunks)})"
-            )
-            drawings.append(_recordings(finding, title, chunk, along, scale))
-    return joined(
-        figure(
-            _recordings_caption(finding),
-            panels(*drawings),
-            legend(*stages(finding).items(), ("floor", "floor")),
-            note="Root mean square of one channel, with 90 % intervals.",
-        ),
-        folded("As a table", _table(finding, scale)),
+        for k, chunk in enumerate(chunks, 1):
+            part = f"{k} of {len(chunks)}" if len(chunks) > 1 else len(group)
+            drawings.append(_recordings(finding, f"{name} ({part})", chunk, along, scale))
+    return figure(
+        _recordings_caption(finding),
+        panels(*drawings),
+        legend(*stages(finding).items(), ("floor", "floor")),
+        note="Root mean square of one channel, with 90 % intervals.",
     )
 
 
@@ -116,7 +109,10 @@ def overlays(finding: Finding) -> Markup | None:
 
 def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
     """The typical distance between simulation and recording in one sentence."""
-    before, after = (median([_distance(o.recorded, getattr(o, name)) for o in shown]) for name in ("before", "after"))
+    before, after = (
+        median([math.dist(o.recorded, getattr(o, name)) / len(o.phase) ** 0.5 for o in shown])
+        for name in ("before", "after")
+    )
     values = change(finding, scale.text(before), scale.text(after))
     return f"Median distance between simulated and recorded beats: {values}"
 
@@ -126,20 +122,15 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
     parts: list[Markup] = [x_axis(along, 22, bottom, f"misfit, {scale.unit}")]
     for k, row in enumerate(rows):
         y = 24 + ROW * k
-        parts.append(tag("text", tag("title", row.name), _label(row, 48), x=LEFT, y=y + 11, class_="value"))
+        about = condition(row)
+        label = f"{shortened(row.name, max(14, 48 - len(about)))} \u2002 {about}"
+        parts.append(tag("text", tag("title", row.name), label, x=LEFT, y=y + 11, class_="value"))
         floor = along.at(row.floor * scale.factor)
         parts.append(line(floor, y + 15, floor, y + 35, "floor"))
         for at, name in zip((y + 21, y + 29), stages(finding), strict=False):
-            interval: Interval = getattr(row, name)
-            ends = tuple(None if v is None else v * scale.factor for v in (interval.low, interval.high))
-            parts.append(whisker(along, at, (ends[0], ends[1]), interval.value * scale.factor, name))
+            parts.append(whisker(along, at, getattr(row, name), name, scale.factor))
     label = f"{title}: misfit by recording"
     return drawing(WIDTH, bottom + 30, label, text(LEFT, 14, title, class_="title"), *parts)
-
-
-def _label(row: RecordingMisfit, letters: int) -> str:
-    about = condition(row)
-    return f"{shortened(row.name, max(14, letters - len(about)))} \u2002 {about}"
 
 
 def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
@@ -149,11 +140,10 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
     recorded = [v * scale.factor for v in overlay.recorded]
     residuals = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
     across = Axis(0, 1, left, right)
-    places = [across.at(p) for p in overlay.phase]
     up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
     rest = axis([v for values in residuals.values() for v in values], 226, 160, zero=True)
     title = shortened(overlay.channel, 28)
-    below = f"{shortened(overlay.recording, 30)}, {'held out' if overlay.held_out else 'fitted'}"
+    below = f"{shortened(overlay.recording, 30)}, {_use(overlay)}"
     return drawing(
         300,
         258,
@@ -164,32 +154,31 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
         y_axis(up, left, right, scale.unit),
         y_axis(rest, left, right, f"residual, {scale.unit}", count=3),
         line(left, rest.at(0), right, rest.at(0), "axis"),
-        dots([(x, up.at(v)) for x, v in zip(places, recorded, strict=True)], "samples"),
+        dots(places(across, overlay.phase, up, recorded), "samples"),
         *(
-            curve([(x, on.at(v)) for x, v in zip(places, values[name], strict=True)], f"curve {name}")
+            curve(places(across, overlay.phase, on, values[name]), f"curve {name}")
             for on, values in ((up, simulated), (rest, residuals))
             for name in simulated
         ),
     )
 
 
-def _table(finding: Finding, scale: Scale) -> Markup:
+def table(finding: Finding) -> tuple[list[str], list[list[str]]]:
+    """Headings of the misfits in a table of the recordings, and its rows."""
+    scale = channel_scale(finding)
+
     def cell(interval: Interval) -> str:
         return f"{number(interval.value * scale.factor)} ({bounds(interval, scale)})"
 
     rows = [
-        (
-            r.name,
-            "held out" if r.held_out else "fitted",
-            condition(r),
-            *(cell(getattr(r, stage)) for stage in stages(finding)),
-            number(r.floor * scale.factor),
-        )
+        [r.name, _use(r), condition(r), *(cell(getattr(r, s)) for s in stages(finding)), number(r.floor * scale.factor)]
         for r in finding.recordings
     ]
-    columns = [f"{stage}, {scale.unit}" for stage in stages(finding)]
-    head = ("recording", "use", "condition", *columns, f"floor, {scale.unit}")
-    return table(head, rows, numbers=len(columns) + 1)
+    return [f"{name}, {scale.unit}" for name in (*stages(finding), "floor")], rows
+
+
+def _use(recording: RecordingMisfit | Overlay) -> str:
+    return "held out" if recording.held_out else "fitted"
 
 
 def _along(values: Sequence[float]) -> Axis:
@@ -204,11 +193,3 @@ def _along(values: Sequence[float]) -> Axis:
 def _values(row: RecordingMisfit) -> list[float]:
     ends = [v for i in (row.before, row.after) for v in (i.value, i.low, i.high)]
     return [v for v in (*ends, row.floor) if v is not None]
-
-
-def _range(interval: Interval) -> str:
-    return f"90 %: {bounds(interval, Scale(1.0, ''))}"
-
-
-def _distance(one: Sequence[float], other: Sequence[float]) -> float:
-    return math.sqrt(sum((a - b) ** 2 for a, b in zip(one, other, strict=True)) / len(one))

@@ -49,8 +49,12 @@ def number(value: float, digits: int = 3) -> str:
     if not -4 <= power < 5:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{_trimmed(mantissa)}e{int(exponent)}".replace("-", "−")
-    text = _trimmed(f"{value:.{max(0, digits - 1 - power)}f}")
-    return text.replace("-", "−")
+    return _trimmed(f"{value:.{max(0, digits - 1 - power)}f}").replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """A number with its sign, + too."""
+    return f"+{number(value)}" if value > 0 else number(value)
 
 
 def share(part: float) -> str:
@@ -104,14 +108,10 @@ def shortened(text: str, letters: int) -> str:
     return f"{text[: letters - tail - 1]}…{text[len(text) - tail :]}"
 
 
-def titles(finding: Finding) -> dict[str, str]:
-    """Titles of the effects, from the hypotheses of one effect."""
-    return {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
-
-
-def title_of(name: str, known: dict[str, str]) -> str:
-    """Title of the effect ``name``, or the name as words."""
-    return known.get(name) or name.replace("_", " ").capitalize()
+def titles_of(names: Iterable[str], finding: Finding) -> list[str]:
+    """Titles of effects, from the hypotheses of one effect; else their names as words."""
+    known = {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
+    return [known.get(name) or name.replace("_", " ").capitalize() for name in names]
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:

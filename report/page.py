@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from wingfit.diagnosis.finding import VERDICTS, Finding, Floors
-from wingfit.report import beat_maps, location, misfits, ranking, tables, wing_map
-from wingfit.report.layout import document, figure, panels, section
-from wingfit.report.markup import Markup, joined, tag
+from wingfit.diagnosis.finding import VERDICTS, Finding
+from wingfit.report import beat_maps, location, misfits, number_format, ranking, svg, tables, wing_map
+from wingfit.report.layout import figure, panels, render
+from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
-    Scale,
     added_effects,
     best_of,
     channel_scale,
@@ -15,88 +14,48 @@ from wingfit.report.number_format import (
     number,
     percent,
     stages,
-    title_of,
-    titles,
+    titles_of,
 )
-from wingfit.report.svg import Axis, bar, drawing, text, x_axis
-
-_VALIDATION = "Is the fit better on held-out recordings?"
+from wingfit.report.svg import Axis, drawing, text, x_axis
 
 
 def html(finding: Finding) -> str:
     """The report as one HTML file, without scripts or anything to load."""
-    title = f"{headline(finding)} ({finding.dataset})"
-    return document(title, _hatch(), tag("main", *_parts(finding)))
+    return render(
+        "finding.html",
+        title=f"{headline(finding)} ({finding.dataset})",
+        headline=headline(finding),
+        finding=finding,
+        verdicts=[*VERDICTS, *(name for name in finding.probabilities if name not in VERDICTS)],
+        tiles=_tiles(finding),
+        floors=_floors(finding),
+        made=_made(finding),
+        scale=channel_scale(finding),
+        n=number_format,
+        **{
+            part.__name__.rpartition(".")[2]: part
+            for part in (beat_maps, location, misfits, ranking, svg, tables, wing_map)
+        },
+    )
 
 
 def headline(finding: Finding) -> str:
     """The verdict in one line."""
-    known = titles(finding)
-    named = [title_of(name, known) for name in finding.named]
-    if finding.verdict == "adequate":
-        return "The model is adequate: these recordings show no missing physics"
-    if finding.verdict == "named":
-        return f"Missing physics: {' + '.join(named)}" if named else "Missing physics: a known effect"
-    if finding.verdict == "ambiguous":
-        return (
-            f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
-            if named
-            else "Several hypotheses fit equally well"
-        )
-    if finding.verdict == "unnamed":
-        return "Missing physics that no effect of the library explains"
-    return f"Measurement fault: {' + '.join(named)}" if named else "Measurement fault"
+    named = titles_of(finding.named, finding)
+    together = " + ".join(named)
+    if finding.verdict == "ambiguous" and named:
+        return f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
+    return {
+        "adequate": "The model is adequate: these recordings show no missing physics",
+        "named": f"Missing physics: {together or 'a known effect'}",
+        "ambiguous": "Several hypotheses fit equally well",
+        "unnamed": "Missing physics that no effect of the library explains",
+        "measurement fault": f"Measurement fault: {together}" if named else "Measurement fault",
+    }[finding.verdict]
 
 
-def _parts(finding: Finding) -> list[object]:
-    return [
-        *_verdict(finding),
-        _section(
-            _VALIDATION if finding.added_effects else "How well the model fits",
-            misfits.proof(finding),
-            misfits.recordings(finding),
-        ),
-        _section(
-            "Location on the wing and in the beat",
-            location.place(finding),
-            wing_map.wing_map(finding),
-            beat_maps.misfit_maps(finding),
-        ),
-        _section(f"The missing {beat_maps.missing_kind(finding)}", beat_maps.missing_loads(finding)),
-        _section("Hypotheses considered", ranking.ranking(finding)),
-        tables.law(finding.law),
-        _section("Recorded and simulated", misfits.overlays(finding)),
-        tables.genes(finding),
-        tables.advice(finding),
-        _section("Lower limit of the misfit", _floors(finding)),
-        tables.sources(finding),
-        tables.remarks(finding),
-        _made(finding),
-    ]
-
-
-def _section(heading: str, *parts: Markup | None) -> Markup | None:
-    shown = [part for part in parts if part is not None]
-    return section(heading, *shown) if shown else None
-
-
-def _verdict(finding: Finding) -> list[object]:
-    rows = []
-    for name in (*VERDICTS, *(k for k in finding.probabilities if k not in VERDICTS)):
-        part = finding.probabilities.get(name, 0.0)
-        chosen = " chosen" if name == finding.verdict else ""
-        shown = bar(part, "strong" if chosen else "pale")
-        rows += [tag("span", name, class_=f"name{chosen}"), shown, tag("span", percent(part), class_=f"value{chosen}")]
-    return [
-        tag("p", f"Diagnosis of {finding.dataset} · verdict: {finding.verdict}", class_="over"),
-        tag("h1", headline(finding)),
-        tag("p", finding.summary),
-        tag("div", *rows, class_="bars verdicts", role="group", aria_label="Probability of every verdict"),
-        _tiles(finding),
-    ]
-
-
-def _tiles(finding: Finding) -> Markup:
+def _tiles(finding: Finding) -> list[tuple[str, str, str]]:
+    """Of each of the main numbers its name, its value and its meaning."""
     scale = channel_scale(finding)
     correlation = number(finding.floors.lag1_autocorrelation, 2)
     tiles = [
@@ -111,8 +70,7 @@ def _tiles(finding: Finding) -> Markup:
     if best is not None and finding.verdict != "adequate":
         by = best.title if finding.added_effects else f"{best.title}, the closest"
         tiles.append(("Explained", percent(best.explained), f"of the misfit beyond the noise, by {by}"))
-    shown = [tag("div", tag("dt", name), tag("dd", value, tag("small", about))) for name, value, about in tiles]
-    return tag("dl", *shown, class_="tiles")
+    return tiles
 
 
 def _floors(finding: Finding) -> Markup:
@@ -136,48 +94,20 @@ def _floors(finding: Finding) -> Markup:
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="value"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
     note = f"The finer model: {floors.finer}." if floors.discretisation is not None else None
-    return figure(
-        _floors_caption(finding, floors, scale), panels(drawing(360, bottom + 30, "Floors", *parts)), note=note
-    )
-
-
-def _floors_caption(finding: Finding, floors: Floors, scale: Scale) -> str:
     residual = scale.text(finding.strength * floors.noise)
-    return (
+    caption = (
         f"The expected misfit of a correct model is {scale.text(floors.total)}; the residual of the nominal model, "
         f"refitted, is {residual} (strength d = {number(finding.strength)})"
     )
+    return figure(caption, panels(drawing(360, bottom + 30, "Floors", *parts)), note=note)
 
 
-def _made(finding: Finding) -> Markup:
+def _made(finding: Finding) -> list[str]:
+    """Lines on the model, the computation and the versions."""
     versions = ", ".join(f"{name} {version}" for name, version in finding.versions.items())
-    minutes = (
-        f"{number(finding.seconds / 60, 2)} minutes"
-        if finding.seconds >= 60
-        else f"{number(finding.seconds, 2)} seconds"
-    )
-    spent = f"{minutes}, {finding.evaluations} evaluations" if finding.evaluations else minutes
-    lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else None, versions or None]
-    return tag("footer", *(tag("p", words, class_="quiet") for words in lines if words))
-
-
-def _hatch() -> Markup:
-    """Hatch patterns: of map cells that are not significant, and of bars that are linear estimates."""
-    pattern = tag(
-        "pattern",
-        tag("rect", width=6, height=6, class_="veil"),
-        tag("path", d="M0 6L6 0", class_="hatch"),
-        id="hatch",
-        width=6,
-        height=6,
-        patternUnits="userSpaceOnUse",
-    )
-    stripes = tag(
-        "pattern",
-        tag("path", d="M1.5 0V8", class_="guess-line"),
-        id="guess",
-        width=5,
-        height=8,
-        patternUnits="userSpaceOnUse",
-    )
-    return joined(tag("svg", tag("defs", pattern, stripes), class_="defs", aria_hidden="true"))
+    size, unit = (60, "minutes") if finding.seconds >= 60 else (1, "seconds")
+    spent = f"{number(finding.seconds / size, 2)} {unit}"
+    if finding.evaluations:
+        spent += f", {finding.evaluations} evaluations"
+    lines = [f"Model: {finding.model}", f"Computed in {spent}" if finding.seconds else "", versions]
+    return [words for words in lines if words]

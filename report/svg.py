@@ -1,23 +1,26 @@
 """SVG charts: axes with round numbers, marks, colour levels, legends.
 
 Drawings are about 360 units wide, so that text keeps its size on a phone, where each fills the width. Colours are CSS
-classes, defined in :mod:`wingfit.report.style` for light and dark.
+classes, defined in style.css for light and dark.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
 
+from wingfit.diagnosis.finding import Interval
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import number
 
-LEVELS = 12  # colours of a map from zero to the maximum, classes l0 to l11
+LEVELS = 12  # colours of a map from zero to the maximum
 SERIES = 6  # colours of curves, classes s0 to s5
-SIDES = 6  # colours of a map on either side of zero, classes d0 to d12
+SIDES = 6  # colours of a map on either side of zero
+LEVEL_CLASSES = [f"l{k}" for k in range(LEVELS)]
+SIDE_CLASSES = [f"d{k}" for k in range(2 * SIDES + 1)]
 Points = Sequence[tuple[float, float]]
 
 
@@ -61,16 +64,9 @@ def axis(values: Sequence[float], start: float, end: float, *, zero: bool = Fals
     return Axis(bottom, high + free, start, end)
 
 
-def drawing(width: float, height: float, label: str, *parts: object, wide: bool = False) -> Markup:
+def drawing(width: float, height: float, label: str, *parts: object) -> Markup:
     """An SVG that fills the width of its parent; ``label`` is its text alternative."""
-    return tag(
-        "svg",
-        *parts,
-        viewBox=f"0 0 {width:g} {height:g}",
-        role="img",
-        aria_label=label,
-        class_="wide" if wide else None,
-    )
+    return tag("svg", *parts, viewBox=f"0 0 {width:g} {height:g}", role="img", aria_label=label)
 
 
 def text(x: float, y: float, words: object, *, anchor: str = "start", class_: str | None = None) -> Markup:
@@ -78,23 +74,34 @@ def text(x: float, y: float, words: object, *, anchor: str = "start", class_: st
     return tag("text", words, x=x, y=y, text_anchor=None if anchor == "start" else anchor, class_=class_)
 
 
+def turned_text(x: float, y: float, words: str) -> Markup:
+    """The label of a vertical axis, centred at (x, y)."""
+    return tag("text", words, transform=f"translate({x:g},{y:g}) rotate(-90)", text_anchor="middle", class_="label")
+
+
 def line(x1: float, y1: float, x2: float, y2: float, class_: str = "grid") -> Markup:
     """A straight line."""
     return tag("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_)
 
 
-def curve(points: Points, class_: str) -> Markup | None:
-    """A line through ``points``."""
-    if not points:
-        return None
-    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points), class_=class_)
+def places(across: Axis, x: Iterable[float], up: Axis, y: Iterable[float]) -> Points:
+    """Coordinates of the points (x, y) on two axes."""
+    return [(across.at(a), up.at(b)) for a, b in zip(x, y, strict=True)]
+
+
+def curve(points: Points, class_: str, end: str = "") -> Markup | None:
+    """A line through ``points``; ``end`` "Z" closes it."""
+    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + end, class_=class_) if points else None
 
 
 def area(points: Points, class_: str) -> Markup | None:
     """The area inside ``points``."""
-    if not points:
-        return None
-    return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + "Z", class_=class_)
+    return curve(points, class_, "Z")
+
+
+def band(low: Points, high: Points) -> Markup | None:
+    """The area between two lines."""
+    return area([*low, *reversed(high)], "band")
 
 
 def dots(points: Points, class_: str) -> Markup | None:
@@ -115,18 +122,19 @@ def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
     return tag("path", d=f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}{ends}", class_=class_)
 
 
-def whisker(along: Axis, y: float, ends: tuple[float | None, float | None], value: float, class_: str) -> Markup:
-    """A dot with its interval; an end without a bound is an arrow to the end of the axis."""
+def whisker(along: Axis, y: float, interval: Interval, class_: str, factor: float = 1.0) -> Markup:
+    """A dot with its interval, times ``factor``; an end without a bound is an arrow to the end of the axis."""
     parts: list[Markup] = []
-    for bound, edge in zip(ends, (along.start, along.end), strict=True):
+    value = along.at(interval.value * factor)
+    for bound, edge in ((interval.low, along.start), (interval.high, along.end)):
         if bound is None:
-            parts.append(arrow(along.at(value), y, edge - along.at(value), 0, f"whisker {class_}"))
+            parts.append(arrow(value, y, edge - value, 0, f"whisker {class_}"))
         else:
-            parts.append(line(along.at(value), y, along.at(bound), y, f"whisker {class_}"))
-            if abs(along.at(bound) - along.at(value)) > 5:
-                at = along.at(bound)
-                parts.append(line(at, y - 2.5, at, y + 2.5, f"whisker {class_}"))
-    return joined(*parts, tag("circle", cx=along.at(value), cy=y, r=3.6, class_=f"dot {class_}"))
+            end = along.at(bound * factor)
+            parts.append(line(value, y, end, y, f"whisker {class_}"))
+            if abs(end - value) > 5:
+                parts.append(line(end, y - 2.5, end, y + 2.5, f"whisker {class_}"))
+    return joined(*parts, tag("circle", cx=value, cy=y, r=3.6, class_=f"dot {class_}"))
 
 
 def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[float] | None = None) -> Markup:
@@ -146,15 +154,7 @@ def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -
     for value in up.ticks(count):
         at, room = up.at(value), max(room, 12 + 6.2 * len(number(value)))
         parts += [line(left, at, right, at), text(left - 4, at + 3.5, number(value), anchor="end", class_="tick")]
-    middle = (up.start + up.end) / 2
-    turned = tag(
-        "text",
-        label,
-        transform=f"translate({left - room:g},{middle:g}) rotate(-90)",
-        text_anchor="middle",
-        class_="label",
-    )
-    return joined(*parts, turned)
+    return joined(*parts, turned_text(left - room, (up.start + up.end) / 2, label))
 
 
 def level(value: float, most: float) -> int:

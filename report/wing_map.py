@@ -4,25 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from operator import itemgetter
 
 from wingfit.diagnosis.finding import Finding, Interval, MarkerMisfit
+from wingfit.report import svg
 from wingfit.report.layout import figure, panels
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import Scale, capital, change, channel_scale, number, share, shortened, stages
-from wingfit.report.svg import (
-    LEVELS,
-    Axis,
-    area,
-    arrow,
-    colour_bar,
-    drawing,
-    legend,
-    level,
-    line,
-    text,
-    whisker,
-    x_axis,
-)
 
 WIDTH, LEFT, RIGHT, TOP = 360.0, 16.0, 344.0, 34.0
 SLANT = 0.45  # oblique view from above and behind: drawn length, and sideways shift, of a unit length along x
@@ -63,7 +51,7 @@ def _planforms(finding: Finding, placed: Sequence[MarkerMisfit], scale: Scale) -
     return figure(
         caption(finding, scale),
         panels(*maps, _directions(placed, plan, scale)),
-        legend(*place) if place else None,
+        svg.legend(*place) if place else None,
         note="Seen from above, root left, leading edge on top. Circles: markers, coloured by the root mean square "
         "misfit beyond the noise over all recordings.",
     )
@@ -80,7 +68,8 @@ class _Plan:
         self.y0, self.y1 = min(p[1] for p in points), max(p[1] for p in points)
         self.size = min((RIGHT - LEFT - 12) / (self.y1 - self.y0 or 1.0), 240 / (self.x1 - self.x0 or 1e-9))
         self.bottom = TOP + 12 + (self.x1 - self.x0) * self.size
-        self.radius = _radius([self.at(m.x or 0.0, m.y or 0.0) for m in placed])
+        self.points = [self.at(m.x or 0.0, m.y or 0.0) for m in placed]
+        self.radius = _radius(self.points)
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         return LEFT + 6 + (y - self.y0) * self.size, TOP + 6 + (x - self.x0) * self.size
@@ -90,36 +79,31 @@ class _Plan:
             tag(
                 "circle",
                 tag("title", f"{m.name}: {scale.text(v)}"),
-                cx=self.at(m.x or 0.0, m.y or 0.0)[0],
-                cy=self.at(m.x or 0.0, m.y or 0.0)[1],
+                cx=x,
+                cy=y,
                 r=self.radius,
-                class_=f"marker l{level(v, most)}",
+                class_=f"marker l{svg.level(v, most)}",
             )
-            for m, v in sorted(zip(self.placed, values, strict=True), key=lambda pair: pair[1])
+            for m, (x, y), v in sorted(zip(self.placed, self.points, values, strict=True), key=itemgetter(2))
         ]
         k = max(range(len(values)), key=values.__getitem__)
-        worst = self.placed[k]
-        at = self.at(worst.x or 0.0, worst.y or 0.0)
+        worst, at = self.placed[k], self.points[k]
         anchor = "end" if at[0] > WIDTH / 2 else "start"
         words = f"largest: {shortened(worst.name, 22)}, {scale.text(values[k])}"
-        bar = colour_bar(
-            Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT),
-            self.bottom + 24,
-            [f"l{n}" for n in range(LEVELS)],
-            f"misfit beyond the noise, {scale.unit}",
-        )
-        return drawing(
+        along = svg.Axis(0, (most or 1.0) * scale.factor, LEFT, RIGHT)
+        label = f"misfit beyond the noise, {scale.unit}"
+        return svg.drawing(
             WIDTH,
             self.bottom + 66,
             f"{title}; {words}",
-            text(LEFT, 14, title, class_="title"),
-            area([self.at(*p) for p in self.outline], "outline"),
+            svg.text(LEFT, 14, title, class_="title"),
+            svg.area([self.at(*p) for p in self.outline], "outline"),
             self.place(self.finding),
             *marks,
             tag("circle", cx=at[0], cy=at[1], r=self.radius + 2.5, class_="ring") if values[k] > 0 else None,
-            text(at[0], self.bottom + 12, words, anchor=anchor, class_="value") if values[k] > 0 else None,
-            line(at[0], at[1] + self.radius + 2.5, at[0], self.bottom + 2, "leader") if values[k] > 0 else None,
-            bar,
+            svg.text(at[0], self.bottom + 12, words, anchor=anchor, class_="value") if values[k] > 0 else None,
+            svg.line(at[0], at[1] + self.radius + 2.5, at[0], self.bottom + 2, "leader") if values[k] > 0 else None,
+            svg.colour_bar(along, self.bottom + 24, svg.LEVEL_CLASSES, label),
         )
 
     def place(self, finding: Finding) -> Markup | None:
@@ -151,30 +135,30 @@ def _directions(placed: Sequence[MarkerMisfit], plan: _Plan, scale: Scale) -> Ma
         arrows.append(tag("circle", cx=start[0], cy=start[1], r=1.4, class_="point"))
         if length > 1:
             dx, dy, dz = m.direction
-            arrows.append(arrow(*start, length * (dy - SLANT * dx), length * (SLANT * dx - dz), "arrow"))
+            arrows.append(svg.arrow(*start, length * (dy - SLANT * dx), length * (SLANT * dx - dz), "arrow"))
     bottom = TOP + ARROW + (plan.x1 - plan.x0) * SLANT * size
     base = bottom + 46
     title = "Direction of the largest misfit"
-    return drawing(
+    return svg.drawing(
         WIDTH,
         bottom + 82,
         f"{title}: {_way(placed)}",
-        text(LEFT, 14, title, class_="title"),
-        text(LEFT, 29, _way(placed), class_="value"),
-        area([at(*p) for p in plan.outline], "outline"),
+        svg.text(LEFT, 14, title, class_="title"),
+        svg.text(LEFT, 29, _way(placed), class_="value"),
+        svg.area([at(*p) for p in plan.outline], "outline"),
         *arrows,
         _triad(LEFT + 26, base + 8),
-        arrow(LEFT + 120, base, ARROW, 0, "arrow"),
-        text(LEFT + 126 + ARROW, base + 4, f"{scale.text(most)} beyond the noise", class_="tick"),
-        text(LEFT + 120, base + 24, "x aft, y to the tip, z up", class_="tick"),
+        svg.arrow(LEFT + 120, base, ARROW, 0, "arrow"),
+        svg.text(LEFT + 126 + ARROW, base + 4, f"{scale.text(most)} beyond the noise", class_="tick"),
+        svg.text(LEFT + 120, base + 24, "x aft, y to the tip, z up", class_="tick"),
     )
 
 
 def _triad(x: float, y: float) -> Markup:
     ends = {"x": (-24 * SLANT, 24 * SLANT), "y": (26.0, 0.0), "z": (0.0, -26.0)}
-    parts = [arrow(x, y, dx, dy, "frame") for dx, dy in ends.values()]
+    parts = [svg.arrow(x, y, dx, dy, "frame") for dx, dy in ends.values()]
     names = [
-        text(x + 1.4 * dx - 1, y + 1.4 * dy + (0 if name == "z" else 4), name, class_="tick", anchor="middle")
+        svg.text(x + 1.4 * dx - 1, y + 1.4 * dy + (0 if name == "z" else 4), name, class_="tick", anchor="middle")
         for name, (dx, dy) in ends.items()
     ]
     return joined(*parts, *names)
@@ -191,11 +175,8 @@ def _way(placed: Sequence[MarkerMisfit]) -> str:
         sum(w * f(2 * math.pi * m.worst) for w, m in zip(weights, placed, strict=True)) for f in (math.cos, math.sin)
     ]
     together = math.hypot(*turn) / sum(weights)
-    when = (
-        f"at phase {number((math.atan2(turn[1], turn[0]) / (2 * math.pi)) % 1, 2)}"
-        if together > 0.5
-        else "at different phases"
-    )
+    phase = (math.atan2(turn[1], turn[0]) / (2 * math.pi)) % 1
+    when = f"at phase {number(phase, 2)}" if together > 0.5 else "at different phases"
     part = parts[most] / (sum(parts) or 1.0)
     return f"{share(part)} along {'xyz'[most]}, {when} of the beat"
 
@@ -219,22 +200,22 @@ def _axes(finding: Finding, scale: Scale) -> Markup:
     """Misfit of every channel without a position, largest first."""
     shown = sorted(finding.markers, key=lambda m: -m.before)[:MOST_ROWS]
     most = max(max(m.before, m.after) for m in shown) * scale.factor or 1.0
-    along = Axis(0, 1.05 * most, 12, 348)
+    along = svg.Axis(0, 1.05 * most, 12, 348)
     bottom = 12 + 30.0 * len(shown)
-    parts: list[Markup] = [x_axis(along, 8, bottom, f"misfit beyond the noise, root mean square, {scale.unit}")]
+    parts: list[Markup] = [svg.x_axis(along, 8, bottom, f"misfit beyond the noise, root mean square, {scale.unit}")]
     for k, m in enumerate(shown):
         y = 34.0 + 30 * k
         name = f"{shortened(m.name, 36)}, largest at phase {number(m.worst, 2)}"
-        parts.append(text(12, y - 9, name, class_="value"))
+        parts.append(svg.text(12, y - 9, name, class_="value"))
         if "after" in stages(finding):
-            parts.append(line(along.at(m.before * scale.factor), y, along.at(m.after * scale.factor), y, "leader"))
+            parts.append(svg.line(along.at(m.before * scale.factor), y, along.at(m.after * scale.factor), y, "leader"))
         for stage in stages(finding):
-            value = getattr(m, stage) * scale.factor
-            parts.append(whisker(along, y, (value, value), value, stage))
+            value = getattr(m, stage)
+            parts.append(svg.whisker(along, y, Interval(value, value, value), stage, scale.factor))
     left = len(finding.markers) - len(shown)
     return figure(
         caption(finding, scale),
-        panels(drawing(WIDTH, bottom + 32, caption(finding, scale), *parts)),
-        legend(*stages(finding).items()),
+        panels(svg.drawing(WIDTH, bottom + 32, caption(finding, scale), *parts)),
+        svg.legend(*stages(finding).items()),
         note=f"{left} more in the JSON." if left else None,
     )

@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -28,6 +30,16 @@ def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) ->
         raise typer.BadParameter(f"there is no folder {place}; create it first", param_hint=option)
     if not os.access(place, os.W_OK):
         raise typer.BadParameter(f"{place} cannot be written; choose another place", param_hint=option)
+
+
+def new_file(about: str, *names: str) -> Any:
+    """An option for a file to write, checked before anything is computed; ``about`` names its ending: FILE.csv."""
+
+    def checked(path: Path | None) -> Path | None:
+        check_file(path, names[0], tuple(re.findall(r"FILE(\.\w+)", about)))
+        return path
+
+    return typer.Option(*names, help=about, callback=checked)
 
 
 @contextmanager

@@ -80,9 +80,7 @@ def read_condition(words: list[str]) -> dict[str, float]:
         name, _, value = word.partition("=")
         if name not in CONDITION:
             raise typer.BadParameter(f"{word}: the name must be one of {', '.join(CONDITION)}", param_hint="--at")
-        if not _is_number(value):
-            raise typer.BadParameter(f"{word}: give NAME=VALUE, such as airspeed_m_s=6", param_hint="--at")
-        values[name] = float(value)
+        values[name] = _number(value, f"{word}: give NAME=VALUE, such as airspeed_m_s=6", "--at")
     return values
 
 
@@ -92,10 +90,8 @@ def read_genome(words: list[str], option: str = "--genome") -> dict[str, float]:
     for word in words:
         name, equals, value = word.partition("=")
         values |= {name: value} if equals else _read_genes(Path(word), option)
-    for name, value in values.items():
-        if not _is_number(value):
-            raise typer.BadParameter(f"{name}={value}: the value must be a number in SI units", param_hint=option)
-    return {name: float(value) for name, value in values.items()}
+    remedy = "the value must be a number in SI units"
+    return {name: _number(value, f"{name}={value}: {remedy}", option) for name, value in values.items()}
 
 
 def _read_genes(path: Path, option: str) -> dict[str, Any]:
@@ -115,9 +111,9 @@ def _read_genes(path: Path, option: str) -> dict[str, Any]:
     return dict(content["genome"]) if isinstance(content.get("genome"), dict) else content
 
 
-def _is_number(value: Any) -> bool:
+def _number(value: Any, message: str, option: str) -> float:
+    """``value`` as a number; where it is none, a usage error with ``message``."""
     try:
-        float(value)
+        return float(value)
     except (TypeError, ValueError):
-        return False
-    return True
+        raise typer.BadParameter(message, param_hint=option) from None

@@ -6,9 +6,10 @@ import json
 import sys
 import time
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
@@ -22,6 +23,8 @@ WHOLE_BELOW = 1e6
 REVERSING = ("LRE", "RLE", "PDF", "LRO", "RLO", "LRI", "RLI", "FSI", "PDI")
 
 Report = Callable[..., None]
+T = TypeVar("T")
+Columns = Mapping[str, str | Callable[[T], object]]  # heading: key of an item, or function of it
 
 
 def out() -> Console:
@@ -84,6 +87,12 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str =
     for row in rows:
         grid.add_row(*(Text(_shown(_cell(value), lines=False)) for value in row))
     out().print(grid)
+
+
+def records(items: Iterable[Any], columns: Columns[Any], empty: str = "none") -> None:
+    """Print a table of a row for each of ``items``; a column is a key of the item, or a function of it."""
+    cells = [itemgetter(column) if isinstance(column, str) else column for column in columns.values()]
+    table([*columns], [[cell(item) for cell in cells] for item in items], empty)
 
 
 def _cell(value: object) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.files import check_file, refused
+from wingfit.cli.base.files import new_file, refused
 
 
 def forces(
@@ -17,12 +17,12 @@ def forces(
     ],
     mass_kg: Annotated[float, typer.Option(help="Mass of the vehicle, kg.", min=1e-6, max=100)],
     flap_hz: Annotated[float, typer.Option(help="Flap frequency.", min=0.01, max=2000)],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the recording: FILE.csv.")] = None,
+    output: Annotated[Path | None, new_file("Write the recording: FILE.csv.", "--output", "-o")] = None,
     details: Annotated[
         Path | None,
-        typer.Option(help="Write all forces and moments with standard deviations, and the flight: FILE.csv."),
+        new_file("Write all forces and moments with standard deviations, and the flight: FILE.csv.", "--details"),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Plot forces with their errors: FILE.html.")] = None,
+    plot: Annotated[Path | None, new_file("Plot forces with their errors: FILE.html.", "--plot")] = None,
     cutoff_hz: Annotated[float | None, typer.Option(help="Low-pass cut-off; default: 3.2 x flap frequency.")] = None,
     order: Annotated[int, typer.Option(help="Order of one pass of the Butterworth filter.", min=1, max=8)] = 4,
     beat_start_s: Annotated[
@@ -39,8 +39,6 @@ def forces(
 
     Example: wingfit forces flight.csv --body body.csv --mass-kg 0.0174 --flap-hz 12.5 -o forces.csv --plot forces.html
     """
-    for path, option, kind in ((output, "--output", ".csv"), (details, "--details", ".csv"), (plot, "--plot", ".html")):
-        check_file(path, option, (kind,))
     from wingfit.cli.forces import free_flight_results as results  # imported late: other commands start faster
 
     with refused("no forces were estimated"):

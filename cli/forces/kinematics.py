@@ -8,15 +8,15 @@ from typing import Annotated, Literal
 
 import typer
 
-from wingfit.cli.base.files import check_file, refused
+from wingfit.cli.base.files import new_file, refused
 
 Wing = Literal["upper-right", "upper-left", "lower-right", "lower-left"]
 
 
 def kinematics(
     file: Annotated[Path, typer.Argument(help="CSV: time_s or t_star, and angles in degrees or markers in metres.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the motion for dataset.yaml.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Plot angles, rates and their errors: FILE.html.")] = None,
+    output: Annotated[Path | None, new_file("Write the motion for dataset.yaml.", "--output", "-o")] = None,
+    plot: Annotated[Path | None, new_file("Plot angles, rates and their errors: FILE.html.", "--plot")] = None,
     leading_edge: Annotated[str, typer.Option(help="Markers on the leading edge from root to tip: A,B,...")] = "",
     chord: Annotated[str, typer.Option(help="Markers along one chord from leading to trailing edge: C,D.")] = "",
     wing: Annotated[Wing, typer.Option(help="Wing that carries the markers.")] = "upper-right",
@@ -47,8 +47,6 @@ def kinematics(
 
     Example: wingfit kinematics angles.csv --pitch passive -o motion.yaml --plot motion.html
     """
-    check_file(output, "--output")
-    check_file(plot, "--plot", (".html",))
     from wingfit.cli.forces import kinematics_results as results  # imported late: other commands start faster
 
     with refused("no motion was estimated"):

@@ -8,7 +8,7 @@ from statistics import fmean
 from typing import TYPE_CHECKING
 
 from wingfit.cli.base.files import write_csv, write_text
-from wingfit.cli.base.output import interval, number, remarks, say, table
+from wingfit.cli.base.output import Columns, interval, number, records, remarks, say, table
 from wingfit.cli.base.rounding import Unit, correlation, force_unit, rounded
 from wingfit.client import force_answers as f
 from wingfit.service.units import MN
@@ -41,19 +41,16 @@ def force_result(answer: f.ForceResult) -> None:
 
 def force_simulation(answer: f.ForceSimulation) -> None:
     """Print how the forces of a given genome agree with a recording."""
-    forces = [[one["mean_recorded_n"], one["mean_modelled_n"], one["rmse_n"]] for one in answer["agreements"]]
-    unit = force_unit(value for row in forces for value in row)
-    rows = [
-        [
-            QUANTITIES[one["quantity"]],
-            *map(unit.show, row),
-            rounded(one["rmse_percent"]),
-            correlation(one["correlation"]),
-        ]
-        for one, row in zip(answer["agreements"], forces, strict=True)
-    ]
-    heads = [f">{what} {unit.name}" for what in ("mean recorded", "mean modelled", "RMS difference")]
-    table([f"recording {answer['recording']}: force", *heads, ">% of range", ">correlation"], rows)
+    unit = force_unit(a[key] for a in answer["agreements"] for key in ("mean_recorded_n", "mean_modelled_n", "rmse_n"))
+    columns: Columns[f.Agreement] = {
+        f"recording {answer['recording']}: force": lambda one: QUANTITIES[one["quantity"]],
+        f">mean recorded {unit.name}": lambda one: unit.show(one["mean_recorded_n"]),
+        f">mean modelled {unit.name}": lambda one: unit.show(one["mean_modelled_n"]),
+        f">RMS difference {unit.name}": lambda one: unit.show(one["rmse_n"]),
+        ">% of range": lambda one: rounded(one["rmse_percent"]),
+        ">correlation": lambda one: correlation(one["correlation"]),
+    }
+    records(answer["agreements"], columns)
     remarks(answer["remarks"])
 
 
@@ -154,18 +151,15 @@ def _mean_and_correlation(agreement: f.Agreement | None, unit: Unit) -> str:
 
 
 def _global(law: f.GlobalModel) -> None:
-    rows = [
-        [
-            gene["name"],
-            gene["constant"],
-            gene["per_hz"],
-            gene["per_deg"],
-            _percent(gene["largest_error_percent"]),
-            _percent(gene["leave_one_out_error_percent"]),
-        ]
-        for gene in law["genes"]
-    ]
-    table(["global model", ">constant", ">per Hz", ">per deg", ">largest error", ">error when left out"], rows)
+    columns: Columns[f.GlobalGene] = {
+        "global model": "name",
+        ">constant": "constant",
+        ">per Hz": "per_hz",
+        ">per deg": "per_deg",
+        ">largest error": lambda gene: _percent(gene["largest_error_percent"]),
+        ">error when left out": lambda gene: _percent(gene["leave_one_out_error_percent"]),
+    }
+    records(law["genes"], columns)
     (slow, fast), (low, high) = law["frequency_range_hz"], law["pitch_range_deg"]
     say(f"fitted from {slow:g} to {fast:g} Hz and from {low:g} to {high:g} deg of body pitch")
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, cast, get_args
 
 import typer
 
-from wingfit.cli.base.files import check_file, write_csv
+from wingfit.cli.base.files import new_file, write_csv
 from wingfit.cli.base.options import AsJson, JobId, Url
 from wingfit.cli.base.output import emit, remarks, say, table
 from wingfit.cli.base.rounding import force_unit
@@ -15,6 +15,7 @@ from wingfit.cli.forces.results import force_beats, write_forces
 from wingfit.client import force_answers as f
 from wingfit.client.client import DEFAULT_URL, Client
 
+BeatFile = Annotated[Path | None, new_file("Write the beat: FILE.csv.", "--output", "-o")]
 SOURCES = get_args(f.Source)
 
 
@@ -25,8 +26,8 @@ def forces(
         str | None,
         typer.Option(help=f"Source of the coefficients: {', '.join(SOURCES)}; default: the best for that recording."),
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the beat: FILE.csv.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Plot forces over the beat and their spectra: FILE.html.")] = None,
+    output: BeatFile = None,
+    plot: Annotated[Path | None, new_file("Plot forces over the beat and their spectra: FILE.html.", "--plot")] = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
@@ -34,8 +35,6 @@ def forces(
 
     Example: wingfit runs forces ID --recording test-4 --source global --plot forces.html
     """
-    check_file(output, "--output", (".csv",))
-    check_file(plot, "--plot", (".html",))
     if source is not None and source not in SOURCES:
         raise typer.BadParameter(f"{source}: must be one of {', '.join(SOURCES)}", param_hint="--source")
     with Client(url) as client:
@@ -51,7 +50,7 @@ def predict(
     airspeed_m_s: Annotated[float, typer.Option(help="Airspeed of level flight, m/s.")],
     pressure_mbar: Annotated[float | None, typer.Option(help="Air pressure; default: 1013.25.")] = None,
     temperature_c: Annotated[float | None, typer.Option(help="Air temperature; default: 20.")] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the beat: FILE.csv.")] = None,
+    output: BeatFile = None,
     url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
@@ -59,7 +58,6 @@ def predict(
 
     Example: wingfit runs predict ID --flap-frequency-hz 12 --body-pitch-deg 60 --airspeed-m-s 0.7
     """
-    check_file(output, "--output", (".csv",))
     with Client(url) as client:
         answer = client.predict(
             run_id,

@@ -8,10 +8,10 @@ import pytest
 
 from tests.report.findings import BOTH, wing_finding
 from wingfit.diagnosis.finding import Interval
+from wingfit.report import html
 from wingfit.report.location import _pieces, place
 from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import Scale, best_of, bounds, listed, number, percent, scale_for, shortened
-from wingfit.report.ranking import ranking
 from wingfit.report.svg import Axis, axis, level, side
 
 
@@ -125,8 +125,7 @@ def test_of_an_ambiguous_verdict_the_one_that_was_put_in_is_credited() -> None:
     best = best_of(finding)
     assert best is not None
     assert best.effects == BOTH[:1]
-    ranked = str(ranking(finding))
-    assert ranked.count('<li class="named">') == 2
+    assert html(finding).count('<li class="named">') == 2
 
 
 def test_a_place_without_an_interval_has_none() -> None:
