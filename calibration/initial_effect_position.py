@@ -101,13 +101,16 @@ def _tried(unit: Array, shape: list[int]) -> Array:
 
 
 def _limits(size: list[int], unit: Array) -> tuple[Array, Array]:
-    """Least and largest multiples [S] of a small size; a single size that can only grow cannot be negative."""
+    """Least and largest multiple [S] of the step of :func:`_small`, by size gene.
+
+    Only a single size that starts at a bound is limited: to at least zero.
+    """
     one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
     return np.full(len(size), 0.0 if one_sided else -np.inf), np.full(len(size), np.inf)
 
 
 def _small(size: list[int], unit: Array, tried: Array) -> Array:
-    """Each of ``tried`` with each of S sizes moved a little into its box [P x S, F]."""
+    """For every row of ``tried`` [P, F], S copies [P x S, F], in each of which one size gene is moved by SMALL."""
     moves = np.array([SMALL if unit[k] + SMALL <= 1.0 else -SMALL for k in size])
     batch = np.repeat(tried, len(size), axis=0)
     batch[np.arange(len(batch)), np.tile(size, len(tried))] += np.tile(moves, len(tried))

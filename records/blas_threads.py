@@ -94,7 +94,9 @@ class OneBlasThread:
         def steps(*args: Any, **kwargs: Any) -> Generator[Any, None, Any]:
             return self._step_by_step(function(*args, **kwargs))
 
-        return cast(F, steps if inspect.isgeneratorfunction(function) else call)
+        guarded: Any = steps if inspect.isgeneratorfunction(function) else call
+        guarded.one_blas_thread = True  # so that a test can see it
+        return cast(F, guarded)
 
     def _step_by_step(self, generator: Generator[Any, None, Any]) -> Generator[Any, None, Any]:
         try:

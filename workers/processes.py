@@ -37,7 +37,7 @@ Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
 class ProcessPoolEvaluator:
-    """Distributes units over ``workers`` processes, by default one per processor."""
+    """Simulates individuals in ``workers`` processes (default: one per processor), each a piece of the batch."""
 
     kind: Literal["processes"] = "processes"
 

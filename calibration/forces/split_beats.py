@@ -44,10 +44,10 @@ class Cut:
 
 
 def pieces(recording: Recording, beats: int) -> npt.NDArray[np.int64]:
-    """Samples [pieces, length] of stretches of ``beats`` beats without a gap, fewer where there is no longer stretch.
+    """Sample indices [pieces, length] of consecutive pieces of ``beats`` beats without gaps.
 
-    They lie end to end in each run of samples without a gap, wherever in the beat that begins: a periodic force has the
-    same spectrum from there. [0, 0] where no run holds a beat.
+    Pieces are shorter if no stretch without gaps is that long, and [0, 0] if none holds a beat. A piece may begin at
+    any phase, which does not change the spectrum of a periodic force.
     """
     runs = _runs(np.flatnonzero(recording.valid.all(axis=1)))
     longest = max((len(run) for run in runs), default=0)

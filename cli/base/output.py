@@ -120,7 +120,10 @@ def size(count: int) -> str:
 
 
 def number(value: float | None, digits: int = 4, unit: str = "") -> str:
-    """``value`` with ``digits`` significant digits, as an integer from 100 to a million, a dash for None."""
+    """``value`` to ``digits`` significant digits, then ``unit``; a dash for None.
+
+    Numbers that would need an exponent are shown whole below a million.
+    """
     if value is None:
         return "–"
     text = f"{value + 0.0:.{digits}g}"  # 0.0 takes the sign from -0

@@ -31,13 +31,13 @@ VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that changes less in all is not
 
 @dataclass(frozen=True)
 class Trial:
-    """A suspect with one or several sizes at one location and shape: what it changes.
+    """One suspect, tried at one location and shape with S sizes, and the changes that these make.
 
     Attributes:
-        suspect: which.
-        unit: [S, E] its genes in unit coordinates, one row for each size.
-        changes: [S, D] change of the coefficients by each size.
-        gain: decrease of chi-squared when they are fitted, the nominal genes adapting.
+        suspect: the effect that is tried.
+        unit: [S, E] its E genes in unit coordinates, one row for each size.
+        changes: [S, D] change of the D harmonic coefficients of all recordings by each size.
+        gain: decrease of chi-squared when all sizes and the nominal genes are fitted.
         multiples: [S] fitted multiples of the sizes.
         freedom: degrees of freedom, location and shape genes included.
         remaining_chi_squared: after that fit, by the linearised model.
@@ -76,7 +76,10 @@ class Nuisance:
         self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
     def project_out(self, changes: Array) -> Array:
-        """Whitened changes [..., D + F] of coefficients [..., D] without what the genes can explain."""
+        """Whitened ``changes`` [..., D] of harmonic coefficients, minus the part that the F nominal genes can explain.
+
+        The result [..., D + F] has an entry for the prior of each gene.
+        """
         return self.genes.rest(changes / self.scale)
 
 

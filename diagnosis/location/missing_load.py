@@ -40,13 +40,13 @@ MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the l
 
 @dataclass(frozen=True)
 class Case:
-    """One recording, whitened: all numbers in standard deviations of independent noise.
+    """One whitened recording: D numbers, each in standard deviations of its noise.
 
     Attributes:
         name: of the recording.
         residual: [D] recorded minus simulated by the refitted nominal model.
-        responses: [D, P] to unit loads, in the order of the probe's genes.
-        sensitivities: [D, F] to the nominal genes, unit coordinates.
+        responses: [D, P] change by a unit value of each of the P genes of the probe (unknown loads).
+        sensitivities: [D, F] to the F nominal genes in unit coordinates.
         crossing: drive phase (beats) at which the recorded beat starts.
     """
 

@@ -94,7 +94,10 @@ def load_estimates(
 
 
 def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysics:
-    """The estimate of the model with the smallest residual among those probed most; ``law``: fit a free-form law."""
+    """Result for the best-fitting model among those probed on the most recordings.
+
+    ``law``: also fit a free-form law.
+    """
     if not found:
         return MissingPhysics()
     whole = max(len(guess.cases) for guess in found)

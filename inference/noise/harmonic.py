@@ -60,7 +60,7 @@ class HarmonicFit:
     coefficients: Float[Array, "C P"]
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
-        """Coefficients [..., C, P] of residuals [..., T, C], NaN where not recorded; zero for a channel not used."""
+        """Harmonic coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded), zero if not used."""
         filled = np.where(np.isfinite(residuals), residuals, 0.0)
         channels = np.moveaxis(filled, -1, 0).reshape(len(self.inverse), -1, filled.shape[-2])
         found = np.einsum("cbt,cpt->bcp", channels, self.inverse, optimize=True)
@@ -68,9 +68,10 @@ class HarmonicFit:
 
 
 def harmonic_fit(recording: Recording, compared: Mask | None = None) -> HarmonicFit:
-    """Reduce ``recording``; ``compared`` [T, C] says which samples count (None: all that were recorded).
+    """Reduce ``recording`` to the harmonic coefficients of its beat and their noise.
 
-    ValueError where no channel has enough samples, or moves, or every sample is from the same phase of the beat.
+    ``compared`` [T, C] selects samples (None: all that were recorded). ValueError if no channel has enough samples, if
+    no channel moves, or if all samples have the same phase.
     """
     scatter = _Scatter.of(recording, compared)
     inner, valid = scatter.inner, scatter.valid

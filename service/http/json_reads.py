@@ -31,7 +31,7 @@ Arguments = ParamSpec("Arguments")
 
 # Column names and conditions are constants of this module; values are bound.
 _WHERE_RUN = "FROM run WHERE id = :id AND (:owner IS NULL OR owner = :owner)"
-_ONE_RUN, _RUN_EXISTS = f"SELECT {', '.join(RUN)} {_WHERE_RUN}", f"SELECT 1 {_WHERE_RUN}"
+_RUN_EXISTS = f"SELECT 1 {_WHERE_RUN}"
 _HISTORY = f"SELECT {', '.join(ITEM)} FROM generation WHERE run_id = ? AND sequence > ? ORDER BY sequence LIMIT ?"  # noqa: S608
 
 
@@ -41,15 +41,6 @@ async def answer(
     """The JSON of ``read``: a short one in the event loop, because a thread would cost more; others in a thread."""
     body = read(*args, **kwargs) if short else await run_in_threadpool(read, *args, **kwargs)
     return Response(body, media_type=http.JSON)
-
-
-def run(database: Database, run_id: str) -> bytes:
-    """A run as JSON, or a 404."""
-    with database.look() as connection:
-        row = connection.execute(_ONE_RUN, {"id": run_id, "owner": visible_owner()}).fetchone()
-    if row is None:
-        raise not_found("run", run_id)
-    return _run_json(row)
 
 
 def runs(database: Database, limit: int, cursor: str | None, dataset_id: str | None, state: str | None) -> bytes:

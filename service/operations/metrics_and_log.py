@@ -55,7 +55,10 @@ class Metrics:
         )
 
     def count(self, scope: Scope, status: int, seconds: float) -> None:
-        """Count a request. Labels are never a caller's own text, because each combination is a series of its own."""
+        """Count a request by method, route and status.
+
+        Unknown methods and paths count as "other", so that callers cannot create any number of Prometheus series.
+        """
         path = getattr(scope.get("route"), "path", "") or "other"
         method = scope["method"] if scope["method"] in METHODS else "other"
         self.requests.labels(method, path, str(status)).inc()

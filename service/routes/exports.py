@@ -72,7 +72,7 @@ async def export_run(
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """The result of ``make`` in a thread; the function that it gets returns whether the client is gone."""
+    """Run ``make`` in a thread and return its result; its argument tells whether the client has disconnected."""
     gone = threading.Event()
     making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
     while not making.done():

@@ -29,9 +29,9 @@ def submit_job(
 ) -> Response:
     """Store the job of a request and queue it; the same answer again for a repeated request.
 
-    Two requests with one Idempotency-Key are the same if they give the same fields the same values; a default that is
-    given explicitly counts, because it replaces a run's setting. ``plan`` checks the request, and returns the job with
-    its dataset_id, kind, name and spec, which it has not stored.
+    Two requests with one Idempotency-Key are equal if they contain the same fields with the same values. A default
+    written out differs from a field left out, because it overrides a run's setting. ``plan`` checks the request and
+    returns a job, not yet stored, with its dataset_id, kind, name and spec.
     """
     again = http.repeat(request, key, body.model_dump_json(exclude_unset=True))
     with service.database.read() as session:

@@ -59,8 +59,8 @@ def is_full(error: Exception) -> bool:
 class FolderLock:
     """Locks a data folder for this process.
 
-    A POSIX record lock, because it dies with the process and is not inherited by worker processes; it does
-    not guard against the same process, hence the set.
+    A POSIX record lock ends with its process and is not inherited by worker processes. It does not stop the same
+    process from locking twice; a set of locked folders does.
     """
 
     _held: ClassVar[set[Path]] = set()

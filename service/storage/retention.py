@@ -22,7 +22,9 @@ TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
 
 
 class Housekeeping:
-    """Deletes at the start and every hour; datasets are never deleted.
+    """Deletes stored answers and, if configured, jobs that ended long ago: at the start and every hour.
+
+    Datasets are never deleted.
 
     The service clock measures how long ago a job ended, from the first pass that found it ended. The wall time of the
     end is not used, because the wall clock may have been wrong.

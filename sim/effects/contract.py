@@ -71,7 +71,9 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """One piece of physics, or one fault of a measurement. ValueError where :data:`FAMILIES` or the law contradict it.
+    """One piece of physics, or one fault of a measurement.
+
+    ValueError if its port does not take its family (:data:`FAMILIES`), or if its law names none of its sizes.
 
     Attributes:
         name: also of its file, and of its page docs/effects/NAME.md.
@@ -80,8 +82,8 @@ class Effect:
         port: where it enters the model.
         size: parameters that switch it off exactly where all are zero.
         shape: the other parameters.
-        power: energy exchange of its own law: "conservative" gives and takes none over a beat, "dissipative" takes some
-            at every instant, "any" makes no promise. Laws of the air keep both promises in still air only.
+        power: energy exchange of its own law: "conservative": none is gained or lost over a beat; "dissipative": some
+            is lost at every instant; "any": neither is guaranteed. In a stream no law of the air guarantees either.
         memory: its internal states in words; empty where it has none.
         law: its equations, one a line, with the names of its parameters; at least one of the sizes is among them.
         source: where the law is from (author, year, equation).

@@ -55,7 +55,7 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of genes: stations times (1 + 2 harmonics), twice that with moments, and those of two rods."""
+        """Number of genes: S (1 + 2 H) forces at S stations, H harmonics, as many moments, 2 (1 + 2 H) for rods."""
         return self.loads + (2 * (1 + 2 * self.harmonics) if self.driving else 0)
 
     @property

@@ -150,11 +150,11 @@ Work = namedtuple(
 
 
 class Trace(NamedTuple):
-    """Results of a beat, per step.
+    """Results at n steps of a beat for W lanes (M markers, N bodies).
 
-    tracks [n, M, 3, W]; wrench of the connectors on the driving rods [n, 2, 6, W]; force of the air in the world
-    [n, 3, W]; power [n, PORTS, W] into the wing; energy [n, 3, W]: kinetic, elastic, gravitational. R, p, V, z: the
-    motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty if not requested.
+    ``tracks`` [n, M, 3, W]; ``rods`` [n, 2, 6, W]: wrench of the connectors on the driving rods; ``air`` [n, 3, W]: its
+    force in world axes; ``power`` [n, PORTS, W] into the wing; ``energy`` [n, 3, W]: kinetic, elastic, gravitational.
+    R, p, V, z: the motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty if not requested.
     """
 
     tracks: Array

@@ -1,9 +1,9 @@
 """The block-sparse linear system of a step, solved by block LU.
 
-The exact linearisation of the wing is not symmetric: dampers rotate with the bodies, wrenches have moments. Pivots are
-6 x 6 blocks without pivoting: inertia over the step and dissipation make the diagonal dominant. ``blocks``
-[NB, 36, W] holds the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as
-many above it, in the same order, and last the columns of the driving rods, which are known and not factored.
+The matrix is not symmetric, because dampers and the moments of wrenches turn with the bodies. It is eliminated in 6 x 6
+blocks, without exchanging rows: inertia and damping make the diagonal dominant. ``blocks`` [NB, 36, W] (W lanes) holds
+the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as many above it, in
+the same order, and last the columns of the driving rods, which are known and not factored.
 ``wingfit.sim.solver.elimination`` lists the blocks and the products to subtract, in the order of elimination.
 """
 

@@ -68,7 +68,7 @@ class Numerics:
 
 
 def estimated_error(changes: list[float]) -> float:
-    """Error (m) of the finest motion, from the ``changes`` (m) of successive refinements, by Richardson extrapolation.
+    """Estimated error (m) at the finest step, by Richardson extrapolation of the ``changes`` (m) of refinements.
 
     The order is estimated from the last two changes and limited to 2...5; with one change it is taken as 2. Changes
     below KINKS may come from the kinks in the law of the air, where convergence is of order 2 only.

@@ -14,7 +14,7 @@ ROW_COUNT = 14
 
 
 def uppers(vehicle: Vehicle) -> tuple[bool, ...]:
-    """Whether each computed side is the upper one: the lower wings, and the upper ones for the layout "x4"."""
+    """For each pair of wings that is computed, whether it is the upper one: (False,), for "x4" (False, True)."""
     return (False, True) if vehicle.layout == "x4" else (False,)
 
 

@@ -141,7 +141,7 @@ class Balance:
 
     @property
     def supplied(self) -> float:
-        """By both motors, W."""
+        """Mean power supplied by both motors, W."""
         return self.front_motor + self.rear_motor
 
     @property

@@ -109,10 +109,6 @@ def test_resumed_equals_uninterrupted(small: tuple[Dataset, Genome], cut: int) -
     rest = list(calibrate(SPEC, dataset, Here(), checkpoint))
     assert rest == whole[cut:]
     assert found(SPEC, dataset, checkpoint)[whole[cut - 1].stage] == whole[cut - 1].genome
-    # as version 0.1 left it: no word of what was found, nor of Gauss-Newton
-    earlier = {key: value for key, value in checkpoint.items() if key not in ("found", "newton")}
-    assert [g.genome for g in calibrate(SPEC, dataset, Here(), earlier)] == [g.genome for g in rest]
-    assert list(found(SPEC, dataset, earlier).values())[-1] == whole[cut - 1].genome
 
 
 def test_specs_stored_by_version_0_1_mean_what_they_meant() -> None:

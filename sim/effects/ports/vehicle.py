@@ -190,7 +190,7 @@ class VehicleScene:
         return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
 
     def each_side(self, rows: Array) -> Iterator[Side]:
-        """The sides of the vehicle, ``rows`` [B, 14, n] being set for each in turn."""
+        """Yield each side of the vehicle, after setting the motion ``rows`` [B, 14, n] to that side, in place."""
         below = self.airspeed * np.sin(self.setting.condition.angle_of_attack)
         for upper in uppers(self.setting.vehicle):
             yield set_side(rows, self.setting.vehicle, self._flap, below, upper)

@@ -83,7 +83,7 @@ if __name__ == "__main__":
 
     Database.__init__ = noted  # type: ignore[method-assign, assignment]
     if "loop" in PARTS:
-        json_reads.run = hang_here  # type: ignore[assignment]  # which the event loop itself calls
+        json_reads.history = hang_here  # type: ignore[assignment]  # which the event loop itself calls
     limits = StopLimits(1, 0.3, 0.3, 0.3, float(sys.argv[2]), float(sys.argv[3]))
     settings = Settings.from_env()
     serve(settings, engine=StuckEngine(), make_evaluator=StuckEvaluator, diagnoser=ToyDiagnoser(), limits=limits)

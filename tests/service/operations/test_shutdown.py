@@ -86,10 +86,10 @@ def test_hanging_parts_do_not_delay_the_stop(tmp_path: Path) -> None:
 def test_a_hanging_event_loop_is_given_up(tmp_path: Path) -> None:
     with stuck(tmp_path / "data", "loop", give_up=1.0) as server:
         with pytest.raises(httpx.ReadTimeout):
-            server.client.get("/v1/runs/run_none", timeout=0.5)
+            server.client.get("/v1/runs/run_none/history", timeout=0.5)
         until_it_hangs(server)
         assert stopped(server, 5, signal.SIGINT) == 0
-        assert re.search(r"given up: GET /v1/runs/run_none, since \d\.\d s", server.log)
+        assert re.search(r"given up: GET /v1/runs/run_none/history, since \d\.\d s", server.log)
         assert re.search(r"given up: thread 'MainThread' at \S+stuck_server.py:\d+ \(hang_here\)", server.log)
 
 

@@ -57,6 +57,6 @@ def downgrade() -> None:
 
 
 def _belonging(table: str, *columns: sa.Column[object]) -> None:
-    """A table whose rows go with their diagnosis."""
+    """Create a table whose rows are deleted with their diagnosis."""
     owner = sa.ForeignKey("diagnosis.id", ondelete="CASCADE")
     op.create_table(table, sa.Column("diagnosis_id", sa.String, owner, primary_key=True), *columns)

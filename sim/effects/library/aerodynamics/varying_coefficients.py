@@ -19,7 +19,7 @@ def factor(frequency: float, pitch: float, by_frequency: Array, by_pitch: Array)
 
 
 def _vary(scene: VehicleScene, values: Values) -> None:
-    """Terms and stations read their coefficients from the scene; of the effect of a fling it is ``scene.fling``."""
+    """Scale the scene's coefficients for its flight condition; ``scene.fling`` scales that of the fling effect."""
     here = scene.setting.condition
 
     def changed(kind: str) -> Array:
