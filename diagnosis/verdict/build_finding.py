@@ -47,7 +47,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], 
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    validation, failed = predict_held_out(held_out, state.data.axes, evaluator, state.nominal.refit.fit, best.fit)
+    validation, failed = predict_held_out(held_out, state.data, evaluator, state.nominal.refit.fit, best.fit)
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
         unnamed = decision.verdict == "unnamed"

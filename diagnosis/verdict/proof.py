@@ -36,17 +36,18 @@ class ResidualPair:
 
 
 def predict_held_out(
-    recordings: Sequence[Recording], axes: tuple[str, ...], evaluator: Evaluator, before: Fit, after: Fit
+    recordings: Sequence[Recording], fitted: WhitenedData, evaluator: Evaluator, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
-    None where no recording can be simulated with both models.
+    ``fitted`` are the data of the fits, whose force axes and thresholds are used here too. None where no recording can
+    be simulated with both models.
     """
     kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
-        one, found, reasons = WhitenedData.of([recording], axes), [], []
+        one, found, reasons = WhitenedData.of([recording], fitted.axes, fitted.policy), [], []
         for fit in (before, after):
-            problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, axes)
+            problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, fitted.axes)
             _, (reason,), (residuals,) = one.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
             found.append(residuals[0])
             reasons.append(reason)
@@ -60,7 +61,9 @@ def predict_held_out(
     if not kept:
         return None, tuple(failed)
     before_all, after_all = zip(*pairs, strict=True)
-    return ResidualPair(WhitenedData.of(kept, axes), before_all, after_all, incomplete), tuple(failed)
+    return ResidualPair(WhitenedData.of(kept, fitted.axes, fitted.policy), before_all, after_all, incomplete), tuple(
+        failed
+    )
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
