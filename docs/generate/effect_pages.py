@@ -8,20 +8,38 @@ from __future__ import annotations
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 
-from wingfit.sim.effects.contract import Effect, Measure, Parameter
+from wingfit.sim.effects.contract import Effect, Measure, Parameter, Port, RigKind
 from wingfit.sim.effects.registry import EFFECTS
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "docs" / "effects"
 INDEX = FOLDER.parent / "effects.md"
 _MEASURES: dict[Measure, str] = {"span": "spans", "chord": "mean chords", "mass": "wing masses"}
+_PORTS: dict[Port, str] = {
+    "inertia": "the inertia of the wing",
+    "connector": "the connectors, which join the bodies of the wing",
+    "point": "a force on one point of the wing",
+    "drive": "the motion of the drive",
+    "air": "the air around the wing",
+}
+_RIGS: dict[RigKind, str] = {
+    "wing": "the wing of the Robird, a robotic bird",
+    "vehicle": "the DelFly, a vehicle with four wings",
+}
+_DETAILS = "../effects.md#figures"
 _POWERS = {
-    "conservative": "It conserves energy: over a beat it neither gives nor takes any.",
-    "dissipative": "It only takes energy.",
-    "any": "It may give or take energy.",
+    "conservative": "The law of the effect conserves energy: over a beat, it neither adds nor removes any.",
+    "dissipative": "The law of the effect dissipates energy and never generates any.",
+    "any": "The law is declared neither conservative nor dissipative: the sign of its energy is not fixed.",
+}
+_KINDS = {
+    "size": "The effect is off where every gene of the kind *size* is zero.",
+    "place": "A *place* says where on the wing the effect acts.",
+    "shape": "A *shape* says how the effect acts.",
 }
 
 
@@ -55,14 +73,26 @@ def blocks_of(effect: Effect) -> dict[str, str]:
 
 
 def genes(effect: Effect) -> str:
-    """Table of the genes. Bounds that grow with the rig are multiples of its span, mean chord or wing mass."""
+    """Legend and table of the genes. Bounds that grow with the rig are multiples of its span, mean chord or mass."""
+    kinds = [_kind(effect, one) for one in effect.parameters]
+    legend = ["A gene is a parameter that a calibration can fit; the law uses the part of its name after the dot."]
+    legend += [text for kind, text in _KINDS.items() if kind in kinds]
+    if any(one.scale == "log" for one in effect.parameters):
+        legend.append('"Log" means that a search samples the bounds on a logarithmic scale.')
     lines = ["| gene | kind | unit | bounds | typical | what it is |", "|---|---|---|---|---|---|"]
-    for one in effect.parameters:
-        kind = "size" if one in effect.size else "place" if one.place else "shape"
+    for one, kind in zip(effect.parameters, kinds, strict=True):
         bounds = f"{one.lower:g} to {one.upper:g}{_of(one)}{', log' if one.scale == 'log' else ''}"
         cells = (f"`{effect.name}.{one.name}`", kind, one.unit, bounds, f"{one.typical:g}{_of(one)}", one.description)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-    return "\n".join(lines)
+    return "\n".join([*textwrap.wrap(" ".join(legend), 120), "", *lines])
+
+
+def _kind(effect: Effect, parameter: Parameter) -> str:
+    return "size" if parameter in effect.size else "place" if parameter.place else "shape"
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def _of(parameter: Parameter) -> str:
@@ -70,28 +100,38 @@ def _of(parameter: Parameter) -> str:
 
 
 def signature(effect: Effect) -> str:
-    """How it looks in a recording, and the effects that look alike."""
+    """How the effect looks in a recording, the effects that look alike, and what the figure below shows."""
     others = ", ".join(f"[{EFFECTS[name].title}]({name}.md)" for name in effect.confused_with)
-    return f"{effect.signature[0].upper()}{effect.signature[1:]}. Easily confused with: {others}."
+    rigs = " and ".join(_RIGS[kind] for kind in effect.rigs)
+    figure = f"The figure shows the change that the effect makes at its typical size on {rigs} ([details]({_DETAILS}))."
+    return f"{_capital(effect.signature)}. Effects that look similar: {others}.\n\n{figure}"
 
 
 def power(effect: Effect) -> str:
     """Port, energy exchange and internal states."""
-    memory = f"Internal states: {effect.memory}." if effect.memory else "It has no internal states."
+    memory = f"Internal states: {effect.memory}." if effect.memory else "The effect has no internal states."
     if effect.port == "observation":
-        return f"Port: observation. It acts after the simulation and exchanges no energy. {memory}"
-    return f"Port: {effect.port}. {_POWERS[effect.power]} {memory}"
+        text = "Port: observation. The effect changes simulated recordings, not the motion, and exchanges no energy."
+    else:
+        text = f"Port: {effect.port}. The effect acts through {_PORTS[effect.port]}. {_power_of(effect)}"
+    return "\n".join(textwrap.wrap(f"{text} {memory}", 120))
+
+
+def _power_of(effect: Effect) -> str:
+    law = _POWERS[effect.power]
+    in_air = effect.family == "aerodynamics" and effect.power != "any"
+    return f"In still air, {law[0].lower()}{law[1:]}" if in_air else law
 
 
 def source(effect: Effect) -> str:
     """Source of the law, and its test file."""
     (tests,) = (ROOT / "tests" / "sim" / "effects").glob(f"*/test_{effect.name}.py")
-    return f"{effect.source}.\n\nTests: `{tests.relative_to(ROOT)}`."
+    return f"{_capital(effect.source)}.\n\nTests: `{tests.relative_to(ROOT)}`."
 
 
 def index() -> str:
     """Table of all effects."""
-    lines = ["| effect | family | acts on | looks like | confused with |", "|---|---|---|---|---|"]
+    lines = ["| effect | family | acts on | what it looks like | similar effects |", "|---|---|---|---|---|"]
     for effect in EFFECTS.values():
         others = ", ".join(f"[{name}](effects/{name}.md)" for name in effect.confused_with)
         cells = (

@@ -181,8 +181,8 @@ fault_of_recordings = partial(Effect, family="measurement", port="observation", 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
     """Shape parameters of an effect at one place of the wing, by the typical place."""
-    along = "place along the span, fraction of it from root to tip"
-    across = "place along the chord, fraction of it from the leading edge"
+    along = "position along the span, as a fraction of the span from root to tip"
+    across = "position along the chord, as a fraction of the chord from the leading edge"
     return (
         Parameter("station", "1", 0.0, 1.0, station, along, place=True),
         Parameter("chord", "1", 0.0, 1.0, chord, across, place=True),

@@ -66,10 +66,10 @@ EFFECT = Effect(
     size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "full angle about x through which the wing turns freely"),),
     power="conservative",
     law="M_x = 0                                    |phi| < b / 2\nM_x = -r sin(phi - sign(phi) b / 2)        beyond",
-    source="dead band between two stops (Dubowsky and Freudenstein 1971, Journal of Engineering for Industry 93, 305; "
-    "Nordin and Gutman 2002, Automatica 38, 1633, sect. 2), in series with the spring of Fasse (1997)",
-    signature="the wing lags by half the play after each reversal of the load at the root and then jumps across; the "
-    "size of the jump does not depend on the load",
+    source="Dubowsky and Freudenstein (1971), Journal of Engineering for Industry 93, 305, and Nordin and Gutman "
+    "(2002), Automatica 38, 1633, sect. 2: dead band between two stops; Fasse (1997): the spring in series with it",
+    signature="the wing lags by half the play after each reversal of the load at the root and then jumps across, and "
+    "the size of the jump does not depend on the load",
     confused_with=("stroke_amplitude", "compliant_drive"),
     wing=_wing,
 )

@@ -24,19 +24,19 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.motor = motor
 
 
-_TEXT = "relative loss of motor speed per watt, for loads much faster than the beat"
+_TEXT = "relative loss of motor speed per watt of load, for loads that vary much faster than the beat"
 
 EFFECT = effect_of_drive(
     name="compliant_drive",
     title="Compliant drive",
     size=(Parameter("d", "1/W", 0.0, 0.02, 0.005, _TEXT),),
-    shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time constant with which the motor follows its load", scale="log"),),
-    memory="the lead of the crank, its speed error and the mean load",
+    shape=(Parameter("t", "s", 0.01, 0.2, 0.04, "time constant of the motor's response to its load", scale="log"),),
+    memory="the lead of the crank, its speed error, and the mean load",
     law="tau' = sigma\nsigma' = -(d (P - P_m) + sigma) / t - (2 pi f / t) tau\nP_m' = 2 pi f (P - P_m)",
-    source="speed over torque of a direct-current motor, and its mechanical time constant (Hughes 1990, Electric "
-    "Motors and Drives, ch. 3), governed to a mean speed (Maxwell 1868, On Governors)",
-    signature="the stroke is late after each phase of heavy load, two in a beat, and catches up between them; grows "
-    "with flap frequency and air density",
+    source="Hughes (1990), Electric Motors and Drives, ch. 3: speed over torque of a direct-current motor, and its "
+    "mechanical time constant; Maxwell (1868), On Governors: control of the mean speed",
+    signature="the stroke falls behind in each of the two phases of heavy load in a beat and catches up between them, "
+    "and this change grows with flap frequency and air density",
     confused_with=("drive_harmonics", "phase_lag_error"),
     wing=_wing,
 )

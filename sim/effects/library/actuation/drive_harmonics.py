@@ -10,7 +10,7 @@ from wingfit.sim.effects.ports.wing import WingScene
 
 HARMONICS = {2: 0.02, 3: 0.02, 4: 0.01}
 """Order and typical size of each; in a four-bar linkage with wrong lengths each is smaller than the one before."""
-_TEXT = "{} of harmonic {} of the drive over the first harmonic"
+_TEXT = "{} amplitude of harmonic {} of the flap angle, over the amplitude of the first harmonic"
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
@@ -38,8 +38,8 @@ EFFECT = effect_of_drive(
         for wave, what in (("cos", "cosine"), ("sin", "sine"))
     ),
     law="zeta' = zeta + a_1 (cos2 cos 2 psi + sin2 sin 2 psi + ... + cos4 cos 4 psi + sin4 sin 4 psi)",
-    source="the leading errors of a four-bar linkage with wrong lengths (Freudenstein 1955)",
-    signature="the same error two to four times a beat at the same drive phases in every condition",
+    source="Freudenstein (1955): the leading errors of a four-bar linkage with wrong lengths",
+    signature="the same error appears two, three or four times a beat, at the same drive phases in every condition",
     confused_with=("stroke_amplitude", "tracker_lag"),
     wing=_wing,
     vehicle=_vehicle,

@@ -22,10 +22,11 @@ EFFECT = effect_of_drive(
         for axis, where in (("y", "outboard of"), ("z", "above"))
     ),
     law="s = s_described + (0, y, z),     p' = s + R (p - s)",
-    source="rotation about a displaced axis (Euler 1776; Goldstein 1950, Classical Mechanics, sect. 4-6); van der "
-    "Grinten names the distance between axis and wing as a likely cause of an error of 2 cm",
-    signature="all markers are off by the same vector at one phase; it turns with the flap angle and is zero at flap "
-    "angle zero, in every condition",
+    source="Euler (1776) and Goldstein (1950), Classical Mechanics, sect. 4-6: rotation about a displaced axis; van "
+    "der Grinten, The bird is the word, names the distance between axis and wing as a likely cause of an error of 2 "
+    "cm",
+    signature="at any one phase all markers are off by the same vector, which turns with the flap angle and is zero at "
+    "flap angle zero, in every condition",
     confused_with=("stroke_amplitude", "camera_shift", "hinge_tilt"),
     wing=_wing,
 )

@@ -21,10 +21,10 @@ EFFECT = effect_of_drive(
     name="hinge_tilt",
     title="Hinge tilt",
     size=tuple(
-        Parameter(axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation {_FROM_TO}") for axis in "yz"
+        Parameter(axis, "rad", -0.2, 0.2, 0.03, f"{axis} component of the rotation vector {_FROM_TO}") for axis in "yz"
     ),
     law="u = R(0, y, z) e_x,     R_rod = cos phi I + sin phi u~ + (1 - cos phi) u u^T",
-    source="rotation about a tilted axis by the formula of Rodrigues (1840); the tilt is the rotation vector (0, y, z)",
+    source="Rodrigues (1840): rotation about an axis, here one that is tilted by the rotation vector (0, y, z)",
     signature="the wing sweeps fore and aft, or twists, in proportion to the flap angle, at any flap frequency, with "
     "or without air",
     confused_with=("camera_rotation", "hinge_offset", "phase_lag_error"),

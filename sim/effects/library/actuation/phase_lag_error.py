@@ -16,11 +16,11 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_drive(
     name="phase_lag_error",
     title="Phase lag error",
-    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "drive phase of the rear rod's additional lag"),),
+    size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "lag of the rear rod beyond the described lag, in drive phase"),),
     law="zeta_rear(psi) = zeta(psi - lag - angle)",
-    source="van der Grinten, section III-F: lags of 0, 3 and 7 degrees; shift theorem of Fourier series (Bracewell "
-    "1965, ch. 6)",
-    signature="twist in phase with the flap rate, largest where the wing moves fastest, the same in every condition",
+    source="van der Grinten, The bird is the word, section III-F: lags of 0, 3 and 7 degrees; Bracewell (1965), ch. 6: "
+    "shift theorem of Fourier series",
+    signature="the wing twists in phase with the flap rate, most where it moves fastest, and alike in every condition",
     confused_with=("hinge_tilt", "rolling_shutter"),
     wing=_wing,
 )

@@ -18,12 +18,16 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_drive(
     name="stroke_amplitude",
     title="Stroke amplitude error",
-    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of the stroke; positive if larger than described"),),
+    size=(
+        Parameter(
+            "part", "1", -0.4, 0.4, 0.05, "relative error of the stroke; positive if it is larger than described"
+        ),
+    ),
     law="zeta(t) = zeta_0 + (1 + part) sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
-    source="every harmonic of the flap angle but the mean is scaled, rates and accelerations with it; wing pitch that "
-    "follows the stroke is scaled too (Armanini et al. 2016, Eqs. 17, 20-21)",
-    signature="forces grow with the square and displacements in proportion, with hardly a change of shape over the "
-    "beat",
+    source="Armanini et al. (2016), Eqs. 17, 20 and 21: the flap angle, and the wing pitch that follows it and is "
+    "scaled too",
+    signature="displacements grow in proportion to the stroke and forces with its square, and their shape over the "
+    "beat hardly changes",
     confused_with=("scale_error", "residual_air"),
     wing=_wing,
     vehicle=_vehicle,

@@ -20,9 +20,9 @@ EFFECT = effect_of_drive(
     title="Stroke bias",
     size=(Parameter("angle", "rad", -0.2, 0.2, 0.03, "angle added to the flap angle at every phase"),),
     law="zeta(t) = zeta_0 + angle + sum_{k > 0} Re zeta_k exp(2 pi i k t*)",
-    source="mean flap angle, eta of Armanini et al. (2016), Eqs. 20-21",
-    signature="a constant rotation of the wing about its flapping axis; in forces, the wing pitch that follows the "
-    "stroke",
+    source="Armanini et al. (2016), Eqs. 20 and 21: the mean flap angle, called eta there",
+    signature="the whole wing is rotated by a constant angle about its flapping axis, and forces change with the wing "
+    "pitch, which follows the stroke",
     confused_with=("camera_rotation", "balance_tilt"),
     wing=_wing,
     vehicle=_vehicle,

@@ -95,13 +95,13 @@ EFFECT = Effect(
     title="Added mass",
     family="aerodynamics",
     port="inertia",
-    size=(Parameter("k", "1", 0.0, 3.0, 1.0, "mass of air moved, as a fraction of that of plates in unbounded flow"),),
+    size=(Parameter("k", "1", 0.0, 3.0, 1.0, "mass of the moved air over that for plates in unbounded flow"),),
     power="conservative",
     law="T' = k (pi rho b^2 / 2) sum_j w_j^2 / (j + 1)",
-    source="Theodorsen (1935), NACA Report 496, noncirculatory part; Lamb, Hydrodynamics (1932), section 71; "
-    "Ellington, Philosophical Transactions B 305, 17 (1984); Armanini et al. (2016), Eqs. 9 and 10",
-    signature="swings later and wider, as if the wing were heavier across its plane; grows with density and "
-    "acceleration, little with airspeed",
+    source="Theodorsen (1935), NACA Report 496: the noncirculatory part; Lamb (1932), Hydrodynamics, section 71; "
+    "Ellington (1984), Philosophical Transactions B 305, 17; Armanini et al. (2016), Eqs. 9 and 10",
+    signature="the wing swings later and wider, as if it were heavier when it moves along its normal, and the change "
+    "grows with air density and acceleration but little with airspeed",
     confused_with=("lumped_mass", "rotational_circulation"),
     wing=_wing,
 )

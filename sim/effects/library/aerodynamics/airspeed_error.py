@@ -18,10 +18,15 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="airspeed_error",
     title="Airspeed error, tunnel blockage",
-    size=(Parameter("part", "1", -0.4, 0.4, 0.05, "relative error of airspeed; positive if faster than described"),),
+    size=(
+        Parameter(
+            "part", "1", -0.4, 0.4, 0.05, "relative error of airspeed; positive if the air is faster than described"
+        ),
+    ),
     law="U' = U (1 + part)",
-    source="solid and wake blockage raise the speed of a closed tunnel like this (Barlow, Rae and Pope 1999, ch. 10)",
-    signature="an error that grows with airspeed and is absent without a stream",
+    source="Barlow, Rae and Pope (1999), Low-Speed Wind Tunnel Testing, ch. 10: solid and wake blockage raise the "
+    "airspeed in a closed tunnel",
+    signature="the error grows with the airspeed and is absent without a stream",
     confused_with=("residual_air", "induced_inflow"),
     wing=_wing,
     vehicle=_vehicle,

@@ -63,7 +63,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"], sine, cosine, hinge])
 
 
-_TEXT = "C_F + C_R: circulation while the wings peel, in 1/2 c^2 (-theta_w')"
+_TEXT = "circulation while the wings peel, in units of c^2 (-theta') / 2; C_F + C_R of the source"
 
 EFFECT = effect_of_air(
     name="clap_and_peel",
@@ -74,9 +74,9 @@ EFFECT = effect_of_air(
     ),
     law="Gamma_f = (coefficient / 2) c^2 max(-theta', 0) g(h / c) max(1 - 2^(1/2) sin chi, 0)\n"
     "g(d) = 1 / (1 + (d / 0.2)^2)",
-    source="Armanini et al. (2016), Eq. 7: fling from t* = 0 until the wings stop peeling; for a wing its decay with "
-    "gap and angle by potential flow (Weis-Fogh 1973; Lighthill 1973)",
-    signature="a peak of force at the start of the beat, while the wings open, and nothing after",
+    source="Armanini et al. (2016), Eq. 7: fling from t* = 0 until the wings stop peeling; Weis-Fogh (1973) and "
+    "Lighthill (1973): potential flow of two opening plates, for the decay with gap and angle on a wing",
+    signature="the force has a peak at the start of the beat, while the wings open, and is unchanged after it",
     confused_with=("wake_capture", "drive_harmonics"),
     wing=_wing,
     vehicle=_vehicle,

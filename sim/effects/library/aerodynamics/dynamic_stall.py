@@ -65,20 +65,28 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="dynamic_stall",
     title="Dynamic stall",
-    size=(Parameter("share", "1", 0.0, 1.0, 0.5, "fraction of Kirchhoff's loss of lift; 1 is the full loss"),),
-    shape=(
-        Parameter("angle", "rad", 0.15, 1.2, 0.4, "angle of attack with steady flow separated from half of the chord"),
-        Parameter("width", "rad", 0.02, 0.3, 0.08, "range of angles over which it separates", scale="log"),
-        Parameter("delay", "1", 0.2, 10.0, 0.5, "tau_1: relaxation of separation, in chords travelled", scale="log"),
-        Parameter("advance", "1", 0.0, 10.0, 2.0, "tau_2: delay of onset with the rate of alpha, in chords travelled"),
+    size=(
+        Parameter("share", "1", 0.0, 1.0, 0.5, "fraction of Kirchhoff's loss of lift that occurs; 1 is the full loss"),
     ),
-    memory="the attached fraction of the chord at each station or strip; of a strip also its last angle of attack",
+    shape=(
+        Parameter(
+            "angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow is separated from half of the chord"
+        ),
+        Parameter(
+            "width", "rad", 0.02, 0.3, 0.08, "range of angles of attack over which steady flow separates", scale="log"
+        ),
+        Parameter("delay", "1", 0.2, 10.0, 0.5, "time constant of separation, in chords travelled", scale="log"),
+        Parameter("advance", "1", 0.0, 10.0, 2.0, "delay of the onset of stall while alpha grows, in chords travelled"),
+    ),
+    memory="the attached fraction of the chord at each station of a vehicle's wing or strip of a flexible wing; for "
+    "each strip also its last angle of attack",
     law="(delay c / V) X' = X_0(alpha - advance (c / V) alpha') - X\n"
     "X_0(alpha) = 1 / (1 + exp((alpha - angle) / width))\n"
     "Gamma_alpha' = Gamma_alpha (1 - share (1 - ((1 + X^(1/2)) / 2)^2))",
-    source="Goman and Khrabrov (1994, Journal of Aircraft 31, 1109): delayed separation point X; Kirchhoff's law of "
-    "lift, ((1 + sqrt X) / 2)^2",
-    signature="lift breaks down late in each stroke at high angles of attack and recovers along a loop",
+    source="Goman and Khrabrov (1994), Journal of Aircraft 31, 1109: delayed separation point X; Kirchhoff: lift is "
+    "proportional to ((1 + sqrt X) / 2)^2",
+    signature="lift breaks down late in each stroke, at high angles of attack, and recovers late too, so that lift "
+    "over angle forms a loop",
     confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss"),
     wing=_wing,
     vehicle=deferred("circulation", _stall),

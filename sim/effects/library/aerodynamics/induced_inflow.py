@@ -103,13 +103,21 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="induced_inflow",
     title="Induced inflow",
-    size=(Parameter("share", "1", 0.0, 2.0, 0.5, "fraction of the thrust or lift that drives the inflow"),),
-    shape=(Parameter("inertia", "1", 0.1, 3.0, 1.0, "mass of that air over the apparent mass of a disc", scale="log"),),
-    memory="the mean inflow through the swept disc; of a wing in a tunnel the inflow of each strip",
+    size=(
+        Parameter(
+            "share", "1", 0.0, 2.0, 0.5, "fraction of the thrust (vehicle) or lift (wing) that drives the inflow"
+        ),
+    ),
+    shape=(
+        Parameter(
+            "inertia", "1", 0.1, 3.0, 1.0, "mass of the accelerated air over the apparent mass of a disc", scale="log"
+        ),
+    ),
+    memory="on a vehicle the mean inflow through the swept disc; on a wing in a tunnel the inflow of each strip",
     law="m v' + 2 rho A V_T v = share T(v)             vehicle\n"
     "m v' = -share L - 2 rho A |U + v| v           each strip of a wing",
-    source="momentum theory (Glauert 1926) with the apparent mass of Pitt and Peters (1981, Vertica 5, 21)",
-    signature="less force on average, most in hover and least in fast flight",
+    source="Glauert (1926): momentum theory; Pitt and Peters (1981), Vertica 5, 21: apparent mass of the air",
+    signature="the mean force is smaller, most in hover and least in fast flight",
     confused_with=("tip_loss", "airspeed_error", "residual_air"),
     wing=_wing,
     vehicle=deferred("inflow", _induce),

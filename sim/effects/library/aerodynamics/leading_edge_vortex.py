@@ -60,17 +60,21 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="leading_edge_vortex",
     title="Leading-edge vortex",
-    size=(Parameter("part", "1", 0.0, 1.0, 0.5, "fraction of the affine coefficients that it replaces"),),
+    size=(Parameter("part", "1", 0.0, 1.0, 0.5, "fraction of the affine coefficients that the vortex replaces"),),
     shape=(
-        Parameter("coefficient", "1", 0.5, 3.0, 1.58, "half the coefficient of the force on the wing at 90 deg"),
+        Parameter(
+            "coefficient", "1", 0.5, 3.0, 1.58, "half the force coefficient of the wing at 90 deg angle of attack"
+        ),
         Parameter("angle", "rad", 0.0, 0.8, 0.26, "angle of attack at which attached flow ends"),
     ),
     law="C_L' = (1 - w) C_L + w coefficient sin 2 alpha\n"
     "C_D' = (1 - w) C_D + w 2 coefficient sin^2 alpha\n"
     "w = part x^2 (3 - 2 x),     x = (|alpha| - angle) / 10 deg, limited to 0..1",
-    source="Ellington et al., Nature 384, 626 (1996); Dickinson, Lehmann and Sane, Science 284, 1954 (1999): C_L "
-    "varies by 1.58 and C_D by 1.55 with about twice the angle; Armanini et al. (2016), Eq. 3",
-    signature="other lift and drag at large angles of attack during fast strokes; nothing while the flow is attached",
+    source="Ellington et al. (1996), Nature 384, 626; Dickinson, Lehmann and Sane (1999), Science 284, 1954: the "
+    "measured C_L and C_D vary with about twice the angle of attack, with amplitudes of 1.58 and 1.55; Armanini et "
+    "al. (2016), Eq. 3",
+    signature="lift and drag differ from the model at large angles of attack in fast strokes, and agree with it while "
+    "the flow is attached",
     confused_with=("dynamic_stall", "plate_drag"),
     wing=_wing,
 )

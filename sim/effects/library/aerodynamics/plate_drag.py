@@ -39,7 +39,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"]])
 
 
-_TEXT = "drag at 90 deg beyond that of the affine law; a plate has 1.2 to 2"
+_TEXT = "drag coefficient at 90 deg beyond that of the affine law; a plate has 1.2 to 2 in all"
 
 EFFECT = effect_of_air(
     name="plate_drag",
@@ -47,9 +47,10 @@ EFFECT = effect_of_air(
     size=(Parameter("coefficient", "1", 0.0, 2.0, 0.5, _TEXT),),
     power="dissipative",
     law="dF_n = coefficient (rho / 2) |w| w dx dy,     w = u_n + theta' x",
-    source="Hoerner, Fluid-Dynamic Drag (1965), ch. III: plates across the stream and the cross-flow principle; of "
-    "the form C_Dpi/2 sin^2 alpha of Armanini et al. (2016), Eq. 11",
-    signature="the wing is held back across its plane by the square of its speed there, at any airspeed",
+    source="Hoerner (1965), Fluid-Dynamic Drag, ch. III: plates across the stream and the cross-flow principle; "
+    "Armanini et al. (2016), Eq. 11, has the same form, C_Dpi/2 sin^2 alpha",
+    signature="a force resists the motion of the wing along its normal and grows with the square of that speed, at any "
+    "airspeed",
     confused_with=("leading_edge_vortex", "viscous_drag"),
     wing=_wing,
 )

@@ -13,15 +13,16 @@ def _change(scene: WingScene | VehicleScene, values: Values) -> None:
     scene.density = np.maximum(scene.density + values["density"], 0.0)
 
 
-_TEXT = "density beyond that at the described pressure and temperature"
+_TEXT = "air density beyond that at the described pressure and temperature"
 
 EFFECT = effect_of_air(
     name="residual_air",
     title="Residual air, density error",
     size=(Parameter("density", "kg/m^3", -0.01, 0.1, 0.02, _TEXT),),
     law="rho = max(p / (R T) + density, 0)",
-    source="ideal gas law (Clapeyron 1834) with an error of density; never below zero",
-    signature="aerodynamic forces in what is described as a vacuum; in open air, a proportional change of all of them",
+    source="Clapeyron (1834): ideal gas law, here with an error of the density and a lower limit of zero",
+    signature="aerodynamic forces act in what is described as a vacuum, and in open air all of them change by the same "
+    "factor",
     confused_with=("airspeed_error", "scale_error", "stroke_amplitude"),
     wing=_change,
     vehicle=_change,

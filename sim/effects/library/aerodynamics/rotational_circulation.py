@@ -33,12 +33,16 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="rotational_circulation",
     title="Rotational circulation",
-    size=(Parameter("coefficient", "1", -10.0, 10.0, 6.2832, "rotational circulation; 2 pi for thin airfoils"),),
+    size=(
+        Parameter(
+            "coefficient", "1", -10.0, 10.0, 6.2832, "coefficient of rotational circulation; 2 pi for thin airfoils"
+        ),
+    ),
     law="Gamma_r = coefficient (3/4 - x_0) c^2 theta' / 2,     x_0 = 1/2",
-    source="Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002): pi (3/4 - x_0) omega c^2; "
-    "Ellington, Philosophical Transactions B 305, 79 (1984); Armanini et al. (2016), Eqs. 2 and 4",
-    signature="a force across the stream where the wing pitches fast, at the ends of the stroke; grows with density, "
-    "pitch rate and speed",
+    source="Sane and Dickinson (2002), Journal of Experimental Biology 205, 1087: circulation pi (3/4 - x_0) omega "
+    "c^2; Ellington (1984), Philosophical Transactions B 305, 79; Armanini et al. (2016), Eqs. 2 and 4",
+    signature="a force across the stream acts where the wing pitches fast, at the ends of the stroke, and grows with "
+    "air density, pitch rate and speed",
     confused_with=("added_mass", "wake_capture", "circulation_lag"),
     wing=_wing,
 )

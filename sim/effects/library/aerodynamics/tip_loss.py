@@ -58,11 +58,13 @@ EFFECT = effect_of_air(
     name="tip_loss",
     title="Tip loss",
     size=(
-        Parameter("spacing", "m", 0.0, 2.0, 0.5, "distance between vortex sheets of successive strokes", of="chord"),
+        Parameter(
+            "spacing", "m", 0.0, 2.0, 0.5, "distance between the vortex sheets of successive strokes", of="chord"
+        ),
     ),
     law="F = (2 / pi) arccos exp(-pi (R - r) / spacing)",
-    source="Prandtl in Betz (1919); Glauert (1935, Aerodynamic Theory, division L, chapter VII)",
-    signature="less load and less bending of the outer wing only, at the phases of large lift",
+    source="Prandtl in Betz (1919); Glauert (1935), Aerodynamic Theory, division L, chapter VII",
+    signature="only the outer wing carries less load and bends less, at the phases of large lift",
     confused_with=("induced_inflow", "residual_air", "dynamic_stall"),
     wing=_wing,
     vehicle=_vehicle,

@@ -36,17 +36,26 @@ EFFECT = effect_of_air(
     name="varying_coefficients",
     title="Coefficients that vary with flight",
     size=(
-        Parameter("lift_by_frequency", "1", -8.0, 8.0, -3.5, "relative change of C_l or K_l with f / 12 Hz"),
-        Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "relative change of C_l or K_l with body pitch"),
-        Parameter("fling_by_frequency", "1", -8.0, 8.0, 1.6, "relative change of fling with f / 12 Hz"),
-        Parameter("fling_by_pitch", "1/rad", -2.0, 2.0, 0.3, "relative change of fling with body pitch"),
+        Parameter(
+            "lift_by_frequency",
+            "1",
+            -8.0,
+            8.0,
+            -3.5,
+            "relative change of C_l or K_l per relative change of flap frequency",
+        ),
+        Parameter("lift_by_pitch", "1/rad", -2.0, 2.0, 0.1, "relative change of C_l or K_l per radian of body pitch"),
+        Parameter(
+            "fling_by_frequency", "1", -8.0, 8.0, 1.6, "relative change of C_F per relative change of flap frequency"
+        ),
+        Parameter("fling_by_pitch", "1/rad", -2.0, 2.0, 0.3, "relative change of C_F per radian of body pitch"),
     ),
     law="C_l' = C_l max(1 + lift_by_frequency (f / f_0 - 1) + lift_by_pitch (theta_b - theta_0), 0)\n"
     "C_F' = C_F max(1 + fling_by_frequency (f / f_0 - 1) + fling_by_pitch (theta_b - theta_0), 0)",
-    source="Armanini et al. (2016), Eq. 23: C_l and C_F are affine in flap frequency and body pitch, C_r is their "
-    "mean; sizes from Table 8",
-    signature="each recording fits by itself, all together do not: lift is too small in some conditions and too large "
-    "in others, with the same shape over the beat",
+    source="Armanini et al. (2016), Eq. 23: C_l and C_F are affine in flap frequency and body pitch, and C_r is the "
+    "mean over the tests; the typical sizes are from Table 8",
+    signature="the model fits each recording by itself but not all together, because lift is too small in some "
+    "conditions and too large in others, with the same shape over the beat",
     confused_with=("circulation_lag", "tip_loss", "mass_offset"),
     vehicle=_vary,
 )

@@ -38,7 +38,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [_BLASIUS * values["part"] * np.sqrt(kinematic / chord)])
 
 
-_TEXT = "skin friction over that of a smooth flat plate; above 1 for rough skin"
+_TEXT = "skin friction over that of a smooth flat plate; rough skin has more than 1"
 
 EFFECT = effect_of_air(
     name="viscous_drag",
@@ -46,10 +46,10 @@ EFFECT = effect_of_air(
     size=(Parameter("part", "1", 0.0, 20.0, 2.0, _TEXT),),
     power="dissipative",
     law="F_c = part (rho / 2) S 2.656 (nu / c)^(1/2) |u_c|^(1/2) u_c",
-    source="Blasius (1908): 1.328 / sqrt(Re) for each face of a plate; Schlichting (1979), Boundary-Layer Theory, ch. "
-    "VII",
-    signature="a backward force that grows with the 3/2 power of speed; in thin air it falls with the square root of "
-    "density only",
+    source="Blasius (1908): coefficient 1.328 / sqrt(Re) for each face of a plate; Schlichting (1979), Boundary-Layer "
+    "Theory, ch. VII",
+    signature="a backward force grows with the 3/2 power of the speed, and in thin air it falls only with the square "
+    "root of the density",
     confused_with=("plate_drag", "residual_air"),
     wing=_wing,
 )

@@ -75,15 +75,20 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="wake_capture",
     title="Wake capture",
-    size=(Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the wake over the wing's earlier velocity"),),
-    shape=(Parameter("chords", "1", 0.5, 10.0, 2.0, "chords travelled in which the wake decays", scale="log"),),
-    memory="the velocity of the wake at each station or strip; of a strip also its own last velocity",
+    size=(
+        Parameter("share", "1", 0.0, 0.5, 0.2, "velocity of the air in the wake over the earlier velocity of the wing"),
+    ),
+    shape=(
+        Parameter("chords", "1", 0.5, 10.0, 2.0, "distance in which the wake decays, in chords travelled", scale="log"),
+    ),
+    memory="the velocity of the wake at each station of a vehicle's wing or strip of a flexible wing; for each strip "
+    "also its own last velocity",
     law="w' = (V / (chords c)) (u - w)\nvelocity of the air = share (w - k u),     k = w.u / u^2, limited to 0..1",
-    source="force that remains after quasi-steady terms at stroke reversal: Dickinson, Lehmann and Sane (1999), Sane "
-    "and Dickinson (2002); no wake in the first stroke from rest: Birch and Dickinson (2003). One decaying state is "
-    "the simplest model of it",
-    signature="soon after each reversal a push in the direction of the previous stroke, which increases the existing "
-    "circulation; it decays within the stroke, and a first stroke from rest has none",
+    source="Dickinson, Lehmann and Sane (1999), Sane and Dickinson (2002): force at stroke reversal that quasi-steady "
+    "terms do not explain; Birch and Dickinson (2003): no wake in the first stroke from rest. The model with one "
+    "decaying state is the simplest one and was chosen here",
+    signature="soon after each reversal the wing is pushed in the direction of its previous stroke, and this push "
+    "decays within the stroke and is absent in a first stroke from rest",
     confused_with=("circulation_lag", "clap_and_peel", "drive_harmonics"),
     wing=_wing,
     vehicle=deferred("wake", _meet_wake),

@@ -23,14 +23,15 @@ EFFECT = fault_of_forces(
     size=(
         Parameter("x", "1/s", -0.1, 0.1, 0.005, "steady drift along x, in weights per second"),
         Parameter("z", "1/s", -0.1, 0.1, 0.005, "steady drift along z, in weights per second"),
-        Parameter("thermal_x", "1", -0.3, 0.3, 0.01, "force along x after warming up, in weights"),
-        Parameter("thermal_z", "1", -0.3, 0.3, 0.01, "force along z after warming up, in weights"),
+        Parameter("thermal_x", "1", -0.3, 0.3, 0.01, "force along x that warming up adds in the end, in weights"),
+        Parameter("thermal_z", "1", -0.3, 0.3, 0.01, "force along z that warming up adds in the end, in weights"),
     ),
-    shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "time constant of warming", scale="log"),),
-    memory="temperature of the gauges, from the first sample of a recording",
+    shape=(Parameter("time", "s", 0.1, 100.0, 2.0, "time constant of the warming", scale="log"),),
+    memory="temperature of the gauges, counted from the first sample of a recording",
     law="F' = F + m g [(x, z) t + (thermal_x, thermal_z) (1 - exp(-t / time))]",
-    source="zero drift and first-order warming of strain gauges (Doebelin 2004, Measurement Systems)",
-    signature="the mean over a beat moves from the first to the last beat; the shape of the beat stays",
+    source="Doebelin (2004), Measurement Systems: zero drift and first-order warming of strain gauges",
+    signature="the mean force over a beat changes from the first beat to the last, and the shape over the beat stays "
+    "the same",
     confused_with=("balance_offset",),
     observe=_observe,
 )

@@ -18,8 +18,8 @@ EFFECT = fault_of_forces(
         Parameter(axis, "1", -0.3, 0.3, 0.02, f"indicated force along {axis} without load, in weights") for axis in "xz"
     ),
     law="F' = F + m g (x, z)",
-    source="zero shift of a balance (AIAA R-091A 2020, Calibration and use of internal strain-gage balances)",
-    signature="a constant force, alike in every condition and at every phase",
+    source="AIAA R-091A (2020), Calibration and Use of Internal Strain-Gage Balances: zero shift of a balance",
+    signature="a constant force is added, alike at every phase and in every condition",
     confused_with=("balance_drift", "balance_tilt"),
     observe=_observe,
 )

@@ -21,13 +21,13 @@ EFFECT = fault_of_forces(
     size=(Parameter("part", "1", 0.0, 1.0, 0.1, "fraction of the force that passes through the oscillating mass"),),
     shape=(
         Parameter("frequency", "Hz", 20.0, 500.0, 100.0, "natural frequency of the mount", scale="log"),
-        Parameter("damping", "1", 0.005, 0.5, 0.02, "its damping ratio", scale="log"),
+        Parameter("damping", "1", 0.005, 0.5, 0.02, "damping ratio of the mount", scale="log"),
     ),
-    memory="deflection of the mount and its rate",
+    memory="deflection of the mount, and the rate of this deflection",
     law="F_k' = F_k (1 + part (G - 1)),     G = 1 / (1 - r^2 + 2 i damping r),   r = k f / frequency",
-    source="force passed on by the spring of a damped oscillator (Den Hartog 1956, Mechanical Vibrations: "
-    "transmissibility)",
-    signature="harmonics near one fixed frequency are too large and shift in phase there, at any flap frequency",
+    source="Den Hartog (1956), Mechanical Vibrations: transmissibility, the force that the spring of a damped "
+    "oscillator passes on",
+    signature="harmonics near one fixed frequency are too large and shifted in phase, at any flap frequency",
     confused_with=("filter_delay", "added_mass"),
     observe=_observe,
 )

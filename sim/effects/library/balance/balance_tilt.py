@@ -19,9 +19,9 @@ EFFECT = fault_of_forces(
     title="Balance axes tilted",
     size=(Parameter("angle", "rad", -0.2, 0.2, 0.02, "nose-up angle from the body's x axis to the balance's"),),
     law="X' = X cos angle - Z sin angle\nZ' = X sin angle + Z cos angle",
-    source="rotation of axes (Barlow, Rae and Pope 1999, Low-Speed Wind Tunnel Testing, chapter 7: alignment of a "
-    "balance)",
-    signature="each force axis shows a part of the other, alike at every phase and in every condition",
+    source="Barlow, Rae and Pope (1999), Low-Speed Wind Tunnel Testing, ch. 7: alignment of a balance",
+    signature="each force component contains a constant fraction of the other component, at every phase and in every "
+    "condition",
     confused_with=("balance_offset", "scale_error"),
     observe=_observe,
 )

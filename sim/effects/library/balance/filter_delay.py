@@ -16,14 +16,21 @@ def _observe(sampling: Sampling, values: Values) -> None:
 EFFECT = fault_of_forces(
     name="filter_delay",
     title="Filter delay",
-    size=(Parameter("delay", "s", 0.0, 0.02, 0.001, "delay of a slow signal"),),
+    size=(Parameter("delay", "s", 0.0, 0.02, 0.001, "delay of a signal that varies slowly"),),
     shape=(
-        Parameter("second", "1", 0.0, 1.0, 0.5, "0 for a filter of first order, 1/3 for Bessel, 1/2 for Butterworth"),
+        Parameter(
+            "second",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            "kind of filter: 0 for first order; for second order 1/3 (Bessel) or 1/2 (Butterworth)",
+        ),
     ),
-    memory="the filter's output and its rate",
+    memory="output of the filter, and the rate of this output",
     law="F_k' = F_k / (1 + s + second s^2),     s = 2 pi i k f delay",
-    source="low-pass filters of first and second order (Tietze, Schenk and Gamm 2008, Electronic Circuits)",
-    signature="forces lag and higher harmonics are smaller; both grow with the flap frequency",
+    source="Tietze, Schenk and Gamm (2008), Electronic Circuits: low-pass filters of first and second order",
+    signature="forces are late and their higher harmonics too small, and both errors grow with the flap frequency",
     confused_with=("clock_offset", "circulation_lag", "balance_resonance"),
     observe=_observe,
 )

@@ -23,10 +23,10 @@ EFFECT = fault_of_tracks(
     size=(Parameter("delay", "s", -0.01, 0.01, 0.002, "time by which the outer camera is later than the inner one"),),
     shape=PLACES,
     law="inner image at t, outer image at t + delay:     H - Z' = B / (v_inner - v_outer + B / H)",
-    source="triangulation of two images of different instants (Hartley and Zisserman 2004, chapter 12; Bradley et al. "
-    "2009, Synchronization and rolling shutter compensation for consumer video camera arrays)",
-    signature="markers appear too near or too far in proportion to their speed along the cameras' base line: an error "
-    "of depth that changes sign with the stroke and grows with the flap frequency",
+    source="Hartley and Zisserman (2004), Multiple View Geometry, ch. 12: triangulation; Bradley et al. (2009), "
+    "Synchronization and rolling shutter compensation for consumer video camera arrays: images of different instants",
+    signature="markers appear too near to the cameras or too far from them, in proportion to their speed along the "
+    "line between the cameras, and this error changes sign with the stroke and grows with the flap frequency",
     confused_with=("rolling_shutter", "clock_offset", "tracker_lag"),
     observe=_observe,
 )

@@ -38,8 +38,9 @@ EFFECT = fault_of_tracks(
         for axis in "xyz"
     ),
     law="p' = R p,     R = exp((x, y, z)~)",
-    source="rigid rotation of the measured frame about its origin (Rodrigues 1840, rotation vector)",
-    signature="errors grow with the distance from the hinge as if a rigid wing were rotated, alike in every condition",
+    source="Rodrigues (1840): rotation about the origin by a rotation vector",
+    signature="the errors grow with the distance from the hinge, as if a rigid wing were rotated, and are alike in "
+    "every condition",
     confused_with=("camera_shift", "hinge_tilt", "stroke_bias"),
     observe=_observe,
 )

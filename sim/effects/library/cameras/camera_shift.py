@@ -21,7 +21,7 @@ EFFECT = fault_of_tracks(
         for axis in "xyz"
     ),
     law="p' = p + (x, y, z)",
-    source="rigid motion of the measured frame (Luhmann et al. 2014, Close-Range Photogrammetry)",
+    source="Luhmann et al. (2014), Close-Range Photogrammetry: rigid motion of the measured frame",
     signature="every marker is off by the same vector at every phase, in every condition",
     confused_with=("hinge_offset", "camera_rotation"),
     observe=_observe,

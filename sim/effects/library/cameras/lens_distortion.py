@@ -31,18 +31,20 @@ EFFECT = fault_of_tracks(
     name="lens_distortion",
     title="Lens distortion not removed",
     size=(
-        Parameter("k1", "1", -0.25, 0.25, -0.1, "radial distortion, third order; negative for a barrel"),
-        Parameter("k2", "1", -0.1, 0.1, 0.01, "radial distortion, fifth order"),
-        Parameter("p1", "1", -0.02, 0.02, 0.001, "tangential distortion, of a lens off its axis along the span"),
-        Parameter("p2", "1", -0.02, 0.02, 0.001, "tangential distortion, of a lens off its axis along the chord"),
+        Parameter("k1", "1", -0.25, 0.25, -0.1, "radial distortion of third order; negative for barrel distortion"),
+        Parameter("k2", "1", -0.1, 0.1, 0.01, "radial distortion of fifth order"),
+        Parameter("p1", "1", -0.02, 0.02, 0.001, "tangential distortion of a lens that is off its axis along the span"),
+        Parameter(
+            "p2", "1", -0.02, 0.02, 0.001, "tangential distortion of a lens that is off its axis along the chord"
+        ),
     ),
     shape=PLACES,
     law="u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2)\n"
     "v' = v (1 + k1 r^2 + k2 r^4) + 2 p2 u v + p1 (r^2 + 2 v^2)",
-    source="Brown-Conrady model: Brown 1971, Close-range camera calibration; Conrady 1919. An action camera has k1 of "
-    "about -0.25; a calibration at another field of view leaves part of it",
-    signature="errors grow with the third power of the distance from the middle of the image, at rest as in motion, "
-    "alike in every condition",
+    source="Brown (1971), Close-range camera calibration, and Conrady (1919): the Brown-Conrady model. An action "
+    "camera has a k1 of about -0.25, and a calibration at another field of view leaves part of it",
+    signature="the errors grow with the third power of the distance from the middle of the image, at rest as in "
+    "motion, and are alike in every condition",
     confused_with=("scale_error", "camera_rotation"),
     observe=_observe,
 )

@@ -22,14 +22,17 @@ EFFECT = fault_of_tracks(
     name="marker_slip",
     title="Marker slipped",
     size=tuple(
-        Parameter(axis, "m", -0.3, 0.3, 0.03, f"distance of the marker {where} of its described place", of="chord")
+        Parameter(
+            axis, "m", -0.3, 0.3, 0.03, f"distance by which the marker lies {where} of its described place", of="chord"
+        )
         for axis, where in (("x", "aft"), ("y", "outboard"))
     ),
     shape=PLACE,
     law="p' = p + x dp/dX + y dp/dY",
-    source="material point moved on the surface, with the tangents of a moving least-squares plane (Lancaster and "
-    "Salkauskas 1981)",
-    signature="one marker is off by a vector that turns with the wing, in every condition; its neighbours are not",
+    source="Lancaster and Salkauskas (1981): a moving least-squares plane, which gives the tangents of the wing at the "
+    "marker",
+    signature="one marker is off by a vector that turns with the wing, in every condition, and its neighbours are "
+    "where they should be",
     confused_with=("marker_swap",),
     observe=_observe,
 )

@@ -20,13 +20,16 @@ EFFECT = fault_of_tracks(
     name="marker_swap",
     title="Markers swapped",
     size=(
-        Parameter("part", "1", 0.0, 1.0, 1.0, "fraction of the frames in which they are swapped, evenly over the beat"),
+        Parameter(
+            "part", "1", 0.0, 1.0, 1.0, "fraction of the frames in which the markers are swapped, evenly over the beat"
+        ),
     ),
     shape=PLACE,
     law="p_1' = (1 - part) p_1 + part p_2,     p_2' = (1 - part) p_2 + part p_1",
-    source="exchange of labels between tracks (identity switch; Bernardin and Stiefelhagen 2008, CLEAR MOT metrics); "
-    "a fraction of the frames acts in least squares like their mean",
-    signature="two neighbours have each other's path: opposite errors of equal length, alike in every condition",
+    source="Bernardin and Stiefelhagen (2008), CLEAR MOT metrics: exchange of labels between tracks (identity switch). "
+    "In least squares, a swap in a fraction of the frames acts like the mean over the frames",
+    signature="two neighbouring markers have each other's path, so that their errors are opposite and of equal length, "
+    "alike in every condition",
     confused_with=("marker_slip",),
     observe=_observe,
 )

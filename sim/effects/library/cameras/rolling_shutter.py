@@ -43,14 +43,21 @@ EFFECT = fault_of_tracks(
     name="rolling_shutter",
     title="Rolling shutter",
     size=(
-        Parameter("along_span", "s", -0.02, 0.02, 0.004, "time of the read-out along the span, from root to tip"),
-        Parameter("along_chord", "s", -0.01, 0.01, 0.0005, "time of the read-out along the mean chord, aft"),
+        Parameter("along_span", "s", -0.02, 0.02, 0.004, "time in which the camera reads the rows from root to tip"),
+        Parameter(
+            "along_chord",
+            "s",
+            -0.01,
+            0.01,
+            0.0005,
+            "time in which the camera reads the rows along the mean chord, from front to back",
+        ),
     ),
     law="p_k(t) = p(t + d_k),     d_k = along_chord x / c + along_span h v_k / b",
-    source="Meingast, Geyer and Sastry 2005, Geometric models of rolling-shutter cameras; Liang, Chang and Chen 2008. "
-    "An action camera reads an image in 10 to 20 ms; a flash in the dark avoids the fault",
-    signature="a lag that grows steadily along the span (or chord), in proportion to the flap frequency; along the "
-    "span heights are wrong too, where two cameras read a marker in different rows",
+    source="Meingast, Geyer and Sastry (2005), Geometric models of rolling-shutter cameras; Liang, Chang and Chen "
+    "(2008). An action camera reads an image in 10 to 20 ms",
+    signature="a lag grows steadily along the span (or the chord), in proportion to the flap frequency, and a read-out "
+    "along the span also makes heights wrong, because the two cameras read a marker in different rows",
     confused_with=("camera_desync", "phase_lag_error", "tracker_lag"),
     observe=_observe,
 )

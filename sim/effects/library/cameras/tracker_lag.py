@@ -55,19 +55,19 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(response(values["smoothing"], order * step))
 
 
-_TEXT = "assumed noise of positions over that of accelerations times frame time squared"
+_TEXT = "position noise that the filter assumes, over its acceleration noise times the frame time squared"
 
 EFFECT = fault_of_tracks(
     name="tracker_lag",
     title="Tracker lag and smoothing",
     size=(Parameter("smoothing", "1", 0.0, 100.0, 2.0, _TEXT),),
-    memory="position, velocity and acceleration of each marker, from frame to frame",
+    memory="position, velocity and acceleration of each marker, carried from frame to frame",
     law="H = N / (N + (1 - alpha) d^3),     N = alpha d^2 + beta q d + gamma q (q + d / 2)\n"
     "2 (1 - s)^3 smoothing = s (1 + s),   alpha = 1 - s^2,   beta = 2 (1 - s)^2,   gamma = beta^2 / (2 alpha)",
-    source="Kalman filter of constant acceleration in steady state: Kalata 1984, The tracking index; Bar-Shalom, Li "
-    "and Kirubarajan 2001, Estimation with Applications to Tracking and Navigation, sections 6.3.3 and 6.5",
-    signature="higher harmonics are smaller and late in the order of the frames, which under a strobe faster than the "
-    "wing is early in the beat; the same at every flap frequency with as many frames per apparent beat",
+    source="Kalata (1984), The tracking index, and Bar-Shalom, Li and Kirubarajan (2001), Estimation with Applications "
+    "to Tracking and Navigation, sections 6.3.3 and 6.5: Kalman filter of constant acceleration in steady state",
+    signature="higher harmonics are smaller, and late in the order of the frames (which is early in the beat if the "
+    "strobe is faster than the wing), alike at all flap frequencies with equally many frames per apparent beat",
     confused_with=("camera_desync", "rolling_shutter"),
     observe=_observe,
 )

@@ -20,13 +20,13 @@ EFFECT = Effect(
     title="Lumped mass",
     family="inertia",
     port="inertia",
-    size=(Parameter("mass", "kg", 0.0, 0.5, 0.05, "mass of the point", of="mass"),),
+    size=(Parameter("mass", "kg", 0.0, 0.5, 0.05, "mass of the added point", of="mass"),),
     shape=place(0.8, 0.8),
     power="conservative",
     law="T = mass |v + omega x a|^2 / 2,     F = mass g",
-    source="Newton's second law for a point fixed to a body; Rayleigh, The Theory of Sound (1877), ch. VIII: a load "
-    "on a bar",
-    signature="everything near one place lags where the stroke reverses, in vacuum as in air, and sags at rest",
+    source="Newton's second law for a point fixed to a body; Rayleigh (1877), The Theory of Sound, ch. VIII: a load on "
+    "a bar",
+    signature="the wing near one place lags where the stroke reverses, in vacuum as in air, and sags there at rest",
     confused_with=("added_mass", "mass_offset", "damage"),
     wing=_wing,
 )

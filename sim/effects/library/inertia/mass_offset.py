@@ -36,12 +36,17 @@ EFFECT = Effect(
     title="Centre of mass off its place along the chord",
     family="inertia",
     port="inertia",
-    size=(Parameter("distance", "m", -0.3, 0.3, 0.05, "distance of the mass aft of its described place", of="chord"),),
+    size=(
+        Parameter(
+            "distance", "m", -0.3, 0.3, 0.05, "distance by which the mass lies aft of its described place", of="chord"
+        ),
+    ),
     power="conservative",
     law="T = m |v + omega x (distance, 0, 0)|^2 / 2",
-    source="Newton's second law for a point fixed to a turning wing; Goldstein, Classical Mechanics (1980), ch. 5: "
-    "inertia about another point than the centre of mass",
-    signature="torsion and force in phase with the accelerations of flap and pitch, in vacuum as in air",
+    source="Newton's second law for a point fixed to a turning wing; Goldstein (1980), Classical Mechanics, ch. 5: "
+    "inertia about a point other than the centre of mass",
+    signature="the wing twists, or its force changes, in phase with the accelerations of flap and pitch, in vacuum as "
+    "in air",
     confused_with=("lumped_mass", "drive_harmonics", "stroke_bias"),
     wing=_wing,
     vehicle=deferred("mass", _shift_mass),

@@ -15,10 +15,9 @@ EFFECT = fault_of_recordings(
     title="Clock offset",
     size=(Parameter("delay", "s", -0.01, 0.01, 0.001, "time by which samples are later than their time stamps"),),
     law="F'(t) = F(t + delay)",
-    source="latency of a trigger (Bendat and Piersol 2010, Random Data: a time delay is a phase that grows in "
-    "proportion to frequency)",
-    signature="forces lead by the same time at every harmonic; tracks show nothing, as they are aligned with the beat "
-    "by their own motion",
+    source="Bendat and Piersol (2010), Random Data: a time delay is a phase that grows in proportion to frequency",
+    signature="forces lead by the same time at every harmonic, and tracks show nothing, because they are aligned with "
+    "the beat by their own motion",
     confused_with=("filter_delay", "strobe_rate", "circulation_lag"),
     observe=_observe,
 )

@@ -14,11 +14,15 @@ def _observe(sampling: Sampling, values: Values) -> None:
 EFFECT = fault_of_recordings(
     name="scale_error",
     title="Scale error",
-    size=(Parameter("part", "1", -0.1, 0.1, 0.01, "relative error of lengths or forces; positive if too large"),),
+    size=(
+        Parameter(
+            "part", "1", -0.1, 0.1, 0.01, "relative error of recorded lengths or forces; positive if they are too large"
+        ),
+    ),
     law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
-    source="the scale of a reconstruction is that of its reference length (Luhmann et al. 2014, Close-Range "
-    "Photogrammetry); gain of a balance (AIAA R-091A 2020)",
-    signature="the whole wing is larger, at rest as in motion, or all forces are; by the same factor in every "
+    source="Luhmann et al. (2014), Close-Range Photogrammetry: a reconstruction takes its scale from a reference "
+    "length; AIAA R-091A (2020): gain of a balance",
+    signature="the whole wing is larger, at rest as in motion, or all forces are larger, by the same factor in every "
     "condition",
     confused_with=("stroke_amplitude", "camera_shift", "lens_distortion"),
     observe=_observe,

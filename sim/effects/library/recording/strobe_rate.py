@@ -13,16 +13,16 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.times = times + values["part"][:, None] * (times - start)
 
 
-_TEXT = "relative error of flap frequency over frame rate; positive if larger than recorded"
+_TEXT = "relative error of flap frequency over frame rate; positive if the true ratio is larger"
 
 EFFECT = fault_of_recordings(
     name="strobe_rate",
     title="Strobe-rate error",
     size=(Parameter("part", "1", -2e-3, 2e-3, 1e-4, _TEXT),),
     law="t' = t + part (t - t_0)",
-    source="aliased time: each frame is from another beat and adds to the error (van der Grinten, The bird is the "
-    "word, Appendix A; Bendat and Piersol 2010, Random Data)",
-    signature="the phase drifts steadily from the first to the last frame: markers scatter about their path in "
+    source="van der Grinten, The bird is the word, Appendix A: each frame is from another beat, and the error "
+    "accumulates; Bendat and Piersol (2010), Random Data: aliasing",
+    signature="the phase drifts steadily from the first frame to the last, so that markers scatter about their path in "
     "proportion to their speed, more in longer recordings",
     confused_with=("clock_offset", "tracker_lag"),
     observe=_observe,

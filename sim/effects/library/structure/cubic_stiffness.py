@@ -62,7 +62,7 @@ def shape(change: Array) -> tuple[Array, Array]:
     return np.where(change > 0.0, change, -2.0 * _SOFTEST * level), level
 
 
-_TEXT = "relative growth of bending stiffness at a bend of one radian over the span"
+_TEXT = "relative change of bending stiffness where the whole span is bent by one radian"
 
 EFFECT = effect_of_joints(
     name="cubic_stiffness",
@@ -72,10 +72,10 @@ EFFECT = effect_of_joints(
     law="M = -E K s (u + c u^2 / 2) / (1 + c u)^2,     u = (s / p)^2\n"
     "change >= 0:   E = change,   c = 0\n"
     "change < 0:    c = (1 + change / 0.7)^(-1/2) - 1,   E = -1.4 c",
-    source="Duffing, Erzwungene Schwingungen bei veränderlicher Eigenfrequenz (1918); Nayfeh and Mook, Nonlinear "
-    "Oscillations (1979), ch. 4; softening made to level off",
-    signature="the swing grows less than in proportion to the drive (more than in proportion if softening), with "
-    "third harmonics",
+    source="Duffing (1918), Erzwungene Schwingungen bei veränderlicher Eigenfrequenz; Nayfeh and Mook (1979), "
+    "Nonlinear Oscillations, ch. 4; the limit on softening was added here",
+    signature="the swing grows less than in proportion to the drive (more, where the wing softens), and the motion "
+    "contains third harmonics",
     confused_with=("damage", "hysteresis", "rod_slip"),
     wing=_wing,
 )

@@ -33,16 +33,36 @@ def remaining(joints: Joints, values: Values) -> Array:
 EFFECT = effect_of_joints(
     name="damage",
     title="Local loss of stiffness",
-    size=(Parameter("loss", "1", -2.0, 0.9, 0.5, "fraction of stiffness and damping lost; negative for a gain"),),
+    size=(
+        Parameter(
+            "loss", "1", -2.0, 0.9, 0.5, "fraction of stiffness and damping lost at the station; negative for a gain"
+        ),
+    ),
     shape=(
-        Parameter("station", "1", 0.0, 1.0, 0.5, "place along the span, fraction of it from root to tip", place=True),
-        Parameter("width", "1", 0.02, 0.3, 0.06, "extent (standard deviation), fraction of the span", place=True),
+        Parameter(
+            "station",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            "position along the span, as a fraction of the span from root to tip",
+            place=True,
+        ),
+        Parameter(
+            "width",
+            "1",
+            0.02,
+            0.3,
+            0.06,
+            "standard deviation of the loss along the span, as a fraction of the span",
+            place=True,
+        ),
     ),
     law="k(s) = k_0 (1 - loss exp(-((s - station) / width)^2 / 2))",
-    source="Christides and Barr, International Journal of Mechanical Sciences 26, 639 (1984): a crack as a local loss "
-    "of bending stiffness; Sinha, Friswell and Edwards, Journal of Sound and Vibration 251, 13 (2002)",
-    signature="a kink: everything outboard of one station swings further than the model predicts, everything inboard "
-    "as predicted",
+    source="Christides and Barr (1984), International Journal of Mechanical Sciences 26, 639: a crack as a local loss "
+    "of bending stiffness; Sinha, Friswell and Edwards (2002), Journal of Sound and Vibration 251, 13",
+    signature="all markers outboard of one station swing further than the model predicts, and all markers inboard of "
+    "it move as predicted",
     confused_with=("cubic_stiffness", "lumped_mass"),
     wing=_wing,
 )

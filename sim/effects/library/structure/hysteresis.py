@@ -52,20 +52,28 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_joints(
     name="hysteresis",
     title="Hysteresis",
-    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that yields, as a fraction of the elastic stiffness"),),
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness of the yielding spring over the elastic stiffness"),),
     shape=(
-        Parameter("yield_angle", "rad", 0.01, 1.0, 0.1, "bend or twist over the span at which it yields", scale="log"),
-        Parameter("gamma", "1", -0.5, 0.5, 0.5, "shape of the loop: gamma in beta + gamma = 1"),
-        Parameter("n", "1", 1.0, 4.0, 1.0, "exponent: the larger, the sharper the onset of yielding"),
+        Parameter(
+            "yield_angle",
+            "rad",
+            0.01,
+            1.0,
+            0.1,
+            "bend or twist of the whole span at which the spring yields",
+            scale="log",
+        ),
+        Parameter("gamma", "1", -0.5, 0.5, 0.5, "shape of the loop: the gamma of the law, with beta = 1 - gamma"),
+        Parameter("n", "1", 1.0, 4.0, 1.0, "exponent of the law: the larger it is, the sharper yielding sets in"),
     ),
     power="dissipative",
-    memory="the elastic part of bending and of twist, per connector",
+    memory="the elastic part of bending and of twist, for each connector",
     law="z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n,     q = z / z_y,   beta = 1 - gamma\n"
     "M = -k K z,     z_y = p yield_angle",
-    source="Bouc (1967), Forced vibration of mechanical systems with hysteresis; Wen, Journal of the Engineering "
-    "Mechanics Division ASCE 102, 249 (1976); Ikhouane and Rodellar, Systems with Hysteresis (2007)",
-    signature="the energy lost in a beat does not depend on the flap frequency; stiffer in small swings than in large "
-    "ones",
+    source="Bouc (1967), Forced vibration of mechanical systems with hysteresis; Wen (1976), Journal of the "
+    "Engineering Mechanics Division ASCE 102, 249; Ikhouane and Rodellar (2007), Systems with Hysteresis",
+    signature="the energy lost in a beat does not depend on the flap frequency, and the wing is stiffer in small "
+    "swings than in large ones",
     confused_with=("viscoelastic", "rod_slip"),
     wing=_wing,
 )

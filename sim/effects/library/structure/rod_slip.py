@@ -74,24 +74,31 @@ def of_rods(scene: WingScene) -> Array:
     return found
 
 
-_STICK = "stiffness of sticking rods over all bending stiffness of the rods"
+_STICK = "bending stiffness of the sticking rods over the full bending stiffness of the rods"
 
 EFFECT = effect_of_joints(
     name="rod_slip",
     title="Rods that slip in their straw",
-    size=(Parameter("friction", "rad", 0.0, 0.5, 0.05, "bend over the whole span at which the rods slip"),),
+    size=(
+        Parameter(
+            "friction", "rad", 0.0, 0.5, 0.05, "bend of the whole span, beyond the clearance, at which the rods slip"
+        ),
+    ),
     shape=(
-        Parameter("clearance", "rad", 0.0, 0.3, 0.02, "bend over the whole span, to either side, with loose rods"),
+        Parameter(
+            "clearance", "rad", 0.0, 0.3, 0.02, "bend of the whole span, to either side, up to which the rods are loose"
+        ),
         Parameter("stick", "1", 0.02, 1.0, 0.3, _STICK, scale="log"),
     ),
     power="dissipative",
-    memory="bending carried by friction, of each connector with rods",
+    memory="the bending carried by friction, for each connector with rods",
     law="w' = r - (r |h| + |r| h) / (2 h_max) - 0.1 |r| w / (w_0 + h_max)\n"
     "h = max(w - w_0, 0) + min(w + w_0, 0),     M = -k h\n"
     "h_max = p friction,   w_0 = p clearance,   k = stick K_rods",
-    source="Dahl, A Solid Friction Model, Aerospace Corporation TOR-0158 (1968): friction; Visintin, Differential "
-    "Models of Hysteresis (1994): play",
-    signature="stiffer in small swings than in large ones; the bending lags behind the load where the stroke reverses",
+    source="Dahl (1968), A Solid Friction Model, Aerospace Corporation TOR-0158: friction; Visintin (1994), "
+    "Differential Models of Hysteresis: play",
+    signature="the wing is stiffer in small swings than in large ones, and its bending lags behind the load where the "
+    "stroke reverses",
     confused_with=("hysteresis", "cubic_stiffness"),
     wing=_wing,
 )

@@ -42,15 +42,15 @@ EFFECT = Effect(
     port="point",
     size=(
         Parameter("k", "N/m", 0.0, 20.0, 1.0, "stiffness of the spring between the wing and the ground"),
-        Parameter("c", "N s/m", 0.0, 0.5, 0.01, "damping constant beside that spring"),
+        Parameter("c", "N s/m", 0.0, 0.5, 0.01, "damping constant of the damper beside this spring"),
     ),
     shape=place(0.9, 0.5),
     power="dissipative",
     law="F = -k (x - x_0) - c v,     P = c |v|^2",
-    source="Rayleigh, The Theory of Sound (1877), ch. IV: potential energy and dissipation function of a point; "
-    "Blevins, Formulas for Natural Frequency and Mode Shape (1979), ch. 8: beams on springs",
-    signature="the wing is held back towards its rest position near one place, in vacuum as in air; less so at higher "
-    "flap frequencies, where inertia grows and the spring does not",
+    source="Rayleigh (1877), The Theory of Sound, ch. IV: potential energy and dissipation function of a point; "
+    "Blevins (1979), Formulas for Natural Frequency and Mode Shape, ch. 8: beams on springs",
+    signature="near one place the wing is held back towards its rest position, in vacuum as in air, and less so at "
+    "higher flap frequencies, where the inertia grows and the spring does not",
     confused_with=("lumped_mass", "cubic_stiffness", "damage"),
     wing=_wing,
 )

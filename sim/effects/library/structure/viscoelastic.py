@@ -43,15 +43,15 @@ def _wing(scene: WingScene, values: Values) -> None:
 EFFECT = effect_of_joints(
     name="viscoelastic",
     title="Viscoelastic relaxation",
-    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness that relaxes, as a fraction of the elastic stiffness"),),
-    shape=(Parameter("tau", "s", 0.002, 0.5, 0.05, "relaxation time", scale="log"),),
+    size=(Parameter("k", "1", 0.0, 2.0, 0.3, "stiffness of the relaxing spring over the elastic stiffness"),),
+    shape=(Parameter("tau", "s", 0.002, 0.5, 0.05, "relaxation time of this spring", scale="log"),),
     power="dissipative",
-    memory="strain of the second spring in bending and in torsion, per connector",
+    memory="strain of the second spring in bending and in torsion, for each connector",
     law="z' = r - z / tau,     M = -k K z",
-    source="Zener, Elasticity and Anelasticity of Metals (1948): standard linear solid; Ferry, Viscoelastic "
-    "Properties of Polymers (1980), ch. 1",
-    signature="bends less and later at higher flap frequencies: stiffness and loss depend on the frequency, not on "
-    "the air",
+    source="Zener (1948), Elasticity and Anelasticity of Metals: standard linear solid; Ferry (1980), Viscoelastic "
+    "Properties of Polymers, ch. 1",
+    signature="at higher flap frequencies the wing bends less and later, and this change of stiffness and loss does "
+    "not depend on the air",
     confused_with=("hysteresis",),
     wing=_wing,
 )
