@@ -1,1 +1,1 @@
-"""Effects of the actuation: the drive, its hinge and its rods."""
+"""Effects of the drive, its hinge and its rods."""

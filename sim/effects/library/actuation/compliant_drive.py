@@ -1,4 +1,4 @@
-"""A drive whose speed drops under load: the rods are late where the wing needs power."""
+"""A drive whose speed drops under load, so that the rods are late where the wing needs power."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEARNING = 1.0
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """A governor that demands the relative speed -d (P - P_m) - g tau, and a motor that follows within t."""
+    """Set a governor that demands the relative speed -d (P - P_m) - g tau, and a motor that follows it within t."""
     motor = np.zeros((MOTOR, LANES))
     motor[DROOP], motor[FOLLOWING] = values["d"], 1.0 / values["t"]
     motor[HOLDING] = GOVERNOR * scene.angular_rate / values["t"]

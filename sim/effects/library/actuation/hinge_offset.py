@@ -1,4 +1,4 @@
-"""The axis about which the drive turns the rods lies elsewhere than described."""
+"""The axis about which the drive turns the rods is displaced from the described one."""
 
 from __future__ import annotations
 

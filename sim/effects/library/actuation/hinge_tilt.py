@@ -1,4 +1,4 @@
-"""The axis about which the drive turns the rods does not point along the body."""
+"""The axis about which the drive turns the rods is not parallel to the body."""
 
 from __future__ import annotations
 

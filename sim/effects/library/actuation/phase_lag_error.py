@@ -1,4 +1,4 @@
-"""The rear driving rod lags more than described."""
+"""The lag of the rear driving rod is larger than described."""
 
 from __future__ import annotations
 

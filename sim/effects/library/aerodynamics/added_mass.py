@@ -1,4 +1,4 @@
-"""Air that a wing accelerates with itself, as inertia."""
+"""Inertia of the air that a wing accelerates together with itself."""
 
 from __future__ import annotations
 
@@ -30,13 +30,14 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def strip_matrix(structure: Structure, strip: int) -> Array:
-    """[6 n, 6 n] (m^3 to m^5): twice the kinetic energy of air of density one that a strip of n bodies moves.
+    """Added-mass matrix [6 n, 6 n] (m^3 to m^5) of a strip of n bodies in air of density one.
 
-    A section of chord c = 2 b whose points move along its normal with w(x), x = cos t from edge to edge, makes a jump
-    of the velocity potential sqrt(1 - x^2) sum_k W_k U_k(x), U_k(x) = sin((k + 1) t) / sin t. With w = sum_k w_k U_k
-    it is W_k = 2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w: so a
-    section that heaves moves rho pi c^2 / 4 of air, one that pitches about its middle rho pi c^4 / 128 (Bisplinghoff,
-    Ashley and Halfman, Aeroelasticity (1955), ch. 5).
+    Its quadratic form in the twists of the bodies is twice the kinetic energy of the air. The points of a section of
+    chord c = 2 b move along its normal with w(x), x = cos t from edge to edge. This causes the jump sqrt(1 - x^2)
+    sum_k W_k U_k(x) of the velocity potential, with U_k(x) = sin((k + 1) t) / sin t. For w = sum_k w_k U_k, W_k is
+    2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w. A section that heaves
+    thus moves rho pi c^2 / 4 of air; one that pitches about its middle, rho pi c^4 / 128 (Bisplinghoff, Ashley and
+    Halfman, Aeroelasticity (1955), ch. 5).
     """
     panel = structure.panels[structure.division.index(strip, 0)]
     first, count = structure.division.index(strip, 0), structure.division.bodies[strip]
@@ -48,7 +49,7 @@ def strip_matrix(structure: Structure, strip: int) -> Array:
 def _strip_matrix(
     stations: tuple[Station, ...], y0: float, y1: float, centres: tuple[tuple[float, float], ...]
 ) -> Array:
-    """The same from the planform, the strip's ends and its bodies' centres of mass (x, y), m; read-only."""
+    """As :func:`strip_matrix`, from planform, ends of the strip and centres of mass of its bodies (m); read-only."""
     count = len(centres)
     total = np.zeros((6 * count, 6 * count))
     nodes, weights = np.polynomial.legendre.leggauss(4)
@@ -68,14 +69,14 @@ def _strip_matrix(
 
 
 def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
-    """Velocity along the normal of a body's points at span ``y`` per component of its twist: at mid-chord, and by x."""
+    """Per twist component of a body: its index, and the normal velocity at span ``y``, at mid-chord and per x."""
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 
 
 def _modes(s0: float, s1: float, constant: float, slope: float) -> Array:
-    """Coefficients by U_k of constant + slope x between two fractions of the chord, zero elsewhere; x in -1..1.
+    """Coefficients w_k of w(x) = constant + slope x between two fractions of the chord, zero elsewhere; x in -1..1.
 
-    w_k = 2 / pi times the integral of w U_k sqrt(1 - x^2), with x = cos t that of w sin((k + 1) t) sin t.
+    w_k is 2 / pi times the integral of w U_k sqrt(1 - x^2) dx, which with x = cos t is that of w sin((k + 1) t) sin t.
     """
     t0, t1 = math.acos(max(min(2 * s1 - 1, 1.0), -1.0)), math.acos(max(min(2 * s0 - 1, 1.0), -1.0))
     m = np.arange(1, _MODES + 1)

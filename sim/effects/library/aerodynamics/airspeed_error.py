@@ -1,4 +1,4 @@
-"""The stream is faster than described: tunnel blockage, or a wrong anemometer."""
+"""The stream is faster than described, because of tunnel blockage or a wrong anemometer."""
 
 from __future__ import annotations
 

@@ -22,13 +22,13 @@ _SCALE = 0.1  # motion of the wing over the integral of a lagging circulation, a
 
 
 def wagner(s: npt.ArrayLike) -> Array:
-    """Part of its final circulation that a wing has ``s`` half chords after a step (Jones 1940)."""
+    """Fraction of the final circulation that a wing has ``s`` half chords after a step (Jones 1940)."""
     travelled = np.asarray(s, float)
     return np.asarray(1.0 - sum(a * np.exp(-b * travelled) for a, b in zip(DEFICIT, RATE, strict=True)))
 
 
 def _lag(scene: VehicleScene, values: Values) -> None:
-    """Gamma - share sum_i DEFICIT_i (Gamma - x_i), with x_i' = RATE_i rate (2 V / c) (Gamma - x_i)."""
+    """Replace Gamma by Gamma - share sum_i DEFICIT_i (Gamma - x_i), x_i' = RATE_i rate (2 V / c) (Gamma - x_i)."""
     flow = scene.flow
     per_metre = values["rate"][:, None] * (2.0 / scene.stations.chord)
     share, quasi_steady = values["share"][:, None, None], flow.circulation
@@ -41,7 +41,7 @@ def _lag(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """The same on strips: of twice Gamma over the chord, which is speed times lift coefficient."""
+    """As :func:`_lag` for strips, with 2 Gamma / c (speed times lift coefficient) in the place of Gamma."""
     port = strip_port(frame)
     for s in range(port.places):
         share = load(port.parameters, 0, s)

@@ -19,11 +19,11 @@ _PHASES = 360  # at which the top of the stroke is looked for
 
 
 def fling_near(distance: Array) -> Array:
-    """Part of the circulation of a fling ``distance`` (in chords) from the mirror plane, 1 where the wings touch.
+    """Circulation of fling ``distance`` (in chords) from the mirror plane, as a fraction of that of touching wings.
 
-    Two plates that open as they lie side by side suck air through the gap: Gamma = omega c^2 / (8 distance) in its
-    narrow limit (of Lighthill 1973); this keeps to that within a tenth of omega c^2 from 0.15 to 1 chord with a
-    coefficient of 2.7, and stays finite where wings touch.
+    Two plates that open side by side suck air into the gap. For a narrow gap, Gamma = omega c^2 / (8 distance)
+    (Lighthill 1973). With a coefficient of 2.7, this function agrees with it within a tenth of omega c^2 from 0.15 to
+    1 chord, and it stays finite where the wings touch.
     """
     return np.asarray(1.0 / (1.0 + (distance / NEAR) ** 2))
 
@@ -36,10 +36,10 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Gamma = C c^2 omega / 2 of a strip that turns nose down from a plane above, which mirrors the wing.
+    """Add Gamma = C c^2 omega / 2 to a strip that turns nose down from the mirror plane above the wing.
 
-    It falls with the distance of mid-chord from the plane, and with the angle to it: open at 45 degrees, two plates
-    make no more circulation than each by itself.
+    Gamma falls with the distance of mid-chord from the plane, and with the angle between the two: from 45 degrees on,
+    two plates have no more circulation than each by itself.
     """
     port = strip_port(frame)
     for s in range(port.places):
@@ -55,7 +55,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """The plane holds the flapping axis, ``clearance`` above the top of the mean stroke of both rods."""
+    """The plane contains the flapping axis, ``clearance`` above the top of the mean stroke of both rods."""
     phases = 2 * np.pi * np.arange(_PHASES) / _PHASES
     top = scene.rods.angles(phases)[:, :, 0].mean(axis=1).max(axis=0)
     sine, cosine = np.sin(top + values["clearance"]), np.cos(top + values["clearance"])

@@ -21,9 +21,9 @@ _METRES = 0.01  # m of motion of the wing per unit of either state
 
 
 def _stall(scene: VehicleScene, values: Values) -> None:
-    """tau_1 X' + X = X_0(alpha - tau_2 alpha'), times tau in chords travelled.
+    """Multiply the circulation of the angle of attack by 1 - share (1 - ((1 + sqrt X) / 2)^2).
 
-    Circulation of the angle of attack times 1 - share (1 - ((1 + sqrt X) / 2)^2).
+    X follows delay X' + X = X_0(alpha - advance alpha'), with time in chords travelled.
     """
     flow, chord = scene.flow, scene.stations.chord
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
@@ -34,9 +34,10 @@ def _stall(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """The same on strips, whose states are the separated part 1 - X, and alpha as it was a moment ago.
+    """As :func:`_stall` for strips, with the states 1 - X (the separated fraction) and a delayed alpha.
 
-    That follows alpha with _RECENT chords travelled; by what it is behind, alpha' is known without accelerations.
+    The delayed alpha follows alpha within _RECENT chords travelled. The difference of the two gives alpha' without
+    accelerations.
     """
     port = strip_port(frame)
     for s in range(port.places):

@@ -1,4 +1,4 @@
-"""The force on the wings accelerates the air: wings meet the inflow that they induce."""
+"""The force on the wings accelerates the air, and the wings meet this induced inflow."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def apparent_mass(density: Array, area: Array) -> Array:
-    """Of the air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 (Tuckerman 1925; Pitt and Peters 1981)."""
+    """Mass of the air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 (Tuckerman 1925; Pitt and Peters 1981)."""
     return np.asarray(8.0 / 3.0 * density * (area / np.pi) ** 1.5)
 
 
@@ -29,11 +29,11 @@ def swept_area(span: float, stroke: Array, wings: int) -> Array:
 
 
 def _induce(scene: VehicleScene, values: Values) -> None:
-    """Along body x, through the disc that the wings sweep.
+    """Add the periodic inflow v along body x, through the disc that the wings sweep, to the scene.
 
-    m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, solved for its periodic state. T is linear in v
-    between none and hover's, then about the solution once more. It is computed at every second instant, the inflow
-    being smooth. The rate of change of the inflow is left out of the added mass.
+    It solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2. T is taken as linear in v between
+    zero and the inflow of hover, then once more about the solution. It is computed at every second instant, because
+    the inflow is smooth. The added mass does not include the rate of change of the inflow.
     """
     vehicle, air, wings = scene.setting.vehicle, scene.setting.condition, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
@@ -57,16 +57,16 @@ def _induce(scene: VehicleScene, values: Values) -> None:
 
 
 def slices(edges: Array) -> Array:
-    """Areas (m^2) that strips between ``edges`` [S + 1] (m from the middle) cut from a disc that ends with the last.
+    """Areas (m^2) that strips between ``edges`` [S + 1] (m from the centre) cut from a disc of radius edges[-1].
 
-    With an elliptic load their inflow is even, that of a lifting line (Prandtl 1918; Glauert 1926).
+    With an elliptic load, the inflow is the same at all strips, as on a lifting line (Prandtl 1918; Glauert 1926).
     """
     x, tip = edges / edges[-1], edges[-1]
     return np.asarray(tip**2 * np.diff(x * np.sqrt(1.0 - x**2) + np.arcsin(x)))
 
 
 def _law(frame: Any, moment: int) -> None:
-    """v' = -share L / m - 2 rho A |U + v| v / m in the world, L being the lift of a strip; A and m are its slice's."""
+    """v' = -share L / m - 2 rho A |U + v| v / m in world axes; L is the lift of a strip, A and m are of its slice."""
     port = strip_port(frame)
     for s in range(port.places):
         if moment == BEFORE:
@@ -90,7 +90,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Through the disc about the span of the wing and its mirror image, by which a wing in a stream is carried."""
+    """Induce inflow through the disc whose diameter is the span of the wing and its mirror image."""
     structure = scene.structure
     edges = structure.planform.strips(structure.division)
     depth = apparent_mass(np.array(1.0), np.array(np.pi * edges[-1] ** 2)) / (np.pi * edges[-1] ** 2)

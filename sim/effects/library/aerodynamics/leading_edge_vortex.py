@@ -1,4 +1,4 @@
-"""Lift beyond attached flow: a vortex stays over the leading edge, and the force is normal to the wing."""
+"""At large angles of attack a vortex stays over the leading edge, and the force is normal to the wing."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _BLEND = math.radians(10.0)  # over which the vortex takes over
 
 
 def _law(frame: Any, moment: int) -> None:
-    """C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha in the place of the affine laws, in the part w of them.
+    """C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha replace the fraction w of the affine laws.
 
-    Together C_N = 2 C_l sin alpha along the normal, and nothing along the chord: without suction at the leading edge
-    pressure can push a thin wing only squarely. w grows smoothly from 0 at the angle where attached flow ends. Of the
-    many forms this has one coefficient, goes to 90 degrees, and is what flapping wings were measured to have; the
-    suction analogy (Polhamus 1966) is for slender wings in steady flow.
+    Together they are C_N = 2 C_l sin alpha along the normal and nothing along the chord, because without suction at
+    the leading edge the pressure on a thin wing acts along its normal. w grows smoothly from 0 at the angle where
+    attached flow ends. This form has one coefficient, is valid up to 90 degrees, and agrees with measurements on
+    flapping wings; the suction analogy (Polhamus 1966) is for slender wings in steady flow.
     """
     port = strip_port(frame)
     P, flow, loads = port.parameters, port.flow, port.loads

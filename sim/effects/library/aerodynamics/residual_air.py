@@ -1,4 +1,4 @@
-"""The air is denser than its pressure and temperature imply: a vacuum chamber whose gauge reads too low."""
+"""The air is denser than its described pressure and temperature imply, as where a vacuum gauge reads too low."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Circulation of a wing that pitches: the Kramer effect."""
+"""Circulation that a wing has because it pitches (Kramer effect)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ _LEVER = 0.75 - 0.5  # of a chord: from where the strip's angle of attack is tak
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Gamma = C_r (3/4 - x_0) c^2 theta' / 2, that is twice Gamma over the chord more to speed times lift coefficient.
+    """Add Gamma = C_r (3/4 - x_0) c^2 theta' / 2, as 2 Gamma / c, to the product of speed and lift coefficient.
 
-    x_0 = 1/2, the strip's flow being that of its middle. In flow from behind the point is at 1/4 and the flow's
-    sense is the other: Gamma is the same, and the force, Gamma times the stream, changes sides.
+    x_0 is 1/2, because the flow of a strip is taken at its middle. In flow from behind, the point that sets the
+    circulation is at 1/4 and the flow is reversed: Gamma is the same, and the force, Gamma times the stream, changes
+    its sign.
     """
     port = strip_port(frame)
     for s in range(port.places):

@@ -18,7 +18,7 @@ _PIECES = 64  # of a strip
 
 
 def prandtl(to_tip: Array, spacing: Array) -> Array:
-    """Prandtl's factor F on circulation, ``to_tip`` (m) from the tip, of vortex sheets ``spacing`` (m) apart.
+    """Prandtl's factor F on the circulation ``to_tip`` (m) from the tip, for vortex sheets ``spacing`` (m) apart.
 
     F = 2 / pi arccos exp(-pi to_tip / spacing) (Prandtl in Betz 1919; Glauert 1935, division L, chapter VII); the
     arguments broadcast.
@@ -37,7 +37,7 @@ def strip_factors(structure: Structure, spacing: Array) -> Array:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Circulation times the strip's factor."""
+    """Multiply the circulation of each strip by its factor."""
     port = strip_port(frame)
     for s in range(port.places):
         factor = load(port.parameters, 0, s)

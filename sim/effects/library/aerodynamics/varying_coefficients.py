@@ -13,13 +13,13 @@ LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
 
 
 def factor(frequency: float, pitch: float, by_frequency: Array, by_pitch: Array) -> Array:
-    """What a coefficient [B] is multiplied by at a flap frequency (Hz) and body pitch (rad); never below zero."""
+    """Factor [B] on a coefficient at a flap frequency (Hz) and body pitch (rad); never below zero."""
     more = by_frequency * (frequency / REFERENCE_FREQUENCY - 1.0) + by_pitch * (pitch - REFERENCE_PITCH)
     return np.asarray(np.maximum(1.0 + more, 0.0))
 
 
 def _vary(scene: VehicleScene, values: Values) -> None:
-    """Scale the scene's coefficients for its flight condition; ``scene.fling`` scales that of the fling effect."""
+    """Scale the coefficients of the scene, and the fling of the effect clap_and_peel, for the flight condition."""
     here = scene.setting.condition
 
     def changed(kind: str) -> Array:

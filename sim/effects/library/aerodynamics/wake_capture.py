@@ -21,12 +21,12 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def _meet_wake(scene: VehicleScene, values: Values) -> None:
-    """The air moves at share (w - k u), w' = V / (chords c) (u - w): u = r zeta' is the wing's velocity, w the wake's.
+    """The air moves at share (w - k u), w' = V / (chords c) (u - w); u = r zeta' is the wing's velocity, w the wake's.
 
-    k, in 0 to 1, is the part of u for which the wing takes its wake along: the air about it that it has just set in
-    motion is no gust to it. So there is none at a start from rest (Birch and Dickinson 2003) nor in steady motion,
-    share (w - u) while the wing slows down and share w after the reversal. The memory fades with the chords travelled,
-    so that it lasts through the reversal, where the wing hardly moves.
+    k, in 0 to 1, is the fraction of u that the wake shares: air that the wing has just set in motion is no gust for it.
+    The air is thus at rest at a start from rest (Birch and Dickinson 2003) and in steady motion, moves at share (w - u)
+    while the wing slows down, and at share w after the reversal. The memory decays with the chords travelled, so that
+    it lasts through the reversal, where the wing hardly moves.
     """
     flow, places = scene.flow, scene.stations
     own = np.broadcast_to(scene.angles.flap[:, 1, :, None] * places.r, flow.speed.shape).copy()
@@ -36,10 +36,10 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """The same on strips, across the flapping axis: of y and z the wake's velocity, then the wing's of a moment ago.
+    """As :func:`_meet_wake` for strips; states: y, z of the wake's velocity and of a delayed velocity of the wing.
 
-    The velocity of the wing is not known before the flow; what follows it within _RECENT takes its place. k = w.u / u^2
-    as far as that lies in 0 to 1: w less its part along u, no longer than u.
+    The velocity of the wing is not known before the flow is computed. A state that follows it within _RECENT replaces
+    it. k is w.u / u^2, limited to 0..1.
     """
     port = strip_port(frame)
     for s in range(port.places):

@@ -1,4 +1,4 @@
-"""The zero of the balance drifts: steadily, and as it warms up."""
+"""The zero of the balance drifts steadily, and also while the gauges warm up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Vehicle and balance oscillate on their mount: the resonance distorts the forces."""
+"""Vehicle and balance oscillate on their mount, and the resonance distorts the forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The origin of the cameras' frame lies elsewhere than described."""
+"""The origin of the cameras' frame is not where the description says."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 def distorted(u: Array, v: Array, values: Values) -> tuple[Array, Array]:
     """Image coordinates ``u``, ``v`` [B, n, M] in focal lengths from the principal point, distorted (Brown 1971).
 
-    u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2), and alike with p1 and p2 exchanged for v'.
+    u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2); v' is the same with u and v, and p1 and p2, exchanged.
     """
     k1, k2, p1, p2 = (values[name][:, None, None] for name in ("k1", "k2", "p1", "p2"))
     r2 = u * u + v * v

@@ -1,4 +1,4 @@
-"""A marker sits elsewhere on the wing than described."""
+"""A marker is not at its described place on the wing."""
 
 from __future__ import annotations
 

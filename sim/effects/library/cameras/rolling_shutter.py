@@ -27,10 +27,10 @@ def _observe(sampling: Sampling, values: Values) -> None:
 
 
 def _cameras(sampling: Sampling, span: float) -> Stereo:
-    """A pair as it usually stands, aimed at the middle of the span.
+    """A pair of cameras at its typical position, aimed at the middle of the span.
 
-    Where it stands hardly matters: a read-out of T along the span makes a height wrong by T z v / b, v the speed along
-    the span, whatever the distance between the cameras.
+    The position hardly matters: a read-out of T along the span makes a height wrong by T z v / b, where v is the speed
+    along the span, for any distance between the cameras.
     """
     typical = {place.name: place.typical for place in PLACES}
     wing, distance = sampling.wing, typical["distance"] * span

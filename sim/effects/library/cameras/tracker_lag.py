@@ -1,4 +1,4 @@
-"""The tracker smooths: a Kalman filter of constant acceleration, from frame to frame."""
+"""The tracker, a Kalman filter of constant acceleration, smooths the marker positions from frame to frame."""
 
 from __future__ import annotations
 
@@ -40,9 +40,10 @@ def response(smoothing: Array, angle: Array) -> npt.NDArray[np.complex128]:
 
 
 def apparent_step(times: Array, frequency: float) -> float:
-    """Angle (rad) by which a beat of ``frequency`` (Hz) seems to turn from frame to frame, in [-pi, pi].
+    """Angle (rad) by which a beat of ``frequency`` (Hz) seems to advance from frame to frame, in [-pi, pi].
 
-    Strobed frames are each from another beat: flashed slightly faster than it flaps, a wing seems to go backwards.
+    Each strobed frame is from another beat. If the strobe is slightly faster than the wing, the beat seems to run
+    backwards.
     """
     beats = float(np.median(np.diff(times))) * frequency
     return 2.0 * np.pi * (beats - round(beats))

@@ -1,1 +1,1 @@
-"""Effects of inertia: masses that the description lacks."""
+"""Effects of inertia: masses that the description does not contain."""

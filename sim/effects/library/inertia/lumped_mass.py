@@ -1,4 +1,4 @@
-"""A point mass that the description lacks: a drop of glue, a marker."""
+"""A point mass that the description does not contain, such as a drop of glue or a marker."""
 
 from __future__ import annotations
 

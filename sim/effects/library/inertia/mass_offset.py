@@ -10,7 +10,7 @@ from wingfit.sim.effects.ports.wing import WingScene
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """The mass of every body lies further aft; its inertia about its own centre is what it was (Steiner's theorem)."""
+    """Move the mass of every body aft; its inertia about its own centre stays the same (Steiner's theorem)."""
     aft = np.zeros((3, len(values["distance"])))
     aft[0] = values["distance"]
     across = np.zeros((3, *aft.shape))
@@ -20,7 +20,7 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def _shift_mass(scene: VehicleScene, values: Values) -> None:
-    """-m times the acceleration of -e (sin theta, cos theta): mass is taken as at the axis without it (Eqs. 12-14)."""
+    """Add -m times the acceleration of -e (sin theta, cos theta), e = distance; the model has the mass on the axis."""
     places, (cosine, sine) = scene.stations, scene.wings.turns
     rate, acceleration = scene.angles.pitch[:, 1], scene.angles.pitch[:, 2]
     mass = places.mass * places.weight * scene.setting.vehicle.wing_mass

@@ -1,1 +1,1 @@
-"""Faults of a recording of any kind: its clock and its scale."""
+"""Faults of recordings of any kind, in their clock or their scale."""

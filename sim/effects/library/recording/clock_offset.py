@@ -1,4 +1,4 @@
-"""The recording's clock starts at another instant than described."""
+"""The clock of the recording is offset by a constant time."""
 
 from __future__ import annotations
 

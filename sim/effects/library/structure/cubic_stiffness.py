@@ -1,4 +1,4 @@
-"""Bending stiffness that grows or falls with the bend."""
+"""Bending stiffness that grows or falls as the wing bends further."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ _SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangen
 
 
 def _law(frame: Any, moment: int) -> None:
-    """A potential of s, the sine of the bending, from the axial part of Q.
+    """Moment of a potential V of s, the sine of the bending angle, from the antisymmetric part of Q.
 
-    V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2: cubic for c = 0, else
-    levelling off at k s / (2 c). A relative turning r makes s' = (tr Q - Q) r / 2; the moment is -(tr Q - Q^T) V_s / 2.
+    V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2. This is cubic for
+    c = 0 and otherwise levels off at k s / (2 c). A relative angular rate r gives s' = (tr Q - Q) r / 2, so that the
+    moment is -(tr Q - Q^T) V_s / 2.
     """
     port = connector_port(frame)
     stored = load0(port.stored)
@@ -54,9 +55,9 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def shape(change: Array) -> tuple[Array, Array]:
-    """E and c of the part E (u + c u^2 / 2) / (1 + c u)^2 by which the stiffness changes: ``change`` at u = 1.
+    """E and c of the relative change of stiffness E (u + c u^2 / 2) / (1 + c u)^2, which is ``change`` at u = 1.
 
-    Hardening is cubic. Softening is so at first and levels off at -E / (2 c) = _SOFTEST.
+    Hardening is cubic. Softening starts as a cubic law and levels off at -E / (2 c) = _SOFTEST.
     """
     level = 1.0 / np.sqrt(1.0 - np.maximum(-change, 0.0) / _SOFTEST) - 1.0
     return np.where(change > 0.0, change, -2.0 * _SOFTEST * level), level

@@ -18,10 +18,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def remaining(joints: Joints, values: Values) -> Array:
-    """Part [C, W] of their stiffness that connectors keep; at s of the span 1 - d exp(-((s - s_0) / w)^2 / 2) is left.
+    """Fraction [C, W] of the stiffness that remains in each connector.
 
-    Along the span pieces bear the same load one after the other, so their compliances add; along the chord they stand
-    side by side.
+    At the position s of the span, 1 - loss exp(-((s - station) / width)^2 / 2) remains. Along the span, the pieces of
+    a connector are in series, so that their compliances add; along the chord, they are in parallel.
     """
     s = joints.reach[:, :1] + (np.arange(_POINTS) + 0.5) / _POINTS * np.diff(joints.reach)
     away = (s[:, :, None] - values["station"]) / values["width"]

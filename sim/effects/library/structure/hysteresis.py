@@ -16,7 +16,7 @@ _TINY = 1e-30
 
 
 def _law(frame: Any, moment: int) -> None:
-    """z' = r - beta |r| |z|^(n - 1) z - gamma r |z|^n, z in parts of its largest and beta + gamma = 1; moment -k z."""
+    """z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n, q = z over its largest value, beta + gamma = 1; moment -k z."""
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
     for k in range(2):  # about x and y

@@ -1,4 +1,4 @@
-"""Carbon rods that slip in their straw: dry friction beyond a clearance in which they are loose."""
+"""Carbon rods in straws: loose within a clearance, held by dry friction beyond it."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic mo
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Moment -k h, h being what of w is beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
+    """Moment -k h, where h is the part of w beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
 
-    Dahl's friction: pulled on, rods slip the more the nearer h is to its largest; pulled back, they hold as springs.
-    The last term lets them shake back to where they lie unloaded, at a rate of e per sweep of w_max = play + h_max.
+    This is Dahl's friction: under increasing load, the rods slip more the nearer h is to h_max; under decreasing load,
+    they act as springs. The last term returns them to their unloaded place, by e per sweep of w_max = play + h_max.
     """
     port = connector_port(frame)
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
@@ -60,10 +60,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def of_rods(scene: WingScene) -> Array:
-    """What rods add [C, W] to the bending stiffness of their connectors, N m/rad.
+    """Bending stiffness [C, W] (N m/rad) that the rods add to their connectors.
 
-    All but the stiffness of the foam, whose modulus is determined by stretching along the span. In its plane the wing
-    is too stiff for rods to slip.
+    It is the bending stiffness minus that of the foam, whose modulus follows from the stiffness in stretching along
+    the span. In its plane the wing is too stiff for rods to slip.
     """
     connectors, stiffness = scene.structure.connectors, scene.lanes.stiffness
     found = np.zeros_like(stiffness[:, 0])

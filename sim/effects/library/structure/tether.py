@@ -1,4 +1,4 @@
-"""A spring and a damper between one place of the wing and the ground: a cable, a hose, a thread."""
+"""A spring and a damper between one place of the wing and the ground, such as a cable or a hose."""
 
 from __future__ import annotations
 

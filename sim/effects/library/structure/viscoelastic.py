@@ -1,4 +1,4 @@
-"""Foam that relaxes: a standard linear solid, whose second spring stands behind a dashpot."""
+"""Foam that relaxes, as a standard linear solid: its second spring is in series with a dashpot."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Bending and torsion only: in its plane and across its sections the wing hardly strains."""
+    """Acts on bending and torsion only, because the wing hardly strains in its plane and within its sections."""
     spring = Joints.of(scene.structure).out_of_plane(scene.lanes.stiffness * values["k"])
     scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
 
