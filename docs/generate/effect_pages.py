@@ -27,14 +27,14 @@ _PORTS: dict[Port, str] = {
     "air": "the air around the wing",
 }
 _RIGS: dict[RigKind, str] = {
-    "wing": "the wing of the Robird, a robotic bird",
-    "vehicle": "the DelFly, a vehicle with four wings",
+    "wing": "the wing of the Robird (a robotic bird)",
+    "vehicle": "the DelFly (a vehicle with four wings)",
 }
 _DETAILS = "../effects.md#figures"
 _POWERS = {
     "conservative": "The law of the effect conserves energy: over a beat, it neither adds nor removes any.",
     "dissipative": "The law of the effect dissipates energy and never generates any.",
-    "any": "The law is declared neither conservative nor dissipative: the sign of its energy is not fixed.",
+    "any": "The law is declared neither conservative nor dissipative: whether it adds or removes energy is not fixed.",
 }
 _KINDS = {
     "size": "The effect is off where every gene of the kind *size* is zero.",
