@@ -63,7 +63,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"], sine, cosine, hinge])
 
 
-_TEXT = "circulation while the wings peel, in units of c^2 (-theta') / 2; C_F + C_R of the source"
+_TEXT = "circulation while the wings peel, in units of c^2 (-theta') / 2 (C_F + C_R in Armanini et al. 2016)"
 
 EFFECT = effect_of_air(
     name="clap_and_peel",
