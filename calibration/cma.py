@@ -12,12 +12,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from deap import cma
 
 from wingfit.calibration.genetic import FAILED, Individual, finite, reflected
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 SIGMA = 0.2  # unit coordinates: the start is an estimate, and the truth some tenths of the box away
 

@@ -14,10 +14,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from deap import base, tools
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 _LOCK = threading.Lock()
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.uncertainty import Standing, standing
@@ -16,6 +15,7 @@ from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.inference.noise.harmonic import noise_distance
 from wingfit.records import Dataset, Gene, Genome
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
@@ -85,10 +85,10 @@ class Comparison:
     """
 
     recording: str
-    phase: npt.NDArray[np.float64]
+    phase: Array
     markers: tuple[str, ...]
-    recorded: npt.NDArray[np.float64]
-    simulated: npt.NDArray[np.float64]
+    recorded: Array
+    simulated: Array
     accuracy: float
     solution: Solution
 

@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
+from wingfit.records.array_types import Array
 
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
@@ -319,6 +318,6 @@ class Finding:
     versions: dict[str, str] = field(default_factory=dict)
 
 
-def table(values: npt.NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+def table(values: Array) -> tuple[tuple[float, ...], ...]:
     """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

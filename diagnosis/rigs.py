@@ -9,13 +9,13 @@ from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import sizes
 from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.subject import ChannelLocation, Subject, Suspect
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
+from wingfit.records.array_types import Array
 from wingfit.records.dataset import ForceAxis
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.probe import Probe
@@ -28,8 +28,6 @@ from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.planform import Planform
 from wingfit.sim.wing.probing import Probed, probed
-
-Array = npt.NDArray[np.float64]
 
 MAX_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
 MAX_ELEMENTS = 640

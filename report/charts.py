@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
 from wingfit.report.svg import SERIES, Axis, axis, band, curve, dots, drawing, legend, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
-Values = Sequence[float] | npt.NDArray[np.float64]
+Values = Sequence[float] | Array
 DECADES = 8  # shown of a logarithmic axis: smaller values are rounding errors
 
 

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import is_size
 from wingfit.calibration.estimates.linearised import (
@@ -31,9 +30,8 @@ from wingfit.calibration.problem import Problem
 from wingfit.inference.gauss_newton import Quadratic, Trials
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
 
 # Dampings tried at once, times the last good one: two groups of lanes. Close to it they lie densely, because valleys of
 # stiffnesses that compensate each other bend: a damping three times too small leaves them, one three times too large

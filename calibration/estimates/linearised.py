@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.inference.differences import STEP, Differences, Outputs, differences
 from wingfit.records import Gene
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Index, Mask
 
 AT_BOUND = 1e-6  # in unit coordinates
 SHORTER = 0.125  # of the step, where both neighbours fail
@@ -38,7 +36,7 @@ class Linearised:
 
     residuals: tuple[Array, ...]
     sensitivities: tuple[Array, ...]
-    known: npt.NDArray[np.bool_]
+    known: Mask
     fitness: float
     distance: float
     evaluations: int
@@ -61,7 +59,7 @@ def unit_at(genes: list[Gene], values: Array) -> Array:
     return np.clip([float(gene.to_unit(value)) for gene, value in zip(genes, values, strict=True)], 0.0, 1.0)
 
 
-def stopped(genes: list[Gene], values: Array) -> npt.NDArray[np.bool_]:
+def stopped(genes: list[Gene], values: Array) -> Mask:
     """[F], True where a value lies at a bound of its gene."""
     unit = unit_at(genes, values)
     return np.asarray((unit < AT_BOUND) | (unit > 1 - AT_BOUND))
@@ -104,7 +102,7 @@ def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised
     )
 
 
-def _replaced(first: Differences, columns: npt.NDArray[np.int64], again: Differences) -> Differences:
+def _replaced(first: Differences, columns: Index, again: Differences) -> Differences:
     """``first`` with the ``columns`` that were differentiated again."""
     known = first.known.copy()
     known[columns] = again.known

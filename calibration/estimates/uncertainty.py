@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, stopped, unit_at
 from wingfit.calibration.estimates.remarks import remarks
@@ -22,9 +21,8 @@ from wingfit.inference.noise.between_beats import (
 from wingfit.inference.noise.coloured import Block, score_covariances
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene, Genome, Recording
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
 
 IDENTIFIABLE = 0.075  # relative standard error: a 95 % interval within 15 %
 PRIOR = 0.5  # standard deviation of the box as a prior, in unit coordinates: its half width
@@ -63,7 +61,7 @@ class Uncertainty:
     values: Array
     covariance: Array
     relative: Array
-    known: npt.NDArray[np.bool_]
+    known: Mask
     noise: tuple[Array, ...]
     cost: float
     remarks: tuple[str, ...]
@@ -166,7 +164,7 @@ class _Part:
     record: Recording
     white: Array
     sensitivity: Array
-    seen: npt.NDArray[np.bool_]
+    seen: Mask
     scores: Array
     used: float
 
@@ -212,9 +210,7 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
     return total
 
 
-def _remarks(
-    genes: list[Gene], relative: Array, known: npt.NDArray[np.bool_], free: npt.NDArray[np.bool_]
-) -> tuple[str, ...]:
+def _remarks(genes: list[Gene], relative: Array, known: Mask, free: Mask) -> tuple[str, ...]:
     """Remarks on the genes that are not at a bound."""
     (kept,) = np.nonzero(free)
     return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], known[kept], IDENTIFIABLE)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import absent, is_measured
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
@@ -33,10 +32,9 @@ from wingfit.calibration.search import found as found_by_stage
 from wingfit.calibration.spec import CalibrationSpec, resolved, vehicle_model
 from wingfit.inference.noise.between_beats import FEWEST_MEAN, without_mean_beat
 from wingfit.records import Condition, Dataset, Genome, Recording
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -258,7 +256,7 @@ def _compare(
     return _Compared(recording, found, rms, int(fitted.sum()), _scatter(recording, fitted))
 
 
-def _scatter(recording: Recording, fitted: npt.NDArray[np.bool_]) -> float | None:
+def _scatter(recording: Recording, fitted: Mask) -> float | None:
     beats = len(Cut.of(recording).gapless)
     if beats < FEWEST_MEAN or not fitted.any():
         return None

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from wingfit.calibration.forces.result import GlobalGene, GlobalModel, LocalEstimate
 from wingfit.records import Condition
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.atmosphere import density
-
-Array = npt.NDArray[np.float64]
 
 AFFINE = ("C_l", "C_F")
 FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
@@ -178,9 +176,7 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
     return float(brentq(surplus, 0.0, above, xtol=1e-12 * above))
 
 
-def _left_out(
-    k: int, design: Array, local: Array, errors: Array, identified: npt.NDArray[np.bool_], weighted: bool
-) -> float | None:
+def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Mask, weighted: bool) -> float | None:
     """Relative error at condition ``k`` of the law fitted without it; None where the rest determines no law."""
     rest = identified.copy()
     rest[k] = False

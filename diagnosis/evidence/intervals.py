@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import GeneValue, Interval
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 CONFIDENCE = 0.9
 

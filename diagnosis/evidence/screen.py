@@ -11,18 +11,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Subject, Suspect
+from wingfit.diagnosis.subject import Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes
@@ -88,39 +86,39 @@ def off_units(suspect: Suspect) -> Array:
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
 
 
+def typical_units(suspect: Suspect) -> Array:
+    """Genes [E] in unit coordinates with the suspect at its typical size and location."""
+    return unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+
+
 def size_columns(suspect: Suspect) -> list[int]:
     """Columns of the suspect's size genes."""
     return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]
 
 
 def score_tests(
-    subject: Subject,
-    data: WhitenedData,
-    nominal: Fit,
-    evaluator: Evaluator,
-    suspects: Sequence[Suspect],
-    known: Sequence[str] = (),
+    context: FitContext, nominal: Fit, suspects: Sequence[Suspect], known: Sequence[str] = ()
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
     """Test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
 
     ``nominal`` is the nominal fit, or a fit with the suspects ``known`` added; all its genes may adapt.
     """
-    nuisance = Nuisance(data, nominal)
+    nuisance = Nuisance(context.data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
-        genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
-        model = subject.with_initial_motion(subject.extended([*known, suspect.name]), genome)
+        model = context.subject.extended([*known, suspect.name])
+        model = context.subject.with_initial_motion(model, nominal.genome)
         free = tuple(gene.name for gene in suspect.genes)
-        problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
-        yield suspect, _suspect_trials(data, problem, nominal, evaluator, suspect, nuisance)
+        problem = context.problem(model, free, base_genome(model, values))
+        yield suspect, _suspect_trials(context, problem, nominal, suspect, nuisance)
 
 
 def _suspect_trials(
-    data: WhitenedData, problem: Problem, nominal: Fit, evaluator: Evaluator, suspect: Suspect, nuisance: Nuisance
+    context: FitContext, problem: Problem, nominal: Fit, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
     groups = list(_genes_to_try(suspect))
     units = np.concatenate(groups)
-    found, reasons, _ = data.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    found, reasons, _ = context.evaluate(problem, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
     trials, row = [], 0
@@ -153,8 +151,7 @@ def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
     for row, unit in enumerate(genes):
         column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
         move = unit[column] - off[column]
-        ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
-        low[row], high[row] = ends
+        low[row], high[row] = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
     return low, high
 
 
@@ -169,8 +166,7 @@ def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
 
 def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
     """Genes [S, E] in unit coordinates, one row for each size, at one location and shape."""
-    off, size = off_units(suspect), size_columns(suspect)
-    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    off, typical, size = off_units(suspect), typical_units(suspect), size_columns(suspect)
     shape = [k for k in range(len(off)) if k not in size]
     for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):

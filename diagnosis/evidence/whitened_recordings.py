@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
@@ -16,8 +15,7 @@ from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 
 @dataclass(frozen=True)

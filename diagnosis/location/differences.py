@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Exponent, Interval, Where
 from wingfit.diagnosis.location.maps import PHASES, RecordingResidual, harmonics
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.atmosphere import density
-
-Array = npt.NDArray[np.float64]
 
 EXTENT_QUANTILES = (0.05, 0.95)  # of the excess: ends of the reported extent
 MIN_PHASE_CONCENTRATION = 0.35  # length of the mean phase vector from which a misfit has a phase

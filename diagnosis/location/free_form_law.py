@@ -13,16 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import FreeLaw, Interval, Term
-from wingfit.diagnosis.location.law_features import Candidate, Motion, candidates
+from wingfit.diagnosis.location.law_features import Candidate, candidates
 from wingfit.diagnosis.location.missing_load import GENE_ERROR_SD, Case
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+from wingfit.sim.wing.probing import StationMotion
 
 MAX_TERMS = 3  # of a law
 MIN_GAIN = 0.02  # of the excess of left-out recordings that a term must explain
@@ -50,7 +48,7 @@ class _NormalEquations:
         kept = np.arange(len(self.power)) != remaining
         return _NormalEquations(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
-    def fit(self, terms: Index, which: npt.NDArray[np.bool_]) -> Array:
+    def fit(self, terms: Index, which: Mask) -> Array:
         """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
         matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
         ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
@@ -76,7 +74,7 @@ class _NormalEquations:
         return max(float((self.power - self.count).sum()), 1e-9)
 
 
-def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> FreeLaw | None:
+def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[StationMotion]) -> FreeLaw | None:
     """The law of the missing load of ``cases``, from the ``motions`` of the nominal model at the stations of ``probe``.
 
     None for fewer than three recordings, or without a misfit beyond the noise. A law without terms means that none
@@ -97,7 +95,7 @@ def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> 
 
 
 def _sums(
-    cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]
+    cases: Sequence[Case], probe: Probe, motions: Sequence[StationMotion], dictionary: Sequence[Candidate]
 ) -> _NormalEquations:
     M, F = len(dictionary), cases[0].sensitivities.shape[1]
     loads = [
@@ -128,7 +126,7 @@ def _products(case: Case, loads: Array) -> Array:
     return np.asarray(shown.T @ (both.T @ both) @ shown)
 
 
-def _probe_sizes(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
+def _probe_sizes(probe: Probe, crossing: float, motion: StationMotion, dictionary: Sequence[Candidate]) -> Array:
     """Sizes of the probe's unit forces [P, M] that best reproduce each candidate load."""
     series = np.linalg.pinv(probe.terms(motion.phase + crossing))
     hats = np.linalg.pinv(probe.hats(motion.stations))

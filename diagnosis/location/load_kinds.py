@@ -7,11 +7,9 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
 
 _LENGTHS = (0.25, 0.5)  # of the span: correlation lengths of smooth loads
 _CENTRES = np.linspace(0.0, 1.0, 41)  # of localised loads along the span (0 to 1)

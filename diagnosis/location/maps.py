@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
 from wingfit.diagnosis.subject import ChannelLocation, Subject
 from wingfit.inference.noise.harmonic import HarmonicFit
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 PHASES = 72  # instants of a beat in maps
 BANDS = 6  # along the span

@@ -15,13 +15,11 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.finding import Interval, MissingLoad, table
 from wingfit.diagnosis.location.load_kinds import LoadForm, drive_errors, localised, smooth, spreads
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
 
 PHASES = 36  # instants of a beat at which loads are reported
 GENE_ERROR_SD = 0.3  # standard deviation of the nominal genes' errors, unit coordinates
@@ -57,7 +55,7 @@ class Case:
     crossing: float
 
 
-def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
+def whitened(values: Array, place: Index, lag1: float) -> Array:
     """Whiten rows [n, ...] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
     if not len(values):
         return values
@@ -339,7 +337,7 @@ def _with_interval(value: float | None, draws: Interval) -> Interval:
 def _posterior_draws(
     inferred: InferredLoads,
     kind: LoadKind,
-    shown: npt.NDArray[np.int64],
+    shown: Index,
     phase: Array,
     count: int,
     rng: np.random.Generator,

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import FreeLaw, Interval, MissingLoad, table
@@ -23,10 +23,9 @@ from wingfit.diagnosis.location.missing_load import (
     whitened,
 )
 from wingfit.diagnosis.subject import Subject
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import Probed, StationMotion
-
-Array = npt.NDArray[np.float64]
 
 PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 MAX_INERTIA_RATIO = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
@@ -81,11 +80,10 @@ def load_estimates(
 ) -> Iterator[tuple[str, LoadEstimate | None]]:
     """The load that each of the fitted ``models`` is missing; yields the name of each recording before it is probed."""
     for subject, nominal in models:
-        fit = nominal.fit
-        genome, found = fit.problem.genomes(np.array(list(fit.values.values())))[0], []
+        found = []
         for r in which:
             yield data.recordings[r].name, None
-            found.append((r, subject.probe_responses(genome, data.recordings[r], PROBE)))
+            found.append((r, subject.probe_responses(nominal.fit.genome, data.recordings[r], PROBE)))
         known = [(r, one) for r, one in found if one is not None]
         if known:
             cases = tuple(_case(data, nominal, r, one) for r, one in known)
@@ -131,13 +129,14 @@ def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
     )
 
 
-def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tuple[MissingLoad, ...]:
+def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ...]:
     """For recordings of forces, the missing force along the axis with the largest residual."""
-    found = []
+    data, found = context.data, []
     for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
         power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
         column = int(np.argmax(power))
-        phase = recording.condition.flap_frequency * recording.times - subject.beat_start_phase(recording) / (2 * np.pi)
+        origin = context.subject.beat_start_phase(recording) / (2 * np.pi)
+        phase = recording.condition.flap_frequency * recording.times - origin
         noise = max(float(beat_fit.noise[column]), data.tolerance)
         lag1 = float(np.clip(beat_fit.lag1, 0.0, 0.99))
         found.append(missing_force(recording.name, residuals[:, column], phase, noise, lag1))

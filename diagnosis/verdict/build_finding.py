@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
@@ -32,36 +31,33 @@ from wingfit.diagnosis.verdict.verdict import Decision, all_genes, decide, hypot
 from wingfit.inference.noise.harmonic import still_markers
 from wingfit.records import Recording
 
-Array = npt.NDArray[np.float64]
 Step = tuple[float, str, Finding | None]
 
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
-def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], evaluator: Evaluator) -> Iterator[Step]:
+def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) -> Iterator[Step]:
     """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last."""
-    if state.nominal is None or state.weights is None:
-        raise ValueError("a finding needs a search that has ended")
-    decision = decide(state.weights)
-    best = state.nominal.refit if decision.verdict == "adequate" else decision.best
+    nominal, weights = state.fitted_nominal.refit, state.final_weights
+    decision = decide(weights)
+    best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
-    best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
+    best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    validation, failed = predict_held_out(held_out, state.data, evaluator, state.nominal.refit.fit, best.fit)
+    validation, failed = predict_held_out(held_out, state.context, nominal.fit, best.fit)
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
-        unnamed = decision.verdict == "unnamed"
-        for fraction, stage, located in _locate(state, evaluator, unnamed=unnamed):
+        for fraction, stage, located in _locate(state, unnamed=decision.verdict == "unnamed"):
             missing = located
             yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
     if decision.verdict != "adequate":
         apart = []
-        for part, one in separations(state.subject, state.data, state.weights, evaluator):
+        for part, one in separations(state.context, weights):
             apart += [one] if one else []
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
-        advice = rank_conditions(state.data, state.weights, apart)
-    location = _where(state, decision, best, missing, evaluator)
+        advice = rank_conditions(state.data, weights, apart)
+    location = _where(state, decision, best, missing)
     found = _finding(state, name, decision, best, validation, missing, advice, location)
     yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
 
@@ -72,19 +68,19 @@ def _is_load(decision: Decision, best: Refit) -> bool:
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
-def _locate(state: SearchState, evaluator: Evaluator, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
+def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
     """Locate the missing physics recording by recording; where it is ``unnamed``, also with a finer model and a law."""
     data, nominal = state.data, state.fitted_nominal.refit
     if data.recordings[0].kind == "forces":
-        when = locate_pulse(state.subject, data, nominal.fit) if unnamed else None
-        loads = missing_forces(state.subject, data, nominal)
+        when = locate_pulse(state.context, nominal.fit) if unnamed else None
+        loads = missing_forces(state.context, nominal)
         yield 1.0, "locating the missing force", MissingPhysics(loads, pulse=when)
         return
     models, which = [(state.subject, nominal)], largest_residuals(data, nominal)
-    for finer in state.subject.finer_subjects()[:1] if unnamed else ():
-        yield 0.0, f"fitting a {finer.description}", MissingPhysics()
-        fitted = refit_at(finer, data, evaluator, nominal)
-        models += [(finer, fitted)] if fitted is not None else []
+    for finer in islice(state.context.finer(), int(unnamed)):
+        yield 0.0, f"fitting a {finer.subject.description}", MissingPhysics()
+        fitted = refit_at(finer, nominal)
+        models += [(finer.subject, fitted)] if fitted is not None else []
     found = []
     for k, (name, guess) in enumerate(load_estimates(models, data, which)):
         yield k / ((len(which) + 1.0) * len(models)), f"probing the wing under {name}", MissingPhysics()
@@ -92,11 +88,11 @@ def _locate(state: SearchState, evaluator: Evaluator, *, unnamed: bool) -> Itera
     yield 1.0, "locating the missing physics", missing_physics(found, law=unnamed)
 
 
-def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics, evaluator: Evaluator) -> Where:
+def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
     """Where the misfit lies; for a named effect, where the effect acts: a fit spreads a misfit over the beat."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        acts = contribution(data, evaluator, best)
+        acts = contribution(state.context, best)
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
     shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
@@ -104,14 +100,12 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     span = _effect_location(shown_refit, own, "span") or missing.span
     chord = _effect_location(shown_refit, own, "chord") or missing.chord
     phase = missing.phase if decision.verdict != "measurement fault" else None
-    return Where(
-        found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
-        span or found.span,
-        chord or found.chord,
-        phase or found.phase,
-        found.axis,
-        found.harmonics,
-        found.exponents,
+    return replace(
+        found,
+        words=found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
+        span=span or found.span,
+        chord=chord or found.chord,
+        phase=phase or found.phase,
     )
 
 
@@ -131,10 +125,8 @@ def _finding(
     advice: tuple[Advice, ...],
     location: Where,
 ) -> Finding:
-    subject, data, weights = state.subject, state.data, state.weights
-    if state.nominal is None or weights is None:
-        raise ValueError("a finding needs a search that has ended")
-    nominal, discretisation = state.nominal.refit, _discretisation_error(state)
+    subject, data, weights = state.subject, state.data, state.final_weights
+    nominal, discretisation = state.fitted_nominal.refit, _discretisation_error(state)
     own = ResidualPair(data, nominal.fit.residuals, best.fit.residuals)
     rows = recording_misfits(own, held_out=False, floor=discretisation)
     shown = list(maps.overlays(subject, data, own.before, own.after, held_out=False))
@@ -174,8 +166,8 @@ def _finding(
         advice=advice,
         outline=subject.outline,
         remarks=(
-            *state.nominal.remarks,
-            *_refinement_remarks(state.nominal),
+            *state.fitted_nominal.remarks,
+            *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
@@ -189,9 +181,9 @@ def _discretisation_error(state: SearchState) -> float:
     Zero where a finer discretisation fits no better.
     """
     nominal = state.fitted_nominal
-    if state.weights is None or nominal.discretisation_error is None or nominal.tried_finer:
+    if nominal.discretisation_error is None or nominal.tried_finer:
         return 0.0
-    least = min(one.excess for one in state.weights.refits)
+    least = min(one.excess for one in state.final_weights.refits)
     return min(nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
 
 

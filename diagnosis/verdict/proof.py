@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Mask
 
 BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
 MIN_MARKERS = 4  # for a bootstrap over markers
@@ -36,19 +33,20 @@ class ResidualPair:
 
 
 def predict_held_out(
-    recordings: Sequence[Recording], fitted: WhitenedData, evaluator: Evaluator, before: Fit, after: Fit
+    recordings: Sequence[Recording], context: FitContext, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
-    ``fitted`` are the data of the fits, whose force axes and thresholds are used here too. None where no recording can
-    be simulated with both models.
+    ``context`` is that of the fits, whose force axes and thresholds are used here too. None where no recording can be
+    simulated with both models.
     """
+    fitted = context.data
     kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
         one, found, reasons = WhitenedData.of([recording], fitted.axes, fitted.policy), [], []
         for fit in (before, after):
-            problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, fitted.axes)
-            _, (reason,), (residuals,) = one.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+            problem = replace(fit.problem, recordings=one.recordings)
+            _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, fit.individual)
             found.append(residuals[0])
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
@@ -61,9 +59,8 @@ def predict_held_out(
     if not kept:
         return None, tuple(failed)
     before_all, after_all = zip(*pairs, strict=True)
-    return ResidualPair(WhitenedData.of(kept, fitted.axes, fitted.policy), before_all, after_all, incomplete), tuple(
-        failed
-    )
+    data = WhitenedData.of(kept, fitted.axes, fitted.policy)
+    return ResidualPair(data, before_all, after_all, incomplete), tuple(failed)
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
@@ -116,9 +113,7 @@ def _relative_to_floor(interval: Interval, floor: float) -> Interval:
     return Interval(interval.value / floor, low and low / floor, high and high / floor)
 
 
-def _misfits(
-    predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
-) -> tuple[Interval, Interval, bool]:
+def _misfits(predicted: ResidualPair, used: Sequence[Mask], kinds: Sequence[str]) -> tuple[Interval, Interval, bool]:
     """Root mean squares before and after with intervals, and whether the decrease is significant."""
     groups: list[Array] = []
     for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
@@ -140,7 +135,7 @@ def _misfits(
     return found[0], found[1], bool(np.mean(rms[1] < rms[0]) >= 0.5 + CONFIDENCE / 2)
 
 
-def _time_blocks(predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+def _time_blocks(predicted: ResidualPair, used: Sequence[Mask], count: int = 12) -> Array:
     """Sums of squares before and after and counts [3, N] over blocks of time."""
     rows = []
     for before, after, own in zip(predicted.before, predicted.after, used, strict=True):
