@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
@@ -318,6 +318,6 @@ class Finding:
     versions: dict[str, str] = field(default_factory=dict)
 
 
-def table(values: Array) -> tuple[tuple[float, ...], ...]:
+def table(values: Float[Array, "N M"]) -> Table:
     """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

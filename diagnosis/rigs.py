@@ -15,7 +15,7 @@ from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.subject import ChannelLocation, Subject, Suspect
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.probe import Probe
@@ -81,7 +81,7 @@ class WingSubject:
         """The nominal model with suspects added, switched off."""
         return self.model.with_effects(*names)
 
-    def with_initial_motion(self, model: Model, genome: Array) -> Model:
+    def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:
         """The wing's search for the periodic motion starts from that of ``genome``, without its effects."""
         return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
@@ -115,7 +115,7 @@ class WingSubject:
         """Phase (rad) at which the reference markers rise through the height of the hinge."""
         return recorded_crossing(self.model.wing, recording)
 
-    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+    def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
         """Tracks of all markers under ``condition``, at the phases of the recording of the most similar condition."""
         blank = _empty_recording(
             self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers)
@@ -123,7 +123,7 @@ class WingSubject:
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
-    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+    def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> Probed | None:
         """Responses of the tracks to unit loads; None where the wing cannot be simulated with them."""
         try:
             return probed(self.model, genome, recording, probe)
@@ -169,7 +169,7 @@ class VehicleSubject:
         """The nominal model with suspects added, switched off."""
         return self.model.with_effects(*names)
 
-    def with_initial_motion(self, model: Model, genome: Array) -> Model:  # noqa: ARG002  # part of the protocol
+    def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:  # noqa: ARG002  # part of the protocol
         """Return ``model``: its motion is prescribed."""
         return model
 
@@ -200,7 +200,7 @@ class VehicleSubject:
         """Zero: times of forces count from the start of a beat."""
         return 0.0
 
-    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
+    def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
         """Forces along both axes under ``condition``, at the phases of the recording of the most similar condition.
 
         Low-passed as they would be fitted.
@@ -210,7 +210,7 @@ class VehicleSubject:
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
-    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> None:
+    def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> None:
         """None: recordings of forces show the missing force directly."""
 
     def candidate_conditions(self) -> tuple[Condition, ...]:

@@ -14,7 +14,7 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial, size_columns, typical_units
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 MAX_STEPS = 14  # of a fit
 FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
@@ -26,7 +26,7 @@ class StartPoint:
     """The nominal model with the suspects of ``trials``, their genes at ``unit`` [E] in unit coordinates."""
 
     trials: tuple[Trial, ...]
-    unit: Array
+    unit: Float[Array, " E"]
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
 from wingfit.records import Genome
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.model import Model
 
 
@@ -30,6 +30,8 @@ class FitContext:
         """The genes ``free`` of ``model`` against all recordings; the other genes keep their value in ``base``."""
         return Problem(model, self.data.recordings, free, base, self.data.axes)
 
-    def evaluate(self, problem: Problem, values: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
+    def evaluate(
+        self, problem: Problem, values: Float[Array, "B F"]
+    ) -> tuple[Float[Array, "B D"], tuple[str | None, ...], list[Array]]:
         """Coefficients of the residuals, reasons of failures, and residuals; see :meth:`WhitenedData.evaluate`."""
         return self.data.evaluate(problem, self.evaluator, values)

@@ -18,7 +18,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.differences import Outputs, differences
 from wingfit.inference.gauss_newton import Quadratic, Trials
-from wingfit.records.array_types import Array, Mask
+from wingfit.records.array_types import Array, Bool, Float, Mask
 
 PRIOR_SD = 0.5  # standard deviation of a gene's prior, unit coordinates
 # Dampings tried at once, a group of lanes. Relative to each gene's own curvature (Marquardt 1963), about the last good
@@ -61,18 +61,18 @@ class Fit:
     """
 
     problem: Problem
-    unit: Array
-    coefficients: Array
-    jacobian: Array
+    unit: Float[Array, " F"]
+    coefficients: Float[Array, " D"]
+    jacobian: Float[Array, "D F"]
     residuals: tuple[Array, ...]
     cost: float
-    motion_genes: Array
+    motion_genes: Float[Array, " F"]
     damping: float = FIRST_DAMPING
     jacobian_measured: bool = False
     converged: bool = False
 
     @property
-    def individual(self) -> Array:
+    def individual(self) -> Float[Array, "1 F"]:
         """Values [1, F] of the free genes, a batch of one individual."""
         return values_at(free_genes(self.problem), self.unit[None])
 
@@ -82,7 +82,7 @@ class Fit:
         return dict(zip(self.problem.free, self.individual[0].tolist(), strict=True))
 
     @property
-    def genome(self) -> Array:
+    def genome(self) -> Float[Array, " G"]:
         """Values [G] of all genes of the model."""
         return np.asarray(self.problem.genomes(self.individual)[0])
 
@@ -90,10 +90,10 @@ class Fit:
 def broyden_fit(
     context: FitContext,
     problem: Problem,
-    start: Array,
-    jacobian: Array | None = None,
+    start: Float[Array, " F"],
+    jacobian: Float[Array, "D F"] | None = None,
     *,
-    known: Mask | None = None,
+    known: Bool[Mask, " F"] | None = None,
     steps: int = 8,
 ) -> Fit:
     """Fit the free genes from ``start`` [F] with Broyden updates; InitialSimulationError where it cannot be simulated.
@@ -125,7 +125,7 @@ def broyden_fit(
     return now
 
 
-def gauss_newton_fit(context: FitContext, problem: Problem, start: Array, steps: int) -> Iterator[Fit]:
+def gauss_newton_fit(context: FitContext, problem: Problem, start: Float[Array, " F"], steps: int) -> Iterator[Fit]:
     """Fit with the Jacobian measured at every step and at the end; yields every step, the final fit last.
 
     Differences are one-sided until steps gain little. Then they are central, and steps include geodesic acceleration

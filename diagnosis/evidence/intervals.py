@@ -11,7 +11,7 @@ from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import GeneValue, Interval
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 CONFIDENCE = 0.9
 
@@ -21,7 +21,7 @@ def standard_errors(freedom: float = np.inf) -> float:
     return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
-def covariance(data: WhitenedData, fit: Fit) -> Array:
+def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
     """Covariance [F, F] of the genes in unit coordinates.
 
     It includes noise; the model error as a few independent samples (:meth:`WhitenedData.likelihood_weight`), no smaller

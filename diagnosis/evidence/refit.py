@@ -22,7 +22,7 @@ from wingfit.diagnosis.evidence.fit import (
 from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.score_test import explained
-from wingfit.records.array_types import Array, Mask
+from wingfit.records.array_types import Array, Float, Mask
 
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
@@ -106,47 +106,46 @@ def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base:
     for part in 0.5 ** np.arange(MAX_HALVINGS):
         start = np.concatenate([before.unit, *(_scaled_start(trial, part) for trial in added)])
         try:
-            fit = _fit_added_genes(context, problem, start, before)
+            fit = _fit_added_genes(context, problem, start, before.jacobian)
         except FIT_ERRORS:
             continue
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.size_genes for gene, trial in genes])
         diverged = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
         if len(trials) == 1 and diverged and not sizes.all():
             with suppress(*FIT_ERRORS):
-                first = _fit_subset(context, problem, start, before, sizes)
-                first = _fit_added_genes(context, problem, first.unit, first)
+                first = _fit_added_genes(context, problem, *_fit_subset(context, problem, start, before, sizes))
                 fit = min((fit, first), key=lambda one: one.cost)
         return make_refit(data, fit, trials)
     return None
 
 
-def _fit_added_genes(context: FitContext, problem: Problem, start: Array, before: Fit) -> Fit:
-    """Fit all genes of ``problem``; the first columns of the Jacobian are those of ``before``."""
-    known = np.arange(len(start)) < before.jacobian.shape[1]
-    jacobian = np.zeros((len(before.jacobian), len(start)))
-    jacobian[:, known] = before.jacobian[:, : known.sum()]
+def _fit_added_genes(context: FitContext, problem: Problem, start: Array, first_columns: Array) -> Fit:
+    """Fit all genes of ``problem`` from ``start`` [F]; ``first_columns`` [D, K] of the Jacobian are known."""
+    known = np.arange(len(start)) < first_columns.shape[1]
+    jacobian = np.zeros((len(first_columns), len(start)))
+    jacobian[:, known] = first_columns[:, : known.sum()]
     return broyden_fit(context, problem, start, jacobian, known=known, steps=REFIT_STEPS)
 
 
-def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit, which: Mask) -> Fit:
-    """Fit the genes ``which`` [F] of ``problem`` only; the others stay at ``start``, with zero slopes.
+def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit, which: Mask) -> tuple[Array, Array]:
+    """Fit the genes ``which`` [F] of ``problem`` only, because shape genes that move before the size may diverge.
 
-    Shape genes that move before the size is known may diverge.
+    Returns all genes [F], the others at ``start``, and the columns of the Jacobian that ``before`` has, [D, K].
     """
     genes = free_genes(problem)
     base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
     free = tuple(name for name, one in zip(problem.free, which, strict=True) if one)
-    found = _fit_added_genes(context, replace(problem, free=free, base=base), start[which], before)
+    found = _fit_added_genes(context, replace(problem, free=free, base=base), start[which], before.jacobian)
     unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
     unit[which], jacobian[:, which] = found.unit, found.jacobian
-    return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
+    return unit, jacobian[:, : len(before.unit)]
 
 
 def refit_at(finer: FitContext, refit: Refit) -> Refit | None:
     """``refit`` fitted with a ``finer`` model from its current genes; None where that cannot be simulated."""
     problem = replace(refit.fit.problem, model=finer.subject.extended(refit.names))
     try:
-        fit = _fit_added_genes(finer, problem, refit.fit.unit, refit.fit)
+        fit = _fit_added_genes(finer, problem, refit.fit.unit, refit.fit.jacobian)
     except FIT_ERRORS:
         return None
     return make_refit(finer.data, fit, refit.trials)
@@ -173,7 +172,7 @@ def fit_to_convergence(context: FitContext, refit: Refit) -> Refit:
     return make_refit(context.data, with_measured_jacobian(context, refit.fit), refit.trials)
 
 
-def restart_fit(context: FitContext, refit: Refit, start: Array) -> Refit | None:
+def restart_fit(context: FitContext, refit: Refit, start: Float[Array, " F"]) -> Refit | None:
     """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
     try:
         fit = broyden_fit(context, refit.fit.problem, start, steps=REFIT_STEPS)
@@ -197,7 +196,7 @@ def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]
     return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names) if gain > least_gain]
 
 
-def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
+def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()) -> Float[Array, " D"] | None:
     """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
 
     All other genes stay the same. None where that cannot be simulated.
@@ -218,7 +217,8 @@ def substitute_trials(
         return []
     own = {gene.name for gene in trial.suspect.genes}
     kept = np.array([name not in own for name in refit.fit.problem.free])
-    others = replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept])
+    fit = refit.fit
+    others = replace(fit, unit=fit.unit[kept], jacobian=fit.jacobian[:, kept], motion_genes=fit.motion_genes[kept])
     nuisance = Nuisance(context.data, others)
     done = nuisance.project_out(change)
     least_gain = context.data.policy.substitute * float(done @ done)

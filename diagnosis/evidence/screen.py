@@ -20,7 +20,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes
@@ -42,15 +42,15 @@ class Trial:
     """
 
     suspect: Suspect
-    unit: Array
-    changes: Array
+    unit: Float[Array, "S E"]
+    changes: Float[Array, "S D"]
     gain: float
-    multiples: Array
+    multiples: Float[Array, " S"]
     freedom: int
     remaining_chi_squared: float
 
     @property
-    def start(self) -> Array:
+    def start(self) -> Float[Array, " E"]:
         """Genes [E] of the suspect in unit coordinates, at the fitted sizes."""
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
@@ -73,7 +73,7 @@ class Nuisance:
         self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
         self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
-    def project_out(self, changes: Array) -> Array:
+    def project_out(self, changes: Float[Array, "*B D"]) -> Float[Array, "*B N"]:
         """Whitened ``changes`` [..., D] of harmonic coefficients, minus the part that the F nominal genes can explain.
 
         The result [..., D + F] has an entry for the prior of each gene.
@@ -81,12 +81,12 @@ class Nuisance:
         return self.genes.rest(changes / self.scale)
 
 
-def off_units(suspect: Suspect) -> Array:
+def off_units(suspect: Suspect) -> Float[Array, " E"]:
     """Genes [E] in unit coordinates with the suspect switched off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
 
 
-def typical_units(suspect: Suspect) -> Array:
+def typical_units(suspect: Suspect) -> Float[Array, " E"]:
     """Genes [E] in unit coordinates with the suspect at its typical size and location."""
     return unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
 

@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Exponent, Interval, Where
 from wingfit.diagnosis.location.maps import PHASES, RecordingResidual, harmonics
 from wingfit.records import Condition
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.atmosphere import density
 
 EXTENT_QUANTILES = (0.05, 0.95)  # of the excess: ends of the reported extent
@@ -20,7 +20,9 @@ WHOLE_EXTENT = 0.8  # of the span or chord: a misfit that extends over as much h
 MIN_RATIO = 1.05  # of two values of a variable that differ
 
 
-def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Array) -> Where:
+def residual_location(
+    data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Float[Array, " D"]
+) -> Where:
     """Location, phase, axis, harmonics and scaling of coefficients [D], split into ``residuals``."""
     spread = harmonics(data, coefficients)
     span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))

@@ -18,7 +18,7 @@ from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import FreeLaw, Interval, Term
 from wingfit.diagnosis.location.law_features import Candidate, candidates
 from wingfit.diagnosis.location.missing_load import GENE_ERROR_SD, Case
-from wingfit.records.array_types import Array, Index, Mask
+from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import StationMotion
 
@@ -37,31 +37,31 @@ class _NormalEquations:
     ``size`` [M] by which coefficients were scaled.
     """
 
-    curvature: Array
-    slope: Array
-    power: Array
-    count: Array
-    size: Array
+    curvature: Float[Array, "R M M"]
+    slope: Float[Array, "R M"]
+    power: Float[Array, " R"]
+    count: Float[Array, " R"]
+    size: Float[Array, " M"]
 
     def without(self, remaining: int) -> _NormalEquations:
         """All recordings but one."""
         kept = np.arange(len(self.power)) != remaining
         return _NormalEquations(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
-    def fit(self, terms: Index, which: Mask) -> Array:
+    def fit(self, terms: Int[Index, "B N"], which: Bool[Mask, " R"]) -> Float[Array, "B N"]:
         """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
         matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
         ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
         slope = self.slope[which].sum(axis=0)[terms]
         return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
-    def remaining(self, recording: int, terms: Index, found: Array) -> Array:
+    def remaining(self, recording: int, terms: Int[Index, "B N"], found: Float[Array, "B N"]) -> Float[Array, " B"]:
         """Sum of squares [B] of a recording's residual with coefficients ``found`` [B, N] of ``terms`` [B, N]."""
         matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
         along = (found * self.slope[recording][terms]).sum(axis=1)
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
-    def explained(self, terms: Index) -> Array:
+    def explained(self, terms: Int[Index, "B N"]) -> Float[Array, " B"]:
         """Fraction [B] of the excess that ``terms`` [B, N] explain, recordings left out one at a time."""
         after = np.zeros(len(terms))
         for r in range(len(self.power)):

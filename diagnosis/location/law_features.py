@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array, Mask
+from wingfit.records.array_types import Array, Float, Mask
 from wingfit.sim.wing.probing import StationMotion
 
 OUTER, INNER = 0.6, 0.4  # of the span: start of the outer part, end of the inner part
@@ -122,7 +122,7 @@ class Candidate:
     span: Window
     beat: Window
 
-    def field(self, motion: StationMotion) -> Array:
+    def field(self, motion: StationMotion) -> Float[Array, "J N"]:
         """Load per metre of span for a coefficient of one, [stations, instants]."""
         return self.feature.field(motion) * self.span.field(motion) * self.beat.field(motion)
 

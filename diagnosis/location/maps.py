@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
 from wingfit.diagnosis.subject import ChannelLocation, Subject
 from wingfit.inference.noise.harmonic import HarmonicFit
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 PHASES = 72  # instants of a beat in maps
 BANDS = 6  # along the span
@@ -27,12 +27,14 @@ class RecordingResidual:
 
     beat_fit: HarmonicFit
     locations: tuple[ChannelLocation, ...]
-    coefficients: Array
-    variance: Array
-    beat: Array
+    coefficients: Float[Array, "C P"]
+    variance: Float[Array, "C P"]
+    beat: Float[Array, "N C"]
 
 
-def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Array) -> list[RecordingResidual]:
+def recording_residuals(
+    subject: Subject, data: WhitenedData, coefficients: Float[Array, " D"]
+) -> list[RecordingResidual]:
     """Split a coefficient vector [D] by recording."""
     found = []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
@@ -43,7 +45,7 @@ def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Arra
     return found
 
 
-def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Array:
+def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Float[Array, "count P"]:
     """[count, P] value of each coefficient's basis function at equal steps of the beat; zero for slow trends."""
     psi = origin + 2 * np.pi * np.arange(count) / count
     columns = []
@@ -120,7 +122,7 @@ def _squares(recording_residuals: Sequence[RecordingResidual], edges: Array) -> 
     return np.asarray(total / np.maximum(count, 1))
 
 
-def harmonics(data: WhitenedData, coefficients: Array) -> tuple[float, ...]:
+def harmonics(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[float, ...]:
     """Fraction of the excess in each harmonic of the beat, from 0; trends are ignored."""
     order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in data.beat_fits])
     trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in data.beat_fits])

@@ -18,7 +18,7 @@ import numpy as np
 
 from wingfit.diagnosis.finding import Interval, MissingLoad, table
 from wingfit.diagnosis.location.load_kinds import LoadForm, drive_errors, localised, smooth, spreads
-from wingfit.records.array_types import Array, Index
+from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.sim.effects.probe import Probe
 
 PHASES = 36  # instants of a beat at which loads are reported
@@ -49,14 +49,14 @@ class Case:
     """
 
     name: str
-    residual: Array
-    responses: Array
-    sensitivities: Array
+    residual: Float[Array, " D"]
+    responses: Float[Array, "D P"]
+    sensitivities: Float[Array, "D F"]
     crossing: float
 
 
-def whitened(values: Array, place: Index, lag1: float) -> Array:
-    """Whiten rows [n, ...] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
+def whitened(values: Float[Array, "N C"], place: Int[Index, " N"], lag1: float) -> Float[Array, "N C"]:
+    """Whiten rows [N, C] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
     if not len(values):
         return values
     kept = lag1 ** np.diff(place)[:, None]
@@ -76,8 +76,8 @@ class LoadKind:
     width: float | None
     chord: float | None
     drive_error: bool
-    sizes: Array
-    covariance: Array
+    sizes: Float[Array, "R P"]
+    covariance: Float[Array, "R P P"]
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,8 @@ class InferredLoads:
     names: tuple[str, ...]
     crossings: tuple[float, ...]
     kinds: tuple[LoadKind, ...]
-    evidence: Array
-    floor: Array
+    evidence: Float[Array, " R"]
+    floor: Float[Array, " R"]
 
     @property
     def localised(self) -> float:
@@ -110,7 +110,9 @@ class InferredLoads:
         """Whether the drive rods are in error, and no load acts."""
         return self.kinds[0].drive_error
 
-    def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
+    def fields(
+        self, span: Float[Array, " J"], phase: Float[Array, " N"]
+    ) -> tuple[Float[Array, "R K N"], Float[Array, "R K N"]]:
         """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
 
         For errors of the drive, the rods' turns, deg, [R, 2, phase].
@@ -203,7 +205,10 @@ class _NormalEquations:
 
 
 def infer(
-    cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
+    cases: Sequence[Case],
+    probe: Probe,
+    chord: Float[Array, " J"] | None = None,
+    response_error: float = RESPONSE_ERROR,
 ) -> InferredLoads:
     """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 

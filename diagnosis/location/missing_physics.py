@@ -23,7 +23,7 @@ from wingfit.diagnosis.location.missing_load import (
     whitened,
 )
 from wingfit.diagnosis.subject import Subject
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import Probed, StationMotion
 
@@ -144,7 +144,7 @@ def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ..
 
 
 def missing_force(
-    name: str, residuals: Array, phase: Array, noise: float, lag1: float, harmonics: int = 8
+    name: str, residuals: Float[Array, " T"], phase: Float[Array, " T"], noise: float, lag1: float, harmonics: int = 8
 ) -> MissingLoad:
     """For a recording of forces, the missing force: the mean beat of one axis' residual, N.
 

@@ -16,7 +16,7 @@ from wingfit.diagnosis.finding import Advice
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 MIN_PROBABILITY = 0.02  # of a hypothesis that is compared
 MAX_RIVALS = 3  # hypotheses that are compared
@@ -80,7 +80,9 @@ def _least_separation(
     return min(known) if len(known) == len(others) else None
 
 
-def separation(context: FitContext, genome: Array, recording: Recording, rival: Fit, *, adapt: bool) -> float | None:
+def separation(
+    context: FitContext, genome: Float[Array, " G"], recording: Recording, rival: Fit, *, adapt: bool
+) -> float | None:
     """Root mean square difference (in noises) of a rival from the ``recording`` that the first hypothesis predicts.
 
     ``genome`` [G] is that of the first hypothesis.

@@ -23,7 +23,7 @@ import numpy as np
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ class HypothesisWeights:
     """
 
     refits: tuple[Refit, ...]
-    evidence: Array
-    probabilities: Array
+    evidence: Float[Array, " H"]
+    probabilities: Float[Array, " H"]
     unknown: float
-    excess: Array
+    excess: Float[Array, " H"]
     policy: Policy = POLICY
 
 
