@@ -49,15 +49,6 @@ class Distribution:
         zeros = [0.0] * len(start)
         return cls([float(u) for u in start], zeros, list(zeros), np.eye(len(start)).tolist(), unit=list(start))
 
-    def as_json(self) -> dict[str, Any]:
-        """Checkpoint."""
-        return dict(self.__dict__)
-
-    @classmethod
-    def from_json(cls, state: dict[str, Any]) -> Distribution:
-        """Back from a checkpoint."""
-        return cls(**state)
-
     @property
     def diversity(self) -> float:
         """Mean over the genes of the standard deviation in unit coordinates."""

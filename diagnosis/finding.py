@@ -318,6 +318,11 @@ class Finding:
     versions: dict[str, str] = field(default_factory=dict)
 
 
+def in_milli(value: float, unit: str) -> str:
+    """``value`` in ``unit`` ("m" or "N") as text in mm or mN."""
+    return f"{1e3 * value:.3g} m{unit}"
+
+
 def table(values: Float[Array, "N M"]) -> Table:
     """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

@@ -28,7 +28,6 @@ from wingfit.diagnosis.evidence.refit import (
     partner_trials,
     refit_at,
     refit_with,
-    restart_fit,
     strongest_trials,
     substitute_trials,
     suspect_pairs,
@@ -235,7 +234,7 @@ def _nominal_from_best(state: SearchState) -> Refit | None:
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
     if best is nominal or not improves(state.data, best, nominal):
         return None
-    found = restart_fit(state.context, nominal, best.fit.unit[: len(nominal.fit.unit)])
+    found = refit_at(state.context, nominal, best.fit.unit[: len(nominal.fit.unit)])
     return found if found is not None and improves(state.data, found, nominal) else None
 
 

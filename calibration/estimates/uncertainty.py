@@ -114,6 +114,8 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     per_value, per_cent = _slopes(genes, values)
     to_shares = _share_map(genes, problem.base) * per_cent
     relative = to_shares @ unit @ to_shares.T
+    (inside,) = np.nonzero(free)
+    own = remarks([genes[k] for k in inside], relative[np.ix_(inside, inside)], linear.known[inside], IDENTIFIABLE)
     return Uncertainty(
         free=problem.free,
         values=values,
@@ -122,7 +124,7 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
         known=linear.known,
         noise=tuple(n.covariance for n in noise),
         cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
-        remarks=(*doubts, *_remarks(genes, relative, linear.known, free)),
+        remarks=(*doubts, *own),
     )
 
 
@@ -208,12 +210,6 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
             larger = np.sqrt(np.maximum(beats / np.maximum(np.diag(meat), 1e-300), 1.0))
         total += meat * larger * larger[:, None]
     return total
-
-
-def _remarks(genes: list[Gene], relative: Array, known: Mask, free: Mask) -> tuple[str, ...]:
-    """Remarks on the genes that are not at a bound."""
-    (kept,) = np.nonzero(free)
-    return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], known[kept], IDENTIFIABLE)
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:

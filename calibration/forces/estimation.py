@@ -11,7 +11,7 @@ import numpy as np
 from wingfit.calibration.effects import absent, is_measured
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
-from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
+from wingfit.calibration.estimates.uncertainty import Standing, Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
 from wingfit.calibration.forces.global_model import at, average, fit_global
@@ -334,20 +334,11 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adeq
     results = []
     for gene in model.genes:
         standings = [one.known.standing[gene.name] for one in judged if gene.name in one.known.standing]
-        free = [0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged]
-        results.append(
-            GeneResult(
-                gene.name,
-                gene.unit,
-                gene.description,
-                nominal[gene.name],
-                best[gene.name],
-                gene.lower,
-                gene.upper,
-                bool(standings),
-                max(s.standard_error for s in standings) if standings else None,
-                adequate and all(s.identifiable for s in standings) and all(free) if standings else None,
-                max(s.absolute for s in standings) if standings else None,
-            )
-        )
+        inside = all(0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged)
+        worst = None
+        if standings:
+            identifiable = adequate and all(s.identifiable for s in standings) and inside
+            largest, absolute = max(s.standard_error for s in standings), max(s.absolute for s in standings)
+            worst = Standing(largest, identifiable, absolute)
+        results.append(GeneResult.of(gene, nominal[gene.name], best[gene.name], worst))
     return tuple(results)

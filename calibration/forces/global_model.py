@@ -35,12 +35,6 @@ class GlobalValues:
     remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class _Fit:
-    coefficients: Array
-    scatter: float | None
-
-
 @one_blas_thread
 def fit_global(
     estimates: Sequence[LocalEstimate],
@@ -131,9 +125,9 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
     identified = np.isfinite(errors)
     if identified.sum() < design.shape[1]:  # not identified: keep the assumed value
         identified = np.ones_like(identified)
-    fit = _fit(design[identified], local[identified], errors[identified], weighted)
-    off = np.abs(design @ fit.coefficients - local) / _sizes(local)
-    constant, per_hz, per_rad = (*fit.coefficients.tolist(), 0.0, 0.0)[:3]
+    coefficients, scatter = _fit(design[identified], local[identified], errors[identified], weighted)
+    off = np.abs(design @ coefficients - local) / _sizes(local)
+    constant, per_hz, per_rad = (*coefficients.tolist(), 0.0, 0.0)[:3]
     left_out = [_left_out(int(k), design, local, errors, identified, weighted) for k in np.flatnonzero(identified)]
     seen = [error for error in left_out if error is not None]
     return GlobalGene(
@@ -141,18 +135,19 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
         constant,
         per_hz,
         per_rad,
-        fit.scatter,
+        scatter,
         float(off[identified].max()),
         max(seen) if len(seen) == len(left_out) else None,
     )
 
 
-def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> _Fit:
+def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> tuple[Array, float | None]:
+    """Coefficients of the law, and its scatter where that can be estimated."""
     conditions, coefficients = design.shape
     if not weighted or conditions - coefficients < FREE_FOR_SCATTER or not np.isfinite(errors).all():
-        return _Fit(_weighted(design, local, np.ones(conditions)), None)
+        return _weighted(design, local, np.ones(conditions)), None
     scatter2 = _scatter2(design, local, errors**2)
-    return _Fit(_weighted(design, local, errors**2 + scatter2), float(np.sqrt(scatter2)))
+    return _weighted(design, local, errors**2 + scatter2), float(np.sqrt(scatter2))
 
 
 def _weighted(design: Array, local: Array, variance: Array) -> Array:
@@ -182,7 +177,7 @@ def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Ma
     rest[k] = False
     if rest.sum() < design.shape[1] or not _independent(design[rest]):
         return None
-    found = _fit(design[rest], local[rest], errors[rest], weighted).coefficients
+    found, _ = _fit(design[rest], local[rest], errors[rest], weighted)
     return float(abs(design[k] @ found - local[k]) / _sizes(local)[k])
 
 

@@ -47,7 +47,8 @@ def pieces(recording: Recording, beats: int) -> Index:
     Pieces are shorter if no stretch without gaps is that long, and [0, 0] if none holds a beat. A piece may begin at
     any phase, which does not change the spectrum of a periodic force.
     """
-    runs = _runs(np.flatnonzero(recording.valid.all(axis=1)))
+    rows = np.flatnonzero(recording.valid.all(axis=1))
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     longest = max((len(run) for run in runs), default=0)
     step = float(np.median(np.diff(recording.times)))
     per_beat = 1.0 / (recording.condition.flap_frequency * step)
@@ -57,8 +58,3 @@ def pieces(recording: Recording, beats: int) -> Index:
         return np.empty((0, 0), np.int64)
     found = [run[: len(run) // length * length].reshape(-1, length) for run in runs]
     return np.concatenate(found)
-
-
-def _runs(rows: Index) -> list[Index]:
-    """``rows`` [n], increasing, in runs without a step beyond one."""
-    return [run for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(run)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -184,6 +185,11 @@ class _Simulator:
         model = self.context.subject.with_initial_motion(problem.model, genome)
         return self.context.evaluate(replace(problem, model=model), values_at(genes, units))
 
+    def outputs(self, motion_genes: Array, units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+        """Coefficients as the only output, and the reasons of failures, for :func:`differences`."""
+        found, reasons, _ = self.at(units, motion_genes)
+        return [found], reasons
+
 
 def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
     found, reasons, residuals = simulator.at(unit[None], unit)
@@ -204,11 +210,7 @@ def _measure_columns(simulator: _Simulator, fit: Fit, which: Mask, sides: int = 
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
-
-    def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        found, reasons, _ = simulator.at(units, fit.motion_genes)
-        return [found], reasons
-
+    simulate = partial(simulator.outputs, fit.motion_genes)
     found = differences(simulate, fit.unit, columns, at=[fit.coefficients], sides=sides)
     jacobian = fit.jacobian.copy()
     jacobian[:, columns] = found.slopes[0]

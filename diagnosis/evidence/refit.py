@@ -141,14 +141,18 @@ def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit
     return unit, jacobian[:, : len(before.unit)]
 
 
-def refit_at(finer: FitContext, refit: Refit) -> Refit | None:
-    """``refit`` fitted with a ``finer`` model from its current genes; None where that cannot be simulated."""
-    problem = replace(refit.fit.problem, model=finer.subject.extended(refit.names))
+def refit_at(context: FitContext, refit: Refit, start: Float[Array, " F"] | None = None) -> Refit | None:
+    """``refit`` fitted with the model of ``context`` from its current genes, or anew from ``start`` [F].
+
+    None where that cannot be simulated.
+    """
+    before, problem = refit.fit, replace(refit.fit.problem, model=context.subject.extended(refit.names))
+    genes, known_columns = (before.unit, before.jacobian) if start is None else (start, before.jacobian[:, :0])
     try:
-        fit = _fit_added_genes(finer, problem, refit.fit.unit, refit.fit.jacobian)
+        fit = _fit_added_genes(context, problem, genes, known_columns)
     except FIT_ERRORS:
         return None
-    return make_refit(finer.data, fit, refit.trials)
+    return make_refit(context.data, fit, refit.trials)
 
 
 def continue_fit(context: FitContext, refit: Refit, steps: int = CONTINUED_STEPS) -> Refit:
@@ -170,15 +174,6 @@ def fit_to_convergence(context: FitContext, refit: Refit) -> Refit:
     if not refit.fit.converged:
         refit = continue_fit(context, refit)
     return make_refit(context.data, with_measured_jacobian(context, refit.fit), refit.trials)
-
-
-def restart_fit(context: FitContext, refit: Refit, start: Float[Array, " F"]) -> Refit | None:
-    """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
-    try:
-        fit = broyden_fit(context, refit.fit.problem, start, steps=REFIT_STEPS)
-    except FIT_ERRORS:
-        return None
-    return make_refit(context.data, fit, refit.trials)
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:

@@ -121,12 +121,9 @@ def _suspect_trials(
     found, reasons, _ = context.evaluate(problem, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
-    trials, row = [], 0
-    for genes in groups:
-        rows = slice(row, row + len(genes))
-        row += len(genes)
-        if not bad[rows].any():
-            trials.append(_trial(suspect, genes, changes[rows], nuisance))
+    ends = np.cumsum([len(genes) for genes in groups])[:-1]
+    parts = zip(groups, np.split(changes, ends), np.split(bad, ends), strict=True)
+    trials = [_trial(suspect, genes, own, nuisance) for genes, own, failed in parts if not failed.any()]
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
@@ -147,11 +144,10 @@ def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -
 
 def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
     """Smallest and largest multiples [S] of each size that stay in the box."""
-    off, low, high = off_units(suspect), np.zeros(len(genes)), np.zeros(len(genes))
-    for row, unit in enumerate(genes):
-        column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
-        move = unit[column] - off[column]
-        low[row], high[row] = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
+    off, size = off_units(suspect), np.array(size_columns(suspect))
+    column = size[np.abs(genes[:, size] - off[size]).argmax(axis=1)]  # of the gene that each row moves
+    move = genes[np.arange(len(genes)), column] - off[column]
+    low, high = np.sort([(0.0 - off[column]) / move, (1.0 - off[column]) / move], axis=0)
     return low, high
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import FreeLaw, Interval, MissingLoad, table
+from wingfit.diagnosis.finding import FreeLaw, MissingLoad, table
 from wingfit.diagnosis.location.free_form_law import free_law
 from wingfit.diagnosis.location.missing_load import (
     PHASES,
@@ -36,29 +36,13 @@ MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
 class MissingPhysics:
     """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
 
-    ``drive_error``: the drive rods are in error, and no load acts. ``pulse``: instant of a recorded force.
+    ``drive_error``: the drive rods are in error, and no load acts.
     """
 
     loads: tuple[MissingLoad, ...] = ()
-    place: LoadPlace | None = None
+    place: LoadPlace = field(default_factory=LoadPlace)
     law: FreeLaw | None = None
     drive_error: bool = False
-    pulse: Interval | None = None
-
-    @property
-    def span(self) -> Interval | None:
-        """Location along the span."""
-        return None if self.place is None else self.place.span
-
-    @property
-    def chord(self) -> Interval | None:
-        """Location along the chord."""
-        return None if self.place is None else self.place.chord
-
-    @property
-    def phase(self) -> Interval | None:
-        """Instant in the beat."""
-        return self.pulse if self.place is None else self.place.phase
 
 
 @dataclass(frozen=True)
@@ -99,14 +83,13 @@ def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysi
     if not found:
         return MissingPhysics()
     whole = max(len(guess.cases) for guess in found)
-    best = min(
-        (guess for guess in found if len(guess.cases) == whole), key=lambda guess: guess.inferred.noise_inflation
-    )
+    complete = [guess for guess in found if len(guess.cases) == whole]
+    best = min(complete, key=lambda guess: guess.inferred.noise_inflation)
     loads, drive_error = missing_loads(best.inferred), best.inferred.drive_error
     if not drive_error and not _plausible(loads, best.motions):
         return MissingPhysics()
     free_form = free_law(best.cases, PROBE, best.motions) if law and not drive_error else None
-    return MissingPhysics(loads, locate_load(best.inferred), free_form, drive_error)
+    return MissingPhysics(loads, locate_load(best.inferred) or LoadPlace(), free_form, drive_error)
 
 
 def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:

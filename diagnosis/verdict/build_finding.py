@@ -10,12 +10,24 @@ from typing import Literal
 import numpy as np
 
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
+from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Interval, Proof, RecordingMisfit, Where
+from wingfit.diagnosis.finding import (
+    Advice,
+    Finding,
+    Floors,
+    GeneValue,
+    Interval,
+    Proof,
+    RecordingMisfit,
+    Where,
+    in_milli,
+)
 from wingfit.diagnosis.location import maps
 from wingfit.diagnosis.location.differences import cause_location, residual_location
+from wingfit.diagnosis.location.missing_load import LoadPlace
 from wingfit.diagnosis.location.missing_physics import (
     MissingPhysics,
     largest_residuals,
@@ -27,7 +39,7 @@ from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
-from wingfit.diagnosis.verdict.verdict import Decision, all_genes, decide, hypotheses, summary
+from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
 from wingfit.inference.noise.harmonic import still_markers
 from wingfit.records import Recording
 
@@ -74,7 +86,7 @@ def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, 
     if data.recordings[0].kind == "forces":
         when = locate_pulse(state.context, nominal.fit) if unnamed else None
         loads = missing_forces(state.context, nominal)
-        yield 1.0, "locating the missing force", MissingPhysics(loads, pulse=when)
+        yield 1.0, "locating the missing force", MissingPhysics(loads, LoadPlace(phase=when))
         return
     models, which = [(state.subject, nominal)], largest_residuals(data, nominal)
     for finer in islice(state.context.finer(), int(unnamed)):
@@ -96,10 +108,10 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
     shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
-    own = {gene.name: gene.value for gene in all_genes(state.data, shown_refit)}
-    span = _effect_location(shown_refit, own, "span") or missing.span
-    chord = _effect_location(shown_refit, own, "chord") or missing.chord
-    phase = missing.phase if decision.verdict != "measurement fault" else None
+    own = {gene.name: gene.value for gene in gene_values(state.data, shown_refit)}
+    span = _effect_location(shown_refit, own, "span") or missing.place.span
+    chord = _effect_location(shown_refit, own, "chord") or missing.place.chord
+    phase = missing.place.phase if decision.verdict != "measurement fault" else None
     return replace(
         found,
         words=found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
@@ -138,7 +150,7 @@ def _finding(
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
         shown += maps.overlays(subject, validation.data, validation.before, validation.after, held_out=True)
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
-    suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(data, best)
+    suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
         dataset=name,
@@ -199,15 +211,12 @@ def _summary_texts(
     data: WhitenedData, nominal: Refit, best: Refit, place: str, proved: Proof | None
 ) -> Mapping[str, str]:
     """The parts of the summary as text."""
-    unit = "mm" if data.recordings[0].kind == "tracks" else "mN"
-
-    def size(excess: float) -> str:
-        return f"{1e3 * np.sqrt(data.noise**2 + max(excess, 0.0)):.3g} {unit}"
-
+    unit = "m" if data.recordings[0].kind == "tracks" else "N"
+    before, after = (np.sqrt(data.noise**2 + max(one.excess, 0.0)) for one in (nominal, best))
     return {
-        "before": size(nominal.excess),
-        "after": size(best.excess),
-        "noise": f"{1e3 * data.noise:.3g} {unit}",
+        "before": in_milli(before, unit),
+        "after": in_milli(after, unit),
+        "noise": in_milli(data.noise, unit),
         "where": place,
         "held_out": f"On {proved.words}."
         if proved
@@ -216,19 +225,16 @@ def _summary_texts(
 
 
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
-    if not nominal.tried_finer:
-        return ()
-    finer = nominal.tried_finer
-    return (f"a finer discretisation ({finer}) hardly fits better: the discretisation is not the cause",)
+    remark = f"a finer discretisation ({nominal.tried_finer}) hardly fits better: the discretisation is not the cause"
+    return (remark,) if nominal.tried_finer else ()
 
 
 def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
     within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
-    still = {r.name: still_markers(r) for r in data.recordings}
     remarks = [
-        f"{name}: the recorded position of {', '.join(markers)} never changes; ignored: check how tracks are exported"
-        for name, markers in still.items()
-        if markers
+        f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
+        for one in data.recordings
+        if (markers := still_markers(one))
     ]
     if within_beats:
         remarks.append(
@@ -247,9 +253,8 @@ def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, .
 
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
     """Remark on recordings that fit worse with the added effects."""
-    name = "mm" if unit == "m" else "mN"
     worse = [
-        f"{row.name} from {1e3 * row.before.value:.3g} to {1e3 * row.after.value:.3g} {name}"
+        f"{row.name} from {1e3 * row.before.value:.3g} to {in_milli(row.after.value, unit)}"
         for row in rows
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]
